@@ -55,7 +55,7 @@ def ours(scene: pn.Scene, q: Any, v: Any, steps: int, threads: int) -> Call:
 
     def call() -> tuple[int, str]:
         try:
-            runs = pn.rollout(scene, q, v, steps * DT, method="semi_implicit_euler", dt=DT, threads=threads)
+            runs = pn.rollout(scene, q, v, steps * DT, method="semi_implicit_euler", dt=DT, jobs=threads)
         except pn.RunError as error:
             return 0, str(error)
         return sum(run.stats.steps for run in runs), ""

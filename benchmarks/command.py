@@ -69,7 +69,7 @@ actions:
   build        compile the core in a temporary folder: processor time, wall time and memory by room
   build-peers  compile the C++ peers (some minutes, once)
   references   compute the references anew
-  report       keep the full results of the output folder; write the page of benchmarks and the README's table
+  report       keep the full results of the output folder; write the page of benchmarks, figures of the README
 """
 
 

@@ -269,7 +269,7 @@ def short(sizes: tuple[int, ...]) -> Iterator[Row]:
     yield Row("short runs", 1, "simulate of one step", {OURS: timing.per_call(once)})
     many = partial(pn.rollout, scene, Q, V, dt, method=method, dt=dt, as_arrays=True)
     batches = {OURS: timing.per_call(many)}
-    by_two = {OURS: timing.per_call(partial(many, threads=2))}
+    by_two = {OURS: timing.per_call(partial(many, jobs=2))}
     step = {OURS: timing.per_call(lambda: scene.step(q, v, None, dt))}
     if found is not None:
         import mujoco

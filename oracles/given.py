@@ -38,9 +38,13 @@ def torque(actuation, scene, q, v, t):
         kp, kd = (_gain(model, k) for k in (actuation.kp, actuation.kd))
         goal = scene.q0 if actuation.q is None else np.asarray(actuation.q)
         return kp * _difference(model, q, goal, kp) - kd * v
+    if isinstance(actuation, pn.Table) and actuation.interpolation == "hold":
+        return np.asarray(actuation.values)[max(np.searchsorted(actuation.times, t, side="right") - 1, 0)]
     if isinstance(actuation, pn.Table):
         return np.array([np.interp(t, actuation.times, column) for column in np.transpose(actuation.values)])
     if isinstance(actuation, pn.SampledControl):
+        if actuation.delay_in_samples:  # a single state has no earlier samples
+            return np.zeros(model.nv) if actuation.initial is None else np.array(actuation.initial)
         return np.asarray(actuation.function(t, q, v), dtype=float)
     return np.asarray(actuation(t, q, v) if callable(actuation) else actuation, dtype=float)
 

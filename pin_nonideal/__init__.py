@@ -60,8 +60,10 @@ if TYPE_CHECKING:
     from .simulation.rollout import rollout
     from .simulation.rollout_arrays import RunArrays
     from .statics.equilibrium import Equilibrium, equilibrium
+    from .statics.holding import HoldingTorque
     from .statics.inverse_dynamics import InverseDynamics, inverse_dynamics
     from .statics.static_feasibility import Rest, rest
+    from .statics.track_trajectory import TrackTrajectory
     from .sweeps.grid import sweep_grid, sweep_samples
     from .sweeps.store import Sweep
     from .sweeps.sweep import sweep
@@ -84,10 +86,12 @@ _LATER = {
     "replay": "visualization.replay",
     "Equilibrium": "statics.equilibrium",
     "equilibrium": "statics.equilibrium",
+    "HoldingTorque": "statics.holding",
     "InverseDynamics": "statics.inverse_dynamics",
     "inverse_dynamics": "statics.inverse_dynamics",
     "Rest": "statics.static_feasibility",
     "rest": "statics.static_feasibility",
+    "TrackTrajectory": "statics.track_trajectory",
     "sweep_grid": "sweeps.grid",
     "sweep_samples": "sweeps.grid",
     "Sweep": "sweeps.store",
@@ -119,6 +123,7 @@ __all__ = [
     "FrictionConvergenceError",
     "FrictionParadoxError",
     "GeometryContact",
+    "HoldingTorque",
     "ImpactEnergyError",
     "InconsistentConstraintsError",
     "InputError",
@@ -145,6 +150,7 @@ __all__ = [
     "Stepper",
     "StiffnessError",
     "Sweep",
+    "TrackTrajectory",
     "Trajectory",
     "UnknownNameError",
     "UserFunctionError",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import platform
 import re
@@ -12,8 +13,9 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
-from .errors import InputError, OutputError
+from .errors import InputError, OutputError, short_repr
 
+NAME_BYTES_MAX = 255  # of a file or folder, on the file systems in use
 PART = ".part"  # end of the name of a file that is still being written
 
 
@@ -28,10 +30,39 @@ def file_path(what: str, value: object) -> Path:
         InputError: the argument is no path, or is empty.
     """
     if not isinstance(value, (str, os.PathLike)) or not isinstance(os.fspath(value), str):
-        raise InputError(f"{what} must be the name of a file; got {value!r}")
-    if not Path(value).name or "\0" in os.fspath(value):
-        raise InputError(f"{what} must be the name of a file; got {os.fspath(value)!r}")
-    return Path(value)
+        raise InputError(f"{what} must be the name of a file; got {short_repr(value)}")
+    path = Path(value)
+    if not path.name or "\0" in os.fspath(value):
+        raise InputError(f"{what} must be the name of a file; got {short_repr(os.fspath(value))}")
+    if any(len(part.encode(errors="replace")) > NAME_BYTES_MAX for part in path.parts):
+        raise InputError(
+            f"{what} must be the name of a file of at most {NAME_BYTES_MAX} bytes; got "
+            f"{short_repr(os.fspath(value))}"
+        )
+    return path
+
+
+def check_writable(path: Path, what: str) -> None:
+    """Check that a file can be written, before the work that makes its content.
+
+    Args:
+        path: the file.
+        what: words for messages.
+
+    Raises:
+        OutputError: the folder does not exist or cannot be written, or `path` is a folder, device or pipe.
+    """
+    mode_of(path, what)
+    target = Path(os.path.realpath(path))
+    try:
+        if target.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+        if not stat.S_ISDIR(target.parent.stat().st_mode):
+            raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR))
+        if not os.access(target.parent, os.W_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    except OSError as error:
+        raise OutputError(_cannot_write(path, what, error)) from error
 
 
 @contextmanager
@@ -87,13 +118,18 @@ def mode_of(path: Path, what: str) -> int:
         OutputError: the path is a device, a pipe or a socket, or its links form a cycle.
     """
     target = Path(os.path.realpath(path))
-    if target.is_symlink():
-        raise OutputError(
-            f'cannot write {what} to "{path}": its symbolic links lead in a circle; name a file'
-        )
-    if not target.exists():
-        return 0o666 & ~_umask()
-    mode = target.stat().st_mode
+    try:
+        if target.is_symlink():
+            raise OutputError(
+                f'cannot write {what} to "{path}": its symbolic links lead in a circle; name a file'
+            )
+        if not target.exists():
+            return 0o666 & ~_umask()
+        mode = target.stat().st_mode
+    except OSError as error:
+        if isinstance(error, OutputError):
+            raise
+        raise OutputError(_cannot_write(path, what, error)) from error
     if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
         raise OutputError(f'cannot write {what} to "{path}": it is a device or a pipe; name a file')
     return stat.S_IMODE(mode)

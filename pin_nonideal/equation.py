@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import InconsistentConstraintsError, InputError, NonFiniteError, SingularMassError
+from .html_tables import table
 from .validation import floats
 
 Array = NDArray[np.floating[Any]]
@@ -74,6 +75,14 @@ class Solution:
     modes: NDArray[np.int8] = field(default_factory=lambda: np.zeros(0, dtype=np.int8))
     unique: bool | None = True
     closed: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+
+    def _repr_html_(self) -> str:
+        keys = ("a", "F_ideal", "F_nonideal", "lam", "modes", "closed")
+        vectors: dict[str, NDArray[Any]] = {key: getattr(self, key) for key in keys}
+        rows: list[tuple[str, object]] = [
+            (name, np.array2string(x, precision=6, threshold=20)) for name, x in vectors.items() if x.size
+        ]
+        return table("Solution", [*rows, ("rank", self.rank), ("unique", self.unique)])
 
 
 def solve(

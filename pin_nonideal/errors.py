@@ -7,8 +7,14 @@ value, and a remedy.
 
 from __future__ import annotations
 
+import reprlib
 from collections.abc import Iterable
 from typing import Any
+
+MESSAGE_MAX = 1000  # characters of a message
+MESSAGE_END = 300  # characters at the end of a longer message that stay, since they hold the remedy
+VALUE_MAX = 160  # characters of a value in a message
+NAME_MAX = 64  # characters of a name that is compared with known names
 
 
 class PinNonidealError(Exception):
@@ -20,7 +26,7 @@ class PinNonidealError(Exception):
 
     def __str__(self) -> str:
         # KeyError prints the repr of its message; all classes here print the message itself.
-        return str(self.args[0]) if self.args else ""
+        return _shortened(str(self.args[0]), MESSAGE_MAX, MESSAGE_END) if self.args else ""
 
 
 def _made_again(
@@ -55,6 +61,8 @@ class JointOrderWarning(UserWarning):
 
 class RunError(PinNonidealError, RuntimeError):
     """A run stopped early.
+
+    The page "Why did my run stop" (docs/how_to/stopped_runs.md) treats each subclass.
 
     Attributes:
         trajectory: samples before the failure (`pin_nonideal.Trajectory`), or None outside of a run.
@@ -206,6 +214,9 @@ class RunInterrupted(RunError, KeyboardInterrupt):
 def nearest(name: str, names: Iterable[str]) -> str:
     """Return a message suffix with the closest known name, for unknown names.
 
+    A name is close if at most one letter in three is changed, added, left out or swapped with its neighbor,
+    or if one name begins with the other.
+
     Args:
         name: the unknown name.
         names: known names.
@@ -216,10 +227,66 @@ def nearest(name: str, names: Iterable[str]) -> str:
     import difflib
 
     known = list(names)
-    close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
-    if close:
-        return f'; nearest: "{close[0]}"'
+    if len(name) <= NAME_MAX:
+        for close in difflib.get_close_matches(name, known, n=3, cutoff=0.5):
+            if _is_close(name, close):
+                return f'; nearest: "{close}"'
     if not known:
         return "; there is none"
-    shown = ", ".join(f'"{n}"' for n in known[:8])
+    shown = ", ".join(f'"{_shortened(n, NAME_MAX)}"' for n in known[:8])
     return f"; known: {shown}" + (", ..." if len(known) > 8 else "")
+
+
+def short_repr(value: object) -> str:
+    """Return the repr of a value for a message, with long parts left out.
+
+    Args:
+        value: any object, also one whose `__repr__` raises.
+
+    Returns:
+        The repr, or a part of it of at most `VALUE_MAX` characters.
+    """
+    try:
+        text = repr(value)
+    except Exception:
+        return f"<{type(value).__name__}>"
+    if len(text) <= VALUE_MAX:
+        return text
+    if type(value) in (list, tuple, dict, set, frozenset):
+        text = _parts.repr(value)
+    return _shortened(text, VALUE_MAX, VALUE_MAX // 4)
+
+
+_parts = reprlib.Repr()
+_parts.maxlist = _parts.maxtuple = _parts.maxdict = _parts.maxset = _parts.maxfrozenset = 3
+_parts.maxlevel, _parts.maxstring, _parts.maxother = 3, 30, 30
+
+
+def _shortened(text: str, most: int, end: int = 0) -> str:
+    """Return a text, or its beginning and its last `end` characters around " ... "."""
+    if len(text) <= most:
+        return text
+    return f"{text[: most - end - 5]} ... {text[len(text) - end :]}".rstrip()
+
+
+def _is_close(name: str, known: str) -> bool:
+    """Check if a name is a known name with few changes."""
+    a, b = name.casefold(), known.casefold()
+    short = min(a, b, key=len)
+    if len(short) >= 3 and a[: len(short)] == b[: len(short)]:
+        return True
+    return _edits(a, b) <= max(1, max(len(a), len(b)) // 3)
+
+
+def _edits(a: str, b: str) -> int:
+    """Return the number of letters changed, added, left out or swapped with a neighbour between two words."""
+    before: list[int] = []
+    last = list(range(len(b) + 1))
+    for i, x in enumerate(a, 1):
+        row = [i]
+        for j, y in enumerate(b, 1):
+            row.append(min(last[j] + 1, row[j - 1] + 1, last[j - 1] + (x != y)))
+            if i > 1 and j > 1 and x == b[j - 2] and a[i - 2] == y:
+                row[j] = min(row[j], before[j - 2] + 1)
+        before, last = last, row
+    return last[-1]

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import InputError, nearest
+from .errors import InputError, nearest, short_repr
 
 FEW = 100  # up to this size a Python sum is faster than NumPy; a finite sum implies finite numbers
 
@@ -55,7 +55,7 @@ def number(what: str, value: object) -> float:
     if type(value) is float and math.isfinite(value):
         return value
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (Real, np.ndarray)):
-        raise InputError(f"{what} must be a number; got {value!r}")
+        raise InputError(f"{what} must be a number; got {short_repr(value)}")
     if isinstance(value, np.ndarray) and (value.ndim != 0 or value.dtype.kind not in "fiu"):
         raise InputError(f"{what} must be one number; got an array of shape {value.shape}")
     result = float(value)
@@ -107,7 +107,7 @@ def flag(what: str, value: object) -> bool:
         InputError: `value` is no bool.
     """
     if not isinstance(value, (bool, np.bool_)):
-        raise InputError(f"{what} must be True or False; got {value!r}")
+        raise InputError(f"{what} must be True or False; got {short_repr(value)}")
     return bool(value)
 
 
@@ -118,7 +118,7 @@ def count(what: str, value: object, *, least: int = 0, most: int = 1_000_000_000
         InputError: `value` is no integer, too small or too large.
     """
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
-        raise InputError(f"{what} must be an integer; got {value!r}")
+        raise InputError(f"{what} must be an integer; got {short_repr(value)}")
     if value < least:
         raise InputError(f"{what} must be at least {least}; got {value}")
     if value > most:
@@ -133,7 +133,7 @@ def text(what: str, value: object) -> str:
         InputError: `value` is no string, or empty.
     """
     if not isinstance(value, str):
-        raise InputError(f"{what} must be a name (a string); got {value!r}")
+        raise InputError(f"{what} must be a name (a string); got {short_repr(value)}")
     if not value.strip():
         raise InputError(f"{what} must be a name; got an empty string")
     return value
@@ -162,7 +162,9 @@ def choice(what: str, value: object, allowed: Sequence[Any]) -> Any:
         hint = nearest(value, names) if isinstance(value, str) else ""
         if not hint.startswith("; nearest"):  # the message lists the known names already
             hint = ""
-        raise InputError(f"{what} must be one of {', '.join(map(repr, allowed))}; got {value!r}{hint}")
+        raise InputError(
+            f"{what} must be one of {', '.join(map(repr, allowed))}; got {short_repr(value)}{hint}"
+        )
     return value
 
 
@@ -173,7 +175,7 @@ def sequence(what: str, value: object) -> tuple[Any, ...]:
         InputError: `value` is no list or tuple, for example a single description.
     """
     if not isinstance(value, (list, tuple)):
-        raise InputError(f"{what} must be a list; got {value!r}")
+        raise InputError(f"{what} must be a list; got {short_repr(value)}")
     return tuple(value)
 
 
@@ -217,7 +219,7 @@ def array(what: str, value: object, shape: Sequence[int | None], copy: bool = Tr
         return result
     wanted = str(tuple("n" if s is None else s for s in shape)).replace("'", "")
     if result is None:
-        raise InputError(f"{what} must be an array of numbers of shape {wanted}; got {value!r}")
+        raise InputError(f"{what} must be an array of numbers of shape {wanted}; got {short_repr(value)}")
     if result.ndim != len(shape) or any(s not in (None, n) for s, n in zip(shape, result.shape, strict=True)):
         raise InputError(f"{what} must have shape {wanted}; got shape {result.shape}")
     if where is not None:
@@ -239,7 +241,7 @@ def function(what: str, value: object, signature: str) -> Callable[..., Any]:
         InputError: `value` is not callable.
     """
     if not callable(value):
-        raise InputError(f"{what} must be a function {signature}; got {value!r}")
+        raise InputError(f"{what} must be a function {signature}; got {short_repr(value)}")
     result: Callable[..., Any] = value
     return result
 
@@ -256,7 +258,7 @@ def unit_axis(what: str, value: object) -> Vector3:
     """
     if isinstance(value, str):
         if value not in AXES:
-            raise InputError(f'{what} must be "x", "y", "z" or three numbers; got {value!r}')
+            raise InputError(f'{what} must be "x", "y", "z" or three numbers; got {short_repr(value)}')
         return AXES[value]
     vector = array(what, value, (3,))
     largest = float(np.abs(vector).max())

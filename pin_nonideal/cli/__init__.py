@@ -1,1 +1,1 @@
-"""The command `pin-nonideal`."""
+"""The command line `pin-nonideal`."""

@@ -1,4 +1,4 @@
-"""What the command line does beside `run`: resume, replay, sweep, equilibrium, info, completion."""
+"""Commands beside `run` and `resume`: replay, sweep, equilibrium, info and completion."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from pin_nonideal.errors import InputError, LoadingError
+from pin_nonideal.atomic_files import check_writable, file_path
+from pin_nonideal.errors import InputError, LoadingError, short_repr
 from pin_nonideal.loading.load import load
 from pin_nonideal.loading.yaml.robot import check_keys
 from pin_nonideal.loading.yaml.subset import plain_yaml
@@ -27,10 +28,10 @@ SWEEP_KEYS = ("robot", "parameters", "duration", "grid", "samples", "options", "
 
 
 def plain_value(text: str) -> Any:
-    """A whole number, a number, true or false; anything else is text.
+    """Return a word as an integer, a number or a truth value, else as text.
 
     Args:
-        text: a word of the command line.
+        text: word of the command line.
     """
     for kind in (int, float):
         try:
@@ -41,14 +42,14 @@ def plain_value(text: str) -> Any:
 
 
 def named_values(words: Sequence[str], option: str) -> dict[str, Any] | None:
-    """JOINT=NUMBER[,NUMBER...] and JOINT.PIECE=... as a table by joint name; None of no words.
+    """Return JOINT=NUMBER[,NUMBER...] and JOINT.PIECE=... as a table by joint name, or None without words.
 
     Args:
-        words: of the command line.
-        option: its name, for messages.
+        words: words of the command line.
+        option: name of the option, for messages.
 
     Raises:
-        InputError: a word is something else.
+        InputError: a word has another form.
     """
     table: dict[str, Any] = {}
     for word in words:
@@ -72,15 +73,17 @@ def named_values(words: Sequence[str], option: str) -> dict[str, Any] | None:
 
 
 def replay_file(options: argparse.Namespace) -> int:
-    """Writes the replay of a saved run.
+    """Write the replay of a saved run.
 
     Args:
-        options: run and page, paths; number of the run where that is a sweep's folder; robot, whose scene it
-            is, or None.
+        options: run and page, paths; number of the run if the path is the folder of a sweep; robot, name or
+            path of the run's robot, or None.
 
     Raises:
-        InputError: there is a number and no folder, or a folder and no number, or no robot.
+        InputError: a number is given without a folder, a folder without a number, or the robot is unknown.
     """
+    if options.page is not None:
+        check_writable(file_path("PAGE.html", options.page), "the replay")
     scene = "source" if options.robot is None else load(options.robot)
     path, number = Path(options.run), options.number
     if path.is_dir() != (number is not None):
@@ -105,38 +108,38 @@ def replay_file(options: argparse.Namespace) -> int:
 
 
 def describe_robot(scene: Scene, as_json: bool) -> int:
-    """Prints what a robot is made of.
+    """Print the parts of a robot: joints, constraints, laws, rows and mobility.
 
     Args:
-        scene: the robot's.
-        as_json: as JSON, for programs.
+        scene: scene of the robot.
+        as_json: whether to print JSON, for programs.
     """
     if not as_json:
         print(scene.report())
         return 0
     q, v = scene.initial_state()
-    told = scene.describe().to_dict()
-    told |= {"source": scene.source, "licence": scene.licence, "notes": scene.notes}
-    told |= {"nq": scene.model.nq, "nv": scene.model.nv, "q0": q.tolist(), "v0": v.tolist()}
-    told["dropped"] = [list(each) for each in scene.dropped]
-    print(json.dumps(told, indent=2))
+    data = scene.describe().to_dict()
+    data |= {"source": scene.source, "licence": scene.licence, "notes": scene.notes}
+    data |= {"nq": scene.model.nq, "nv": scene.model.nv, "q0": q.tolist(), "v0": v.tolist()}
+    data["dropped"] = [list(each) for each in scene.dropped]
+    print(json.dumps(data, indent=2))
     return 0
 
 
-def rest_robot(scene: Scene, q0: Any, as_json: bool) -> int:
-    """Prints a state of rest.
+def print_equilibrium(scene: Scene, q: Any, as_json: bool) -> int:
+    """Print a state of rest.
 
     Args:
-        scene: the robot's.
-        q0: where to start, or None.
-        as_json: as JSON, for programs.
+        scene: scene of the robot.
+        q: start configuration by joint name, or None.
+        as_json: whether to print JSON, for programs.
     """
-    found = equilibrium(scene, q0)
+    found = equilibrium(scene, q)
     places = compiled_scene(scene).joints
     values = {p.name: found.q[p.q_first : p.q_first + p.nq].tolist() for p in places}
     if as_json:
-        told = {"q": values, "stable": found.stable, "left": found.left, "rates": found.rates.real.tolist()}
-        print(json.dumps(told, indent=2))
+        data = {"q": values, "stable": found.stable, "left": found.left, "rates": found.rates.real.tolist()}
+        print(json.dumps(data, indent=2))
         return 0
     print({True: "stable", False: "unstable", None: "neutral"}[found.stable])
     width = max(len(name) for name in values)
@@ -149,7 +152,7 @@ def rest_robot(scene: Scene, q0: Any, as_json: bool) -> int:
 
 
 def sweep_file(options: argparse.Namespace) -> int:
-    """Runs the sweep that a YAML file describes.
+    """Run the sweep of a YAML file.
 
     Args:
         options: file, a path; jobs, a number or None.
@@ -168,10 +171,10 @@ def sweep_file(options: argparse.Namespace) -> int:
     keep = str(table.get("failures", "keep"))
     kept: Any = sweep(make, points, table["duration"], jobs=jobs, store=store, failures=keep, **settings)
     print(kept)
-    for name, told in kept.summary().items():
-        q = told["quantiles"]
+    for name, data in kept.summary().items():
+        q = data["quantiles"]
         print(
-            f"  {name}: mean {told['mean']:.6g}, median {q[0.5]:.6g}, 90 % in {q[0.05]:.6g} to {q[0.95]:.6g}"
+            f"  {name}: mean {data['mean']:.6g}, median {q[0.5]:.6g}, 90 % in {q[0.05]:.6g} to {q[0.95]:.6g}"
         )
     for k, error in list(kept.failures.items())[:10]:
         print(f"  run {k} {kept.records[k]['parameters']}: {error}")
@@ -179,13 +182,13 @@ def sweep_file(options: argparse.Namespace) -> int:
 
 
 class _Robot:
-    """Loads a robot with the parameters of one run; of a module, so that other processes have it."""
+    """Loader of a robot with the parameters of one run; defined in a module, so that it can be serialized."""
 
     def __init__(self, robot: str, fixed: Mapping[str, Any]) -> None:
         self.robot, self.fixed = robot, dict(fixed)
 
     def __call__(self, **parameters: Any) -> Scene:
-        """The robot's scene."""
+        """Return the scene of the robot."""
         return load(self.robot, **{**self.fixed, **parameters})
 
 
@@ -199,29 +202,32 @@ def _sweep_table(path: Path) -> Table:
             raise LoadingError(f'"{path}" needs the key "{key}"')
     for key in ("parameters", "grid", "samples", "options"):
         if not isinstance(table.get(key) or {}, dict):
-            raise LoadingError(f'"{path}": {key} must be a table; got {table[key]!r}')
+            raise LoadingError(f'"{path}": {key} must be a table; got {short_repr(table[key])}')
     return table
 
 
 def _points(table: Table, path: Path) -> list[Table]:
-    """Parameters of the runs: a grid, or samples {n: .., kind: .., ranges: {name: [least, largest]}}."""
+    """Return parameters of the runs: a grid, or samples {n: .., kind: .., ranges: {name: [low, high]}}."""
     if bool(table.get("grid")) == bool(table.get("samples")):
         raise LoadingError(f'"{path}" must have one of the keys grid and samples')
     if table.get("grid"):
         return sweep_grid(**table["grid"])
-    said = dict(table["samples"])
-    check_keys(said, ("n", "kind", "seed", "ranges"), f'"{path}": samples')
-    ranges = said.pop("ranges", None) or {}
-    return sweep_samples(said.pop("n", 0), **said, **ranges)
+    samples = dict(table["samples"])
+    check_keys(samples, ("n", "kind", "seed", "ranges"), f'"{path}": samples')
+    ranges = samples.pop("ranges", None) or {}
+    return sweep_samples(samples.pop("n", 0), **samples, **ranges)
 
 
-def completion(parser: argparse.ArgumentParser, shell: str, robots: Sequence[str]) -> str:
-    """A script that completes commands, options and names of robots in a shell.
+def completion(
+    parser: argparse.ArgumentParser, shell: str, robots: Sequence[str], examples: Sequence[str]
+) -> str:
+    """Return a script that completes commands, options and names of robots and examples in a shell.
 
     Args:
-        parser: of the command line.
+        parser: parser of the command line.
         shell: "bash", "zsh" or "fish".
-        robots: names that complete as well.
+        robots: names of the robots.
+        examples: names of the examples, arguments of the command `example`.
     """
     actions = [a for a in parser._actions if isinstance(a, argparse._SubParsersAction)]
     commands = {name: _options(sub) for name, sub in actions[0].choices.items()}
@@ -229,7 +235,8 @@ def completion(parser: argparse.ArgumentParser, shell: str, robots: Sequence[str
         lines = ["complete -c pin-nonideal -f -n __fish_use_subcommand -a '" + " ".join(commands) + "'"]
         for name, own in commands.items():
             seen = f"__fish_seen_subcommand_from {name}"
-            lines.append(f"complete -c pin-nonideal -n '{seen}' -a '{' '.join(robots)}'")
+            names = examples if name == "example" else robots
+            lines.append(f"complete -c pin-nonideal -n '{seen}' -a '{' '.join(names)}'")
             lines += [f"complete -c pin-nonideal -n '{seen}' -l {option[2:]}" for option in own]
         return "\n".join(lines)
     cases = "\n".join(f'    {name}) words="{" ".join(own)}" ;;' for name, own in commands.items())
@@ -239,7 +246,9 @@ def completion(parser: argparse.ArgumentParser, shell: str, robots: Sequence[str
     case "${{COMP_WORDS[1]}}" in
 {cases}
     esac
-    case "$word" in -*) ;; *) words="{" ".join(robots)}" ;; esac
+    local names="{" ".join(robots)}"
+    if [ "${{COMP_WORDS[1]}}" = example ]; then names="{" ".join(examples)}"; fi
+    case "$word" in -*) ;; *) words="$names" ;; esac
   fi
   COMPREPLY=( $(compgen -W "$words" -- "$word") $(compgen -f -- "$word") )
 }}
@@ -251,10 +260,10 @@ def _options(parser: argparse.ArgumentParser) -> list[str]:
     return [option for a in parser._actions for option in a.option_strings if option.startswith("--")]
 
 
-def events_told(run: Trajectory) -> str:
-    """The events of a run, a line each.
+def format_events(run: Trajectory) -> str:
+    """Return the events of a run, one line each.
 
     Args:
-        run: the run.
+        run: trajectory of the run.
     """
     return "\n".join(f"{e.time:.9g} s  {e.kind}  {e.element}" for e in run.events) or "no events"

@@ -1,7 +1,7 @@
-"""The command `pin-nonideal`: run robots, resume, replay and sweep, describe them, find where they rest.
+"""The command `pin-nonideal`: run robots and examples, resume, replay, sweep, describe, find states of rest.
 
-Exit codes: 0 done; 2 an error of the package, told in one line on standard error; 130 interrupted by Ctrl-C.
-What a run had computed when it failed or was interrupted is written to the files asked for all the same.
+Exit codes: 0 done; 2 an error of the package, in one line on standard error; 130 interrupted by Ctrl-C.
+A run that fails or is interrupted writes its samples to the requested files.
 """
 
 from __future__ import annotations
@@ -26,14 +26,15 @@ from .commands import (
     completion,
     describe_robot,
     named_values,
+    print_equilibrium,
     replay_file,
-    rest_robot,
     sweep_file,
 )
+from .examples import examples, run_example
 from .run import parameters, resume_run, run_robot
 
 EXIT_ERROR = 2
-EXIT_UNREAD = 141  # 128 and the number of SIGPIPE, as shells show it
+EXIT_BROKEN_PIPE = 141  # 128 + SIGPIPE, as shells report it
 EXIT_INTERRUPTED = 130  # 128 + SIGINT, as shells report it
 
 
@@ -41,10 +42,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line.
 
     Args:
-        arguments: the words after the command's name; those of the process when None.
+        arguments: words after the name of the command; None selects those of the process.
 
     Returns:
-        The exit code.
+        Exit code.
     """
     options, rest = _parser().parse_known_args(arguments)
     if rest and options.command is not _bench:
@@ -52,7 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options.rest = rest
     try:
         code = int(options.command(options))
-        if sys.stdout is not None:  # which a shell may have closed
+        if sys.stdout is not None:  # the shell may have closed the output
             sys.stdout.flush()
         return code
     except RunInterrupted as error:
@@ -61,20 +62,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("pin-nonideal: interrupted", file=sys.stderr)
         return EXIT_INTERRUPTED
-    except BrokenPipeError:  # the reader of the output, such as `head`, has had enough
-        _print_no_more()
-        return EXIT_UNREAD
+    except BrokenPipeError:  # the reader of the output, such as `head`, has closed the pipe
+        _discard_output()
+        return EXIT_BROKEN_PIPE
     except PinNonidealError as error:
         print(f"pin-nonideal: error: {error}", file=sys.stderr)
         return EXIT_ERROR
-    except OSError as error:  # a disk that is full, or a terminal that went away
+    except OSError as error:  # a full disk, or a closed terminal
         print(f"pin-nonideal: error: cannot print: {error.strerror or error}", file=sys.stderr)
-        _print_no_more()
+        _discard_output()
         return EXIT_ERROR
 
 
-def _print_no_more() -> None:
-    """Leaves what could not be printed to nobody, so that the interpreter does not try again at its end."""
+def _discard_output() -> None:
+    """Redirect standard output to the null device, so that the interpreter does not flush it at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
@@ -86,7 +87,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"%(prog)s {pn.__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
-    run = commands.add_parser("run", help="simulate a robot and write what is asked for")
+    run = commands.add_parser("run", help="simulate a robot and write files")
     _add_robot(run)
     run.add_argument(
         "--duration", type=float, default=5.0, metavar="S", help="length of time [s] (default: 5)"
@@ -104,21 +105,23 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--record",
         metavar="NAMES",
-        help="what to record, separated by commas: a, forces, laws, reactions, energy, power "
+        help="recorded quantities, separated by commas: a, forces, laws, reactions, energy, power "
         "(default: nothing; forces,energy with --html or --plot)",
     )
     run.add_argument(
         "--several",
         choices=SEVERAL,
-        help="where friction allows several motions: stop (default), or go on with the nearest",
+        help="if friction allows several motions: error (default), or continue with the nearest",
     )
-    run.add_argument("--checkpoint", type=Path, metavar="FILE", help="keep the run in a file, for `resume`")
+    run.add_argument(
+        "--checkpoint", type=Path, metavar="FILE", help="file with the state of the run, for `resume`"
+    )
     _add_start(run)
-    run.add_argument("--v0", **_start("velocity"))
+    run.add_argument("--v", **_start("velocity"))
     _add_writers(run)
     run.set_defaults(command=run_robot)
 
-    resume = commands.add_parser("resume", help="go on with a run from its checkpoint")
+    resume = commands.add_parser("resume", help="continue a run from its checkpoint")
     resume.add_argument("file", type=Path, metavar="CHECKPOINT", help="file of `run --checkpoint`")
     _add_writers(resume)
     resume.set_defaults(command=resume_run)
@@ -128,39 +131,48 @@ def _parser() -> argparse.ArgumentParser:
         "run", type=Path, metavar="RUN.npz", help="file of `run --save`, or folder of `sweep`"
     )
     replay.add_argument("page", type=Path, nargs="?", metavar="PAGE.html", help="default: the run's name")
-    replay.add_argument("--run", type=int, dest="number", metavar="K", help="which run of a sweep")
-    replay.add_argument("--robot", metavar="NAME_OR_PATH", help="of a run that does not know it")
+    replay.add_argument("--run", type=int, dest="number", metavar="K", help="number of the run in a sweep")
+    replay.add_argument("--robot", metavar="NAME_OR_PATH", help="robot of a run whose file does not name it")
     replay.set_defaults(command=replay_file)
 
-    sweep = commands.add_parser("sweep", help="run a robot with many parameters, into a folder")
+    sweep = commands.add_parser(
+        "sweep", help="run a robot with many parameters and store the runs in a folder"
+    )
     sweep.add_argument("file", type=Path, metavar="SWEEP.yaml", help="robot, duration, grid or samples, ...")
     sweep.add_argument("--jobs", type=int, metavar="N", help="parallel jobs; -1 for all processors")
     sweep.set_defaults(command=sweep_file)
 
-    equilibrium = commands.add_parser("equilibrium", help="find where a robot rests")
+    equilibrium = commands.add_parser("equilibrium", help="find a state of rest of a robot")
     _add_robot(equilibrium)
     _add_start(equilibrium)
-    equilibrium.add_argument("--json", action="store_true", help="for programs")
+    equilibrium.add_argument("--json", action="store_true", help="print JSON, for programs")
     equilibrium.set_defaults(command=_equilibrium)
 
-    listing = commands.add_parser("list", help="robots of the package, by name")
+    example = commands.add_parser("example", help="run an example, which draws a figure")
+    example.add_argument("name", metavar="NAME", help="name of an example from `list`")
+    example.set_defaults(command=_example)
+
+    listing = commands.add_parser("list", help="print the names of robots and examples")
     listing.set_defaults(command=_list)
 
-    info = commands.add_parser("info", help="joints, loops, rows, rank, mobility and what is skipped")
+    info = commands.add_parser(
+        "info", help="print joints, loops, rows, rank, mobility and skipped operations"
+    )
     _add_robot(info)
-    info.add_argument("--json", action="store_true", help="all tables, for programs")
+    info.add_argument("--json", action="store_true", help="print all tables as JSON, for programs")
     info.set_defaults(command=_info)
 
     picture = commands.add_parser("render", help="picture or video of a run: .png, .gif, .webm, .mp4")
     picture.add_argument("run", metavar="RUN", help="file that `run --save` wrote (.npz)")
     picture.add_argument("out", type=Path, metavar="OUT", help="file to write")
     picture.add_argument(
-        "--robot", metavar="NAME_OR_PATH", help="robot of the run (default: the name that the run bears)"
+        "--robot", metavar="NAME_OR_PATH", help="robot of the run (default: the name in the file)"
     )
-    picture.add_argument("--size", default="960x540", metavar="WxH", help="pixels (default: 960x540)")
+    picture.add_argument("--width", type=int, default=960, help="of the picture [pixels] (default: 960)")
+    picture.add_argument("--height", type=int, default=540, help="of the picture [pixels] (default: 540)")
     picture.add_argument("--seconds", type=float, default=6.0, help="length of a video [s] (default: 6)")
     picture.add_argument("--fps", type=float, default=25.0, help="pictures a second (default: 25)")
-    picture.add_argument("--time", type=float, metavar="S", help="of a single picture [s]")
+    picture.add_argument("--time", type=float, metavar="S", help="time of a still picture [s]")
     picture.add_argument("--set", action="append", default=[], dest="settings", metavar="KEY=VALUE")
     picture.set_defaults(command=_render)
 
@@ -169,7 +181,7 @@ def _parser() -> argparse.ArgumentParser:
     complete.set_defaults(command=_complete)
 
     bench = commands.add_parser(
-        "bench", help="run the benchmarks of a checkout; further words go to them", add_help=False
+        "bench", help="run the benchmarks of a checkout, with their own arguments", add_help=False
     )
     bench.set_defaults(command=_bench)
     return parser
@@ -190,7 +202,7 @@ def _add_robot(parser: argparse.ArgumentParser) -> None:
 
 
 def _start(what: str) -> Table:
-    """An option that gives a state by joint name."""
+    """Return the settings of an option that gives a state by joint name."""
     return {
         "action": "append",
         "default": [],
@@ -200,7 +212,7 @@ def _start(what: str) -> Table:
 
 
 def _add_start(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--q0", **_start("configuration"))
+    parser.add_argument("--q", **_start("configuration"))
 
 
 def _add_writers(parser: argparse.ArgumentParser) -> None:
@@ -209,25 +221,33 @@ def _add_writers(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--plot", type=Path, metavar="FILE", help="write a figure (.png, .pdf, .svg)")
     parser.add_argument("--save", type=Path, metavar="FILE", help="write the arrays (.npz)")
     parser.add_argument("--events", action="store_true", help="print the events, a line each")
-    parser.add_argument("--quiet", action="store_true", help="print nothing but what was asked for")
+    parser.add_argument("--quiet", action="store_true", help="print only requested output")
 
 
 def _equilibrium(options: argparse.Namespace) -> int:
     scene = pn.load(options.robot, **parameters(options.settings))
-    return rest_robot(scene, named_values(options.q0, "--q0"), options.json)
+    return print_equilibrium(scene, named_values(options.q, "--q"), options.json)
 
 
 def _complete(options: argparse.Namespace) -> int:
-    print(completion(_parser(), options.shell, [name for name, _ in robots()]))
+    names = [[name for name, _ in each] for each in (robots(), examples())]
+    print(completion(_parser(), options.shell, *names))
+    return 0
+
+
+def _example(options: argparse.Namespace) -> int:
+    print(f"wrote {run_example(options.name)}")
     return 0
 
 
 def _list(options: argparse.Namespace) -> int:
     del options
-    listed = robots()
-    width = max((len(name) for name, _ in listed), default=0)
-    for name, description in listed:
-        print(f"{name:{width}}  {description}".rstrip())
+    groups = {"robots: pin-nonideal run NAME": robots(), "examples: pin-nonideal example NAME": examples()}
+    width = max((len(name) for listed in groups.values() for name, _ in listed), default=0)
+    for title, listed in groups.items():
+        print(title)
+        for name, description in listed:
+            print(f"  {name:{width}}  {description}".rstrip())
     return 0
 
 
@@ -240,17 +260,13 @@ def _render(options: argparse.Namespace) -> int:
     if run.scene is None:
         scene = pn.load(options.robot or run.name, **parameters(options.settings))
         run = replace(run, scene=scene)
-    try:
-        width, height = (int(x) for x in options.size.split("x"))
-    except ValueError:
-        raise InputError(f'--size needs WxH, for example 960x540; got "{options.size}"') from None
-    settings = {"width": width, "height": height, "seconds": options.seconds, "fps": options.fps}
-    print(f"wrote {render(run, options.out, **settings, time=options.time)}")
+    keys = ("width", "height", "seconds", "fps", "time")
+    print(f"wrote {render(run, options.out, **{key: getattr(options, key) for key in keys})}")
     return 0
 
 
 def _bench(options: argparse.Namespace) -> int:
-    """Run the folder `benchmarks` of the checkout: benchmarks are no part of the installed package."""
+    """Run the folder `benchmarks` of the checkout; the installed package does not contain benchmarks."""
     places = [Path.cwd(), Path(__file__).resolve().parent.parent.parent]
     for place in places:
         folder = place / "benchmarks"

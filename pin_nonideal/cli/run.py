@@ -1,4 +1,4 @@
-"""The commands that run: `run` and `resume`, what they ask of a run, and the files that they write of it."""
+"""Commands `run` and `resume`: their settings of a run and their output files."""
 
 from __future__ import annotations
 
@@ -15,56 +15,59 @@ from pin_nonideal.trajectory.trajectory import Trajectory
 from pin_nonideal.types import Table
 from pin_nonideal.visualization.plotting import picture_format
 
-from .commands import events_told, named_values, plain_value
+from .commands import format_events, named_values, plain_value
 
 Writer = tuple[Path, Callable[[Trajectory, Path], Path]]
 
-# Samples when pictures are asked for: so many a second of simulated time, within these bounds over a run.
+# Samples of runs with pictures: number per second of simulated time, with bounds for a run.
 PICTURE_RATE, PICTURE_SAMPLES = 60.0, (1200, 20_000)
 
 
 def run_robot(options: argparse.Namespace) -> int:
-    """Simulates a robot and writes what was asked for.
+    """Simulate a robot and write the requested files.
 
     Args:
-        options: of `run`.
+        options: options of `run`.
     """
     writers = _writers(options)
-    q, v = named_values(options.q0, "--q0"), named_values(options.v0, "--v0")
+    q, v = named_values(options.q, "--q"), named_values(options.v, "--v")
     scene = pn.load(options.robot, **parameters(options.settings))
     settings = _simulation_settings(options)
-    return _finished(lambda: pn.simulate(scene, options.duration, q=q, v=v, **settings), options, writers)
+    return _run_and_write(
+        lambda: pn.simulate(scene, options.duration, q=q, v=v, **settings), options, writers
+    )
 
 
 def resume_run(options: argparse.Namespace) -> int:
-    """Goes on with a run and writes what was asked for.
+    """Continue a run from its checkpoint and write the requested files.
 
     Args:
-        options: of `resume`.
+        options: options of `resume`.
     """
     writers = _writers(options)
-    return _finished(lambda: pn.resume(options.file), options, writers)
+    return _run_and_write(lambda: pn.resume(options.file), options, writers)
 
 
-def _finished(run: Callable[[], Trajectory], options: argparse.Namespace, writers: list[Writer]) -> int:
-    """Runs, prints and writes; what a run had computed when it stopped is written all the same."""
+def _run_and_write(run: Callable[[], Trajectory], options: argparse.Namespace, writers: list[Writer]) -> int:
+    """Run, print and write; a failed run writes the samples before its failure."""
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # the run's notes say the same, and are printed
+            # the printed notes of the run contain the same messages
+            warnings.simplefilter("ignore", RuntimeWarning)
             done = run()
     except RunError as error:
         if error.trajectory is not None:
-            _told(error.trajectory, options, writers)
+            _print_and_write(error.trajectory, options, writers)
         raise
-    _told(done, options, writers)
+    _print_and_write(done, options, writers)
     return 0
 
 
-def _told(run: Trajectory, options: argparse.Namespace, writers: list[Writer]) -> None:
+def _print_and_write(run: Trajectory, options: argparse.Namespace, writers: list[Writer]) -> None:
     if not options.quiet:
         print(run)
     if options.events:
-        print(events_told(run))
+        print(format_events(run))
     for path, writer in writers:
         written = writer(run, path)
         if not options.quiet:
@@ -72,7 +75,7 @@ def _told(run: Trajectory, options: argparse.Namespace, writers: list[Writer]) -
 
 
 def _simulation_settings(options: argparse.Namespace) -> Table:
-    """Keyword arguments of `simulate`: what was given on the command line, and the defaults of pictures."""
+    """Return keyword arguments of `simulate` from the command line, with defaults for pictures."""
     keys = ("method", "rtol", "atol", "dt", "output_dt", "several", "checkpoint")
     given = {key: getattr(options, key) for key in keys}
     settings = {key: value for key, value in given.items() if value is not None}
@@ -90,7 +93,7 @@ def _simulation_settings(options: argparse.Namespace) -> Table:
 
 
 def _writers(options: argparse.Namespace) -> list[Writer]:
-    """Files to write and what writes them; they are checked now, because a run may take long."""
+    """Return the output files with their writers; the check comes before the run, which may be long."""
     if options.plot is not None:
         picture_format(options.plot)
     asked: list[tuple[Path | None, Callable[[Trajectory, Path], Path]]] = [
@@ -122,13 +125,13 @@ def _write_figure(run: Trajectory, path: Path) -> Path:
 
 
 def parameters(settings: Sequence[str]) -> Table:
-    """KEY=VALUE words as keyword arguments.
+    """Return KEY=VALUE words as keyword arguments.
 
     Args:
-        settings: the words.
+        settings: words of the command line.
 
     Raises:
-        InputError: one of them has another form.
+        InputError: a word has another form.
     """
     parameters: Table = {}
     for word in settings:

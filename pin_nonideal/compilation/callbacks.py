@@ -12,7 +12,7 @@ import numpy as np
 
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.time_functions import Constant, Polynomial, Sinusoid, Spline
-from pin_nonideal.errors import InputError, RunError, UnknownNameError, UserFunctionError, nearest
+from pin_nonideal.errors import InputError, RunError, UnknownNameError, UserFunctionError, nearest, short_repr
 from pin_nonideal.types import Array
 from pin_nonideal.validation import array, floats
 
@@ -91,7 +91,7 @@ def numbers_of(part: Any, shape: tuple[int, ...], who: str) -> Array:
     """
     result, where = floats(part, "fiubOUS")  # any kind that float() accepts
     if result is None:
-        raise UserFunctionError(f"{who} must return numbers of shape {shape}; got {part!r}")
+        raise UserFunctionError(f"{who} must return numbers of shape {shape}; got {short_repr(part)}")
     if result.shape != shape and result.size != math.prod(shape):
         raise UserFunctionError(f"{who} must return shape {shape}; got shape {result.shape}")
     if where is not None:
@@ -139,7 +139,7 @@ def time_function(function: Any, who: str) -> Any:
     if isinstance(function, Polynomial):
         return ("polynomial", list(function.coefficients))
     if isinstance(function, Sinusoid):
-        return ("sinusoid", [function.amplitude, function.frequency, function.phase, function.offset])
+        return ("sinusoid", [function.amplitude, function.omega, function.phase, function.offset])
     if isinstance(function, Spline):
         return ("spline", function.breaks.tolist(), function.coefficients.ravel().tolist())
     jet = checked(function, f"{who}: function of time", (), (), ())

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 from typing import Any
 
 from pin_nonideal.core_loader import core
-from pin_nonideal.description.actuation import SampledControl, asked_by
+from pin_nonideal.description.actuation import SampledControl, delayed_control, switching_drives
 from pin_nonideal.description.constraints import UserConstraint
 from pin_nonideal.errors import InputError, RunError
 from pin_nonideal.states.held import NOTHING_HELD, Held
@@ -16,8 +17,10 @@ from pin_nonideal.states.report import ProjectionReport
 from pin_nonideal.states.rows import row_slices
 from pin_nonideal.types import Array, Model
 
+from .actuation import delayed_torque
 from .analysis import check_user_functions, has_rates, idle_rows, without_functions
 from .constraints import anchor_frames
+from .delay import DelayedTorque
 from .error_context import Circumstances, named_failure
 from .lowering import Descriptions, lower
 from .resolver import Resolution, unique_names
@@ -32,7 +35,6 @@ class CompiledScene:
         model: pinocchio.Model.
         q0: configuration at which `frame2=None` and lengths left out are read, (nq,).
         said: descriptions of the scene.
-        tolerance: residual that a vanishing row may have [m or rad].
         is_start: whether q0 was given as a start, so that user functions may be called there.
 
     Raises:
@@ -57,9 +59,7 @@ class CompiledScene:
         unchecked: whether derivatives of user functions are still unchecked.
     """
 
-    def __init__(
-        self, model: Model, q0: Array, said: Descriptions, tolerance: float, is_start: bool = True
-    ) -> None:
+    def __init__(self, model: Model, q0: Array, said: Descriptions, is_start: bool = True) -> None:
         self.model, self.q0, self.said = model, q0, said
         try:
             builder = core.Builder(model, core.Provider[said.terms])
@@ -92,7 +92,7 @@ class CompiledScene:
             stand_in = core.Builder(model, core.Provider[said.terms])
             lower(plain, stand_in, where)
             sampled = stand_in.finish()
-        self.dropped, copies = idle_rows(model, q0, self.program, sampled, tolerance)
+        self.dropped, copies = idle_rows(model, q0, self.program, sampled, said.assembly_tolerance)
         if self.dropped:
             idle = {(name, row) for name, row, _ in self.dropped}
             for block, c in enumerate(self.program.constraints):
@@ -103,6 +103,29 @@ class CompiledScene:
             self.program = builder.finish()
         idle_names = {name for name, _, _ in self.dropped}
         self.projection = Projection(model, self.program, q0, idle_names, is_start or plain is None)
+        control = delayed_control(said.actuation)
+        self._delayed: tuple[SampledControl, core.Builder] | None = None
+        if control is not None:
+            self._delayed, self._building = (control, builder), threading.Lock()
+
+    def program_of_runs(
+        self, t0: float, by_thread: bool = False
+    ) -> tuple[core.Program, DelayedTorque | None]:
+        """Return the program of a new run, and its delayed torques or None without a delay.
+
+        Delayed torques belong to one run, so a scene with a delay needs a program per run.
+
+        Args:
+            t0: start time of the run [s].
+            by_thread: whether the program serves runs in several threads, each run in one thread.
+        """
+        if self._delayed is None:
+            return self.program, None
+        control, builder = self._delayed
+        delayed = delayed_torque(control, self.model, t0, by_thread)
+        with self._building:
+            builder.set_sampled_torque(delayed, control.period)
+            return builder.finish(), delayed
 
     def check_functions(self, q: Array, v: Array, t: float) -> None:
         """Check the derivatives of user functions once, at the first known start.
@@ -138,15 +161,28 @@ class CompiledScene:
         """Message on a part of the scene that no implicit method supports, or empty."""
         if self.opening_names:
             return f'no implicit method here opens and closes contacts such as "{self.opening_names[0]}" yet'
-        if isinstance(asked_by(self.said.actuation), SampledControl):
-            return "no implicit method here holds the torques of a SampledControl yet"
+        if switching := switching_drives(self.said.actuation):
+            return f"no implicit method here holds the torques of a {type(switching[0]).__name__} yet"
         return ""
 
     def _circumstances(self) -> Circumstances:
         """Return the parts of the scene that errors of its runs name."""
         said = self.said
         sources = ("the actuation", _quoted("force", said.forces), _quoted("law", said.laws))
-        return Circumstances(self.explicit_only, sources)
+        taken: set[str] = set()
+        unique_names(said.constraints, taken)
+        names = unique_names(said.contacts, taken)
+        pairs = {
+            name: _frames_of(c) for name, c in zip(names, said.contacts, strict=True) if any(_frames_of(c))
+        }
+        return Circumstances(self.explicit_only, sources, pairs)
+
+
+def _frames_of(contact: Any) -> tuple[str, str]:
+    """Return the frames of a contact, empty for the world or if it has none."""
+    first = getattr(contact, "frame", None) or getattr(contact, "frame1", None)
+    second = getattr(contact, "plane", None) or getattr(contact, "frame2", None)
+    return (str(first or ""), str(second or ""))
 
 
 def _quoted(kind: str, descriptions: Sequence[Any]) -> str:

@@ -25,7 +25,7 @@ from pin_nonideal.description.constraints import (
     UserConstraint,
 )
 from pin_nonideal.description.time_functions import Constant
-from pin_nonideal.errors import InputError, UnknownNameError
+from pin_nonideal.errors import InputError, UnknownNameError, short_repr
 from pin_nonideal.types import Array
 from pin_nonideal.validation import axis_triad, unit_axis
 
@@ -57,7 +57,8 @@ def lower_constraint(c: Any, name: str, out: core.Builder, where: Resolution) ->
     known = ("RigidConstraintModel", "PointAnchorConstraintModel", "FrameAnchorConstraintModel")
     if kind not in known:
         raise InputError(
-            f"a constraint must be one of this package's or of Pinocchio's {', '.join(known)}; got {c!r}"
+            f"a constraint must be one of this package's or of Pinocchio's {', '.join(known)}; "
+            f"got {short_repr(c)}"
         )
     f1, f2 = frames_of(c, where, kind)
     if kind == "PointAnchorConstraintModel" or (

@@ -17,7 +17,7 @@ from pin_nonideal.description.contacts.solids import (
     RevolvedContact,
     RimContact,
 )
-from pin_nonideal.errors import InputError
+from pin_nonideal.errors import InputError, short_repr
 from pin_nonideal.types import Model
 
 from .callbacks import checked
@@ -49,7 +49,7 @@ def lower_contacts(
     for name, c in contacts:
         if not isinstance(c, get_args(Contact)):
             known = ", ".join(kind.__name__ for kind in get_args(Contact))
-            raise InputError(f"a contact must be one of {known}; got {c!r}")
+            raise InputError(f"a contact must be one of {known}; got {short_repr(c)}")
         if isinstance(c, JointLimit):
             _check_limit(c, words(c, name), where)
     blocks: dict[int, list[int]] = {}

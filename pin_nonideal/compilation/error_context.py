@@ -25,6 +25,8 @@ from pin_nonideal.errors import (
 )
 from pin_nonideal.types import Model
 
+MOST_NAMED = 4  # names in a message
+
 
 def opened(name: str, gaps: dict[str, float], t: float, after: str = "") -> LoopClosureError:
     """Return the exception of a run that has left its constraints.
@@ -49,10 +51,12 @@ class Circumstances(NamedTuple):
     Attributes:
         explicit_only: message on a part of the scene that no implicit method supports, or empty.
         sources: names of the actuation, the applied forces and the laws.
+        pairs: frames of each contact by its name, the second one empty for the world.
     """
 
     explicit_only: str
     sources: tuple[str, str, str]
+    pairs: dict[str, tuple[str, str]]
 
 
 def named_failure(
@@ -71,22 +75,23 @@ def named_failure(
         return _singular(model, failure.elements[0], t)
     if kind is kinds.inconsistent:
         names = [*(c.name for c in program.constraints), *program.element_names]
-        return _inconsistent(names, failure.elements, value, t)
+        return _inconsistent([names[i] for i in failure.elements], value, t, model, around.pairs)
     if kind is kinds.not_finite:
         return NonFiniteError(f"acceleration is not finite at t = {t:.4g} s", time=t)
     if kind is kinds.paradox:
-        elements = ", ".join(program.element_names[i] for i in failure.elements)
-        return _paradox(elements or ", ".join(program.law_names), failure)
+        elements = [program.element_names[i] for i in failure.elements]
+        return _paradox(elements or program.law_names, failure)
     if kind is kinds.not_converged:
         names = [program.element_names[i] for i in failure.elements]
-        return _unresolved(", ".join(names or [program.constraints[i].name for i in program.contacts]), t)
+        return _unresolved(names or [program.constraints[i].name for i in program.contacts], t)
     if kind is kinds.closure:
         name = program.constraints[failure.elements[0]].name
         return opened(name, {name: value}, t)
     if kind is kinds.interrupted:
         return RunInterrupted(f"the run was interrupted at t = {t:.4g} s", time=t)
     if kind is kinds.impact_energy:
-        return _gained(", ".join(program.constraints[i].name for i in failure.elements), value, t)
+        names = [program.constraints[i].name for i in failure.elements]
+        return _gained(names, value, t, _touching(model, names, around.pairs))
     if kind is kinds.stiff:
         return _stiff(model, failure.elements[0], value, t, around.explicit_only)
     if kind is kinds.growing:
@@ -106,11 +111,50 @@ def named_failure(
     return _stuck(value, t, around.explicit_only)
 
 
-def _gained(element: str, gain: float, t: float) -> RunError:
+def _listed(names: Sequence[str]) -> str:
+    """Return names for a message: each in quotes, and the number of those beyond the first few."""
+    shown = [f'"{name}"' for name in names[:MOST_NAMED]]
+    if len(names) > MOST_NAMED:
+        shown.append(f"{len(names) - MOST_NAMED} more")
+    return shown[0] if len(shown) == 1 else f"{', '.join(shown[:-1])} and {shown[-1]}"
+
+
+def _touching(model: Model, names: Sequence[str], pairs: dict[str, tuple[str, str]]) -> str:
+    """Return the two bodies of the first contact for a message, or an empty text if it has no frames."""
+    frames = next((pairs[name] for name in names if name in pairs), None)
+    if frames is None:
+        return ""
+    one, other = (_body(model, frame) for frame in frames)
+    return f" ({one} on {other})"
+
+
+def _body(model: Model, name: str) -> str:
+    """Return the body that carries a frame for a message: its name, or that of its joint, or the world."""
+    if not name or not model.existFrame(name):
+        return "the world"
+    frame = model.frames[model.getFrameId(name)]
+    if frame.parentJoint == 0:
+        return "the world"
+    if frame.type != pin.FrameType.BODY:
+        above = model.frames[frame.parentFrame]
+        bodies = [
+            f for f in model.frames if f.parentJoint == frame.parentJoint and f.type == pin.FrameType.BODY
+        ]
+        if above.type == pin.FrameType.BODY:
+            frame = above
+        elif bodies:
+            frame = bodies[0]
+        else:
+            return f'the body of joint "{model.names[frame.parentJoint]}"'
+    return f'body "{frame.name}"'
+
+
+def _gained(names: Sequence[str], gain: float, t: float, bodies: str) -> RunError:
     return ImpactEnergyError(
-        f'the impact of "{element}" at t = {t:.6g} s gains {gain:.3g} J, as Newton\'s law of restitution '
-        "with friction may; use a smaller restitution, or strict=False",
-        element=element,
+        f"the impact at {_listed(names)}{bodies} at t = {t:.6g} s gains {gain:.3g} J, as Newton's law of "
+        'restitution with friction may; use Scene(..., impact="poisson"), a smaller restitution, or '
+        "strict=False",
+        element=", ".join(names),
         gain=gain,
         time=t,
     )
@@ -180,18 +224,18 @@ def joint_of(model: Model, dof: int) -> int:
     return next(i for i, j in enumerate(model.joints) if i and j.idx_v <= dof < j.idx_v + j.nv)
 
 
-def _paradox(element: str, failure: core.CoreFailure) -> RunError:
+def _paradox(names: Sequence[str], failure: core.CoreFailure) -> RunError:
     shown, t = core.Solutions, failure.time
     found, way_out = {
-        shown.several: ("several solutions", ', go on with the nearer one by several="continue",'),
-        shown.none: ("no solution", ","),
-    }.get(failure.solutions, ("no solution or several", ","))
+        shown.several: ("several solutions", 'go on with the nearer one by several="continue", reduce mu,'),
+        shown.none: ("no solution", "reduce mu,"),
+    }.get(failure.solutions, ("no solution or several", "reduce mu,"))
     limits = " and ".join(", ".join(f"{x:.4g}" for x in each) for each in failure.limits)
     return FrictionParadoxError(
-        f'friction of "{element}" has {found} at t = {t:.4g} s: '
+        f"friction of {_listed(names)} has {found} at t = {t:.4g} s: "
         + (f"limits of {limits} (N m or N), " if limits else "")
-        + f'det(I - d lam\'/d lam) = {failure.value:.3g}; reduce mu{way_out} or use reaction="ideal"',
-        element=element,
+        + f'det(I - d lam\'/d lam) = {failure.value:.3g}; {way_out} or use reaction="ideal"',
+        element=", ".join(names),
         determinant=failure.value,
         time=t,
         solutions=failure.accelerations,
@@ -199,11 +243,11 @@ def _paradox(element: str, failure: core.CoreFailure) -> RunError:
     )
 
 
-def _unresolved(element: str, t: float) -> RunError:
+def _unresolved(names: Sequence[str], t: float) -> RunError:
     return FrictionConvergenceError(
-        f'whether "{element}" sticks or slips was not found at t = {t:.4g} s, which proves nothing; '
-        "take shorter steps, change an initial value a little, or give `modes` to solve",
-        element=element,
+        f"it was not found at t = {t:.4g} s whether {_listed(names)} sticks or slips, although a motion may "
+        'exist; change an initial value a little, tighten rtol, use method="moreau", or give modes to solve',
+        element=", ".join(names),
         time=t,
     )
 
@@ -223,21 +267,26 @@ def _stuck(steps: float, t: float, explicit_only: str) -> RunError:
     )
 
 
-def _inconsistent(names: Sequence[str], items: list[int], residual: float, t: float) -> RunError:
-    quoted = " and ".join(f'"{names[i]}"' for i in items)
+def _inconsistent(
+    names: Sequence[str], residual: float, t: float, model: Model, pairs: dict[str, tuple[str, str]]
+) -> RunError:
+    quoted = _listed(names)
     if residual == 0.0:  # the failure of an impact has no residual
+        bodies = _touching(model, names, pairs)
         return InconsistentConstraintsError(
-            f"no impulses part the bodies at {quoted} as their restitution asks at t = {t:.2f} s: with what"
-            ' else holds them they cannot move apart; lower restitution, or use Scene(..., impact="poisson")',
+            f"no impulses part the bodies at {quoted}{bodies} as their restitution asks at t = {t:.2f} s: "
+            "other constraints keep them from moving apart; lower restitution, or use "
+            'Scene(..., impact="poisson")',
             time=t,
         )
-    blame = (
-        f"constraints {quoted} contradict each other"
-        if len(items) > 1
-        else f"constraint {quoted} contradicts itself"
-    )
+    if len(names) > 1:
+        blame, remedy = f"constraints {quoted} contradict each other", "leave one of them out"
+    else:
+        blame, remedy = f"constraint {quoted} contradicts itself", "leave one of its rows out"
     return InconsistentConstraintsError(
-        f"{blame}: residual {abs(residual):.1e} m/s^2 at t = {t:.2f} s", time=t
+        f"{blame}: residual {abs(residual):.1e} m/s^2 at t = {t:.2f} s; {remedy}, or let both ask for "
+        "the same motion",
+        time=t,
     )
 
 

@@ -1,20 +1,12 @@
-"""Applied forces and actuation in the core's program."""
+"""Applied forces in the core's program."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import singledispatch
-from typing import Any
-
-import numpy as np
 
 from pin_nonideal.core_loader import core
-from pin_nonideal.description.actuation import EffortLimits, HoldPosition, SampledControl, Table
 from pin_nonideal.description.forces import JointSpring, SpringDamper, UserForce, Wrench
-from pin_nonideal.errors import InputError
-from pin_nonideal.states.parsing import named_configuration, named_joint_samples, named_joint_values
-from pin_nonideal.types import Array, Model
-from pin_nonideal.validation import by_name
+from pin_nonideal.errors import InputError, short_repr
 
 from .callbacks import checked
 from .resolver import Resolution, words
@@ -32,7 +24,7 @@ def lower_force(f: object, out: core.Builder, where: Resolution) -> None:
     Raises:
         InputError, UnknownNameError: a frame or joint does not exist or does not fit.
     """
-    raise InputError(f"a force must be SpringDamper, JointSpring, Wrench or UserForce; got {f!r}")
+    raise InputError(f"a force must be SpringDamper, JointSpring, Wrench or UserForce; got {short_repr(f)}")
 
 
 @lower_force.register
@@ -59,90 +51,3 @@ def _(f: Wrench, out: core.Builder, where: Resolution) -> None:
 @lower_force.register
 def _(f: UserForce, out: core.Builder, where: Resolution) -> None:
     out.add_user_force(checked(f.function, f"{words(f)}: function", (where.model.nv,)))
-
-
-# Efforts from here on are unlimited: Pinocchio stores the largest float for no limit.
-UNBOUNDED = 1e300
-
-
-def lower_actuation(u: Any, out: core.Builder, where: Resolution) -> None:
-    """Set the actuation of the scene.
-
-    Args:
-        u: None, an array (nv,), a function, or a description.
-        out: the program under construction.
-        where: frames and joints by name.
-
-    Raises:
-        InputError: shapes do not fit the model.
-    """
-    model, nv = where.model, where.model.nv
-    if u is None:
-        return
-    if isinstance(u, EffortLimits):
-        lower_actuation(u.actuation, out, where)
-        least, most = _efforts(u, model)
-        out.limit_effort(least=least, most=most)
-    elif isinstance(u, SampledControl):
-        who = f"{words(u)}: function"
-        out.set_sampled_torque(checked(_torques_of(u.function, model, who), who, (nv,)), u.period)
-    elif isinstance(u, HoldPosition):
-        q = where.q0 if u.q is None else named_configuration(model, u.q, where.q0, f"{words(u)}: q")
-        kp, kd = _gains(u, "kp", model), _gains(u, "kd", model)
-        out.set_hold_position(kp=kp, kd=kd, q=np.ascontiguousarray(q))
-    elif isinstance(u, Table):
-        times = np.asarray(u.times)
-        values = named_joint_samples(model, u.values, times.size, f"{words(u)}: values")
-        out.set_torque_table(times.tolist(), np.ascontiguousarray(values))
-    elif callable(u):
-        out.set_torque_function(checked(_torques_of(u, model, "actuation"), "actuation", (nv,)))
-    else:
-        out.set_constant_torque(tau=named_joint_values(model, u, "actuation"))
-
-
-def _torques_of(function: Callable[..., Any], model: Model, who: str) -> Callable[..., Any]:
-    """A function of torques that may return them by joint name."""
-
-    def torques(*arguments: Any) -> Any:
-        tau = function(*arguments)
-        if type(tau) is np.ndarray or by_name(tau) is None:
-            return tau
-        return named_joint_values(model, tau, who)
-
-    return torques
-
-
-def _efforts(u: EffortLimits, model: Model) -> tuple[Array, Array]:
-    """Return the lower and upper effort limit of each degree of freedom; no limit is infinite."""
-    if u.effort is not None:
-        if isinstance(u.effort, float):
-            most = np.full(model.nv, u.effort)
-        else:
-            most = named_joint_values(model, u.effort, f"{words(u)}: effort", others=np.inf)
-        return -most, most
-    least, most = model.lowerEffortLimit.copy(), model.upperEffortLimit.copy()
-    unstated = least >= most
-    least[unstated | (least <= -UNBOUNDED)] = -np.inf
-    most[unstated | (most >= UNBOUNDED)] = np.inf
-    return np.ascontiguousarray(least), np.ascontiguousarray(most)
-
-
-def _gains(u: HoldPosition, key: str, model: Model) -> Array:
-    """Return a gain for each degree of freedom; a scalar acts on joints with one degree of freedom."""
-    gain, who = getattr(u, key), f"{words(u)}: {key}"
-    if isinstance(gain, float):
-        single = np.zeros(model.nv)
-        for joint in list(model.joints)[1:]:
-            if joint.nv == 1:
-                single[joint.idx_v] = float(gain)
-        return single
-    full = named_joint_values(model, gain, who)
-    if key == "kp":
-        for index, joint in list(enumerate(model.joints))[1:]:
-            part = full[joint.idx_v : joint.idx_v + joint.nv]
-            if joint.nq != joint.nv and joint.nv > 1 and (part != 0.0).any():
-                raise InputError(
-                    f'{who} must be zero on joint "{model.names[index]}", whose configuration is no '
-                    "vector; drive it by a function"
-                )
-    return full

@@ -7,7 +7,7 @@ from typing import Any
 
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.laws import Drag, JointFriction, LuGre, SigmoidFriction, UserFriction, UserLaw
-from pin_nonideal.errors import InputError
+from pin_nonideal.errors import InputError, short_repr
 from pin_nonideal.types import Array
 
 from .callbacks import Reactions, checked, checked_limits
@@ -29,7 +29,8 @@ def lower_law(law: object, name: str, out: core.Builder, around: Surroundings) -
         InputError, UnknownNameError: a frame or joint does not exist or does not fit.
     """
     raise InputError(
-        f"a law must be JointFriction, SigmoidFriction, LuGre, Drag, UserLaw or UserFriction; got {law!r}"
+        f"a law must be JointFriction, SigmoidFriction, LuGre, Drag, UserLaw or UserFriction; "
+        f"got {short_repr(law)}"
     )
 
 

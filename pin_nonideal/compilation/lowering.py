@@ -11,10 +11,11 @@ from pin_nonideal.description.constraints import Rolling
 from pin_nonideal.description.contacts import JointLimit
 from pin_nonideal.states.rows import row_slices
 
+from .actuation import lower_actuation
 from .callbacks import ReactionNames
 from .constraints import lower_constraint
 from .contacts import lower_contacts, lower_gaps
-from .forces import lower_actuation, lower_force
+from .forces import lower_force
 from .friction import Surroundings, lower_contact_friction
 from .laws import lower_law
 from .resolver import Resolution, unique_names
@@ -28,9 +29,11 @@ class Descriptions(NamedTuple):
         contacts: descriptions.
         laws: descriptions.
         forces: descriptions.
-        actuation: None, an array (nv,), a function, or a description.
+        actuation: None, an array (nv,), a table by joint name, a function, a description, or a tuple of
+            drives.
         terms: provider of M and the bias forces, "core" or "pinocchio".
         impact: the law of restitution, "newton" or "poisson".
+        assembly_tolerance: residual that a vanishing row may have [m or rad].
     """
 
     constraints: tuple[Any, ...]
@@ -40,6 +43,7 @@ class Descriptions(NamedTuple):
     actuation: Any
     terms: str
     impact: str
+    assembly_tolerance: float
 
 
 class Written(NamedTuple):
@@ -114,10 +118,15 @@ def lowered(said: Descriptions, builder: core.Builder, where: Resolution) -> Ite
     for name, f in zip(unique_names(said.forces, set()), said.forces, strict=True):
         lower_force(f, builder, where)
         yield Written("force", name, f, lambda f, out: lower_force(f, out, where))
-    lower_actuation(said.actuation, builder, where)
-    yield Written("actuation", "actuation", said.actuation, lambda u, out: lower_actuation(u, out, where))
+    lower_actuation(said.actuation, builder, where, said)
+    again = partial(_actuation_again, where, said)
+    yield Written("actuation", "actuation", said.actuation, again)
     builder.set_impact(core.ImpactLaw[said.impact])  # last, since it belongs to no description
 
 
 def _again(write: Callable[..., object], name: str, around: Any, description: Any, out: Any) -> None:
     write(description, name, out, around)
+
+
+def _actuation_again(where: Resolution, said: Descriptions, actuation: Any, out: Any) -> None:
+    lower_actuation(actuation, out, where, said)

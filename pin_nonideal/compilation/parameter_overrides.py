@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from pin_nonideal.core_loader import core
-from pin_nonideal.errors import InputError, UnknownNameError, nearest
+from pin_nonideal.errors import InputError, UnknownNameError, nearest, short_repr
 from pin_nonideal.types import Array
 from pin_nonideal.validation import array, label
 
@@ -183,14 +183,14 @@ def _descriptions(name: str, described: Any, given: Any, n: int) -> Iterator[Any
         return
     if not is_dataclass(described) or not isinstance(given, Mapping):
         raise InputError(
-            f"{who} must be values by field of a description; got {given!r} for {label(described)}"
+            f"{who} must be values by field of a description; got {short_repr(given)} for {label(described)}"
         )
     known = [field.name for field in fields(described)]
     for key, values in given.items():
         if key not in known or key == "name":
             raise UnknownNameError(f'{who}: no field "{key}"{nearest(str(key), known)}')
         if not isinstance(values, (list, tuple, np.ndarray)) or np.shape(values)[:1] != (n,):
-            raise InputError(f"{who}: {key} must be {n} values, one a run; got {values!r}")
+            raise InputError(f"{who}: {key} must be {n} values, one a run; got {short_repr(values)}")
     plain = {key: v.tolist() if isinstance(v, np.ndarray) else v for key, v in given.items()}
     for k in range(n):
         one: Any = described
@@ -248,7 +248,8 @@ class _Again:
         written.again(other, self)
         if self._differs or len(self._told) != len(self.calls):
             raise InputError(
-                f'rollout: parameters: "{name}" with {other!r} is more than other numbers: something would '
+                f'rollout: parameters: "{name}" with {short_repr(other)} is more than other numbers: '
+                "something would "
                 "begin or cease to act; keep zeros zero and others positive, or let sweep make a scene for "
                 "each"
             )
@@ -274,9 +275,11 @@ class _Again:
 
 
 def _same(a: Any, b: Any) -> bool:
-    """Check if two arguments are equal; any two functions count as equal."""
+    """Check if two arguments are equal; any two functions count as equal unless their sources differ."""
     if isinstance(a, (tuple, list)):
         return isinstance(b, (tuple, list)) and len(a) == len(b) and all(map(_same, a, b))
     if isinstance(a, np.ndarray):
         return bool(np.array_equal(a, b))
-    return callable(a) and callable(b) if callable(a) else bool(a == b)
+    if callable(a) and callable(b):
+        return getattr(a, "source", None) is getattr(b, "source", None)
+    return not callable(a) and bool(a == b)

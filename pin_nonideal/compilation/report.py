@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from pin_nonideal.description.actuation import drives_of
 from pin_nonideal.description.contacts import JointLimit
 from pin_nonideal.description.laws import JointFriction
 from pin_nonideal.types import Model
@@ -34,8 +35,7 @@ def report(scene: CompiledScene, name: str, rank: int, notes: Sequence[str]) -> 
     for name in scene.program.law_names:
         lines.append(f"  law {name}")
     lines += [f"  force {_label(force)}" for force in scene.said.forces]
-    if scene.said.actuation is not None:
-        lines.append(f"  actuation {_label(scene.said.actuation)}")
+    lines += [f"  actuation {_label(drive)}" for drive in drives_of(scene.said.actuation)]
     limited = [str(model.names[i]) for i in _passed(scene)]
     if limited:
         lines.append(f"  limits, which the motion may pass: {', '.join(limited)}")

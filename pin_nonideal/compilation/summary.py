@@ -9,12 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from pin_nonideal.description.actuation import drives_of
 from pin_nonideal.states.joint_order import file_order
 from pin_nonideal.types import Model, Table
 
 from .compiled_scene import CompiledScene
 from .resolver import unique_names
 
+DRIVES = "list of drives"  # kind of an actuation of several drives
 NO_LIMIT = 1e30  # models store infinity or the largest float for no limit
 
 
@@ -32,7 +34,8 @@ class Description:
         contacts: the same columns as `constraints`.
         laws: name, kind and arguments.
         forces: kind and arguments.
-        actuation: kind and arguments, or None.
+        actuation: kind and arguments, or None. A list of drives has the kind "list of drives" and the drives
+            as arguments.
     """
 
     name: str
@@ -66,7 +69,7 @@ class Description:
             lines += _table(title, getattr(self, title), ("name", "kind", "first", "rows", "made with"))
         lines += _table("laws", self.laws, ("name", "kind", "made with"))
         lines += _table("forces", self.forces, ("kind", "made with"))
-        lines += _table("actuation", [self.actuation] if self.actuation else [], ("kind", "made with"))
+        lines += _table("actuation", _drives(self.actuation), ("kind", "made with"))
         if any(joint["file_index"] is not None for joint in self.joints):
             filed = sorted(
                 (j for j in self.joints if j["file_index"] is not None), key=lambda j: j["file_index"]
@@ -86,6 +89,14 @@ def _table(title: str, rows: Sequence[Table], keys: Sequence[str]) -> list[str]:
         for row in (list(keys), *cells)
     ]
     return [title, *lines]
+
+
+def _drives(actuation: Table | None) -> list[Table]:
+    """Return the rows of the drives of an actuation."""
+    if actuation is None:
+        return []
+    drives: list[Table] = actuation["made_with"]["drives"] if actuation["kind"] == DRIVES else [actuation]
+    return drives
 
 
 def _cell(row: Table, key: str) -> str:
@@ -178,8 +189,10 @@ def _made(said: Any) -> Table:
         if dataclasses.is_dataclass(said)
         else {}
     )
-    kind = type(said).__name__
-    if kind in ("ndarray", "list", "tuple"):
+    kind, drives = type(said).__name__, drives_of(said)
+    if drives and drives[0] is not said:
+        kind, fields = DRIVES, {"drives": [_made(drive) for drive in drives]}
+    elif kind in ("ndarray", "list", "tuple"):
         kind, fields = "constant torques", {"torque": said}
     elif isinstance(said, Mapping):
         kind, fields = "constant torques", dict(said)

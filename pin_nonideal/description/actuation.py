@@ -1,13 +1,15 @@
 """Torques tau that drive a scene, in generalized coordinates (shape nv).
 
-A scene accepts None, constant torques, a function (t, q, v) -> tau that is called at every evaluation, or one
-of the descriptions below. Torques are arrays (nv,) or tables by joint name, also those of functions.
+A scene accepts None, constant torques, a function (t, q, v) -> tau that is called at every evaluation, one of
+the descriptions below, or a list of drives, whose torques add. Torques are arrays (nv,) or tables by joint
+name, also those of functions.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass
 from typing import Any
 
 import numpy as np
@@ -15,7 +17,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from pin_nonideal.errors import InputError
 from pin_nonideal.types import Array, State
-from pin_nonideal.validation import array, by_name, function, label, optional_text, positive
+from pin_nonideal.validation import (
+    array,
+    by_name,
+    choice,
+    count,
+    function,
+    label,
+    nonnegative,
+    optional_text,
+    positive,
+)
+
+from .scene_drive import SceneDrive
 
 __all__ = [
     "EffortLimits",
@@ -24,6 +38,8 @@ __all__ = [
     "Table",
 ]
 
+MOST_DELAY = 1_000_000_000  # samples
+WHOLE = 1e-9  # a delay this part of a period above a whole number of periods is rounded down
 Gain = float | Sequence[float] | NDArray[np.float64] | Mapping[str, ArrayLike]
 
 
@@ -31,14 +47,30 @@ Gain = float | Sequence[float] | NDArray[np.float64] | Mapping[str, ArrayLike]
 class SampledControl:
     """A controller in discrete time: its torque is held between samples, and steps end at every sample.
 
+    A delay stands for sensors, buses and computing time. With a delay of d samples, the torque
+    tau(t) = function(t_(k-d), q(t_(k-d)), v(t_(k-d))) acts for t_k <= t < t_(k+1), t_k = t0 + k period. The
+    torque `initial` acts for the first d samples. Each run starts without earlier samples: each call of
+    `simulate`, each run of a `rollout`, and each `Stepper.reset`. Single states and steps
+    (`Scene.acceleration`, `Scene.solve`, `Scene.step`) have no earlier samples, so `initial` acts there.
+    Torques that replace the actuation, as those of `Stepper.step` and of a callback, act without delay.
+
     Args:
         function: (t, q, v) -> tau, shape (nv,), called once per period.
         period: sample period [s].
+        delay: delay of the torque [s], not negative. It is rounded up to a whole number of periods.
+        delay_samples: delay as a number of samples instead.
+        initial: torque before the first delayed torque [N m or N], (nv,) or by joint name; None for zero.
         name: used in messages and results.
+
+    Raises:
+        InputError: an argument does not fit, or both delays are given.
     """
 
     function: Callable[..., object]
     period: float
+    delay: float = 0.0
+    delay_samples: int = 0
+    initial: State | None = None
     name: str | None = None
 
     def __post_init__(self) -> None:
@@ -46,6 +78,28 @@ class SampledControl:
         who = label(self)
         function(f"{who}: function", self.function, "(t, q, v) -> tau")
         object.__setattr__(self, "period", positive(f"{who}: period", self.period))
+        object.__setattr__(self, "delay", nonnegative(f"{who}: delay", self.delay))
+        samples = count(f"{who}: delay_samples", self.delay_samples, most=MOST_DELAY)
+        object.__setattr__(self, "delay_samples", samples)
+        if self.delay and samples:
+            raise InputError(
+                f"{who}: the delay must be given once; got delay={self.delay:g} s and "
+                f"delay_samples={samples}; leave one of them out"
+            )
+        if self.delay / self.period > MOST_DELAY:
+            raise InputError(
+                f"{who}: delay must be at most {MOST_DELAY:g} periods; got {self.delay:g} s with a period of "
+                f"{self.period:g} s"
+            )
+        if self.initial is not None:
+            named = by_name(self.initial)
+            torques = array(f"{who}: initial", self.initial, (None,)).tolist() if named is None else []
+            object.__setattr__(self, "initial", tuple(torques) if named is None else named)
+
+    @property
+    def delay_in_samples(self) -> int:
+        """Delay as a number of samples; a delay in seconds is rounded up."""
+        return self.delay_samples or math.ceil(self.delay / self.period - WHOLE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,51 +127,39 @@ class HoldPosition:
         optional_text("HoldPosition: name", self.name)
         who = label(self)
         for key in ("kp", "kd"):
-            object.__setattr__(self, key, _nonnegative(f"{who}: {key}", getattr(self, key)))
+            object.__setattr__(self, key, checked_gain(f"{who}: {key}", getattr(self, key)))
         if self.q is not None and by_name(self.q) is None:
             object.__setattr__(self, "q", array(f"{who}: q", self.q, (None,)))
 
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Torques at given times, interpolated linearly, and held before the first and after the last time.
+    """Torques at given times, interpolated linearly or held until the next time.
+
+    With interpolation "hold", values[k] acts from times[k] up to times[k + 1] (zero-order hold). Steps of the
+    core's methods end at every time of the table, also in a list of tables and constant torques. The first
+    value acts before the first time and the last value after the last time.
 
     Args:
         times: increasing times [s], shape (nt,) with nt >= 1.
         values: torques [N m or N], shape (nt, nv), or by joint name, shape (nt,) or (nt, n) for a joint of n
             degrees of freedom: a dict or a pandas DataFrame. Missing joints have no torque.
+        interpolation: "linear" or "hold".
         name: used in messages and results.
     """
 
     times: Sequence[float] | NDArray[np.float64]
     values: Sequence[Sequence[float]] | NDArray[np.float64] | Mapping[str, ArrayLike]
+    interpolation: str = "linear"
     name: str | None = None
 
     def __post_init__(self) -> None:
         optional_text("Table: name", self.name)
         who = label(self)
-        times = array(f"{who}: times", self.times, (None,))
-        if times.size == 0:
-            raise InputError(f"{who}: times must hold at least one sample; got none")
-        late = np.flatnonzero(np.diff(times) <= 0.0)
-        if late.size:
-            i = int(late[0])
-            raise InputError(
-                f"{who}: times must increase; times[{i + 1}] = {times[i + 1]:g} does not follow "
-                f"times[{i}] = {times[i]:g}"
-            )
+        choice(f"{who}: interpolation", self.interpolation, ("linear", "hold"))
+        times = sample_times(who, self.times)
         object.__setattr__(self, "times", times)
-        samples = by_name(self.values)
-        if samples is None:
-            checked: Array | dict[str, Array] = array(f"{who}: values", self.values, (times.size, None))
-        else:
-            checked = {
-                name: array(
-                    f'{who}: values of "{name}"', x, (times.size,) if np.ndim(x) < 2 else (times.size, None)
-                )
-                for name, x in samples.items()
-            }
-        object.__setattr__(self, "values", checked)
+        object.__setattr__(self, "values", checked_samples(f"{who}: values", self.values, times.size))
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,8 +170,10 @@ class EffortLimits:
     "saturate" occurs when the drive of a joint reaches its limit. An event of kind "desaturate" occurs when
     the drive follows the requested torque again.
 
+    In a list of drives, the limits apply to the joints of this drive.
+
     Args:
-        actuation: source of the requested torques u: any other actuation.
+        actuation: source of the requested torques u: any other actuation, or a list of drives.
         effort: largest effort of each dof [N m or N], not negative: a number, an array of shape (nv,), or by
             joint name, without limit for missing joints. None selects the model's limits
             (`lowerEffortLimit`, `upperEffortLimit` of the file). Infinite limits, and zero limits of joints
@@ -144,36 +188,169 @@ class EffortLimits:
     def __post_init__(self) -> None:
         optional_text("EffortLimits: name", self.name)
         who = label(self)
-        if self.actuation is None or isinstance(self.actuation, EffortLimits):
-            kind = "None" if self.actuation is None else "EffortLimits"
+        object.__setattr__(self, "actuation", given_actuation(self.actuation))
+        inner = drives_of(self.actuation)
+        if not inner or any(isinstance(drive, EffortLimits) for drive in inner):
+            kind = "EffortLimits" if inner else "None"
             raise InputError(f"{who}: actuation must ask for torques without limits of its own; got {kind}")
         if self.effort is not None:
-            object.__setattr__(self, "effort", _nonnegative(f"{who}: effort", self.effort))
+            object.__setattr__(self, "effort", checked_gain(f"{who}: effort", self.effort))
 
 
-Actuation = (
+Drive = (
     EffortLimits
     | SampledControl
     | HoldPosition
     | Table
+    | SceneDrive
     | Callable[..., object]
     | Sequence[float]
     | Array
     | Mapping[str, ArrayLike]
 )
+Actuation = Drive | Sequence[Drive]
 
 
-def _nonnegative(what: str, value: Any) -> float | Array | dict[str, Array]:
-    """A number, an array or a table by joint name of numbers that are not negative."""
+def checked_gain(what: str, value: Any) -> float | Array | dict[str, Array]:
+    """Return a number, an array or a table by joint name of numbers that are not negative.
+
+    Args:
+        what: words for messages.
+        value: the argument.
+
+    Raises:
+        InputError: the argument has another form, or a number is negative or not finite.
+    """
     table = by_name(value)
     if table is not None:
-        return {name: np.asarray(_nonnegative(f'{what} of "{name}"', x)) for name, x in table.items()}
+        return {name: np.asarray(checked_gain(f'{what} of "{name}"', x)) for name, x in table.items()}
     checked = array(what, value, () if np.asarray(value, dtype=object).ndim == 0 else (None,))
     if (checked < 0.0).any():
         raise InputError(f"{what} must not be negative; got {float(checked.min()):g}")
     return float(checked) if checked.ndim == 0 else checked
 
 
-def asked_by(actuation: Actuation | None) -> Actuation | None:
-    """Return the actuation that requests torques, without effort limits."""
-    return actuation.actuation if isinstance(actuation, EffortLimits) else actuation
+def sample_times(who: str, given: object) -> Array:
+    """Return increasing sample times [s], (nt,) with nt >= 1, read-only.
+
+    Args:
+        who: label of the description.
+        given: the argument.
+
+    Raises:
+        InputError: there is no sample, or a time does not follow the one before it.
+    """
+    times = array(f"{who}: times", given, (None,))
+    if times.size == 0:
+        raise InputError(f"{who}: times must hold at least one sample; got none")
+    late = np.flatnonzero(np.diff(times) <= 0.0)
+    if late.size:
+        i = int(late[0])
+        raise InputError(
+            f"{who}: times must increase; times[{i + 1}] = {times[i + 1]:g} does not follow "
+            f"times[{i}] = {times[i]:g}"
+        )
+    return times
+
+
+def checked_samples(what: str, given: Any, count: int) -> Array | dict[str, Array]:
+    """Return samples of all joints, (nt, n), or by joint name, (nt,) or (nt, n) for each joint.
+
+    Args:
+        what: words for messages.
+        given: the argument: an array, a dict or a pandas DataFrame.
+        count: nt.
+
+    Raises:
+        InputError: a shape does not fit, or a number is not finite.
+    """
+    samples = by_name(given)
+    if samples is None:
+        return array(what, given, (count, None))
+    return {
+        name: array(f'{what} of "{name}"', x, (count,) if np.ndim(x) < 2 else (count, None))
+        for name, x in samples.items()
+    }
+
+
+def given_actuation(actuation: Any) -> Any:
+    """Return an actuation, with a list of drives as a tuple.
+
+    A list or tuple is a list of drives if an entry is a description, a function, a table by joint name or an
+    array. Otherwise it holds the numbers of constant torques.
+
+    Args:
+        actuation: the argument of a scene.
+
+    Raises:
+        InputError: an entry of a list of drives is None or another list of drives.
+    """
+    if not isinstance(actuation, (list, tuple)) or not any(map(_is_drive, actuation)):
+        return actuation
+    for k, drive in enumerate(actuation):
+        if drive is None or given_actuation(drive) is not drive:
+            kind = "None" if drive is None else "another list"
+            raise InputError(
+                f"actuation: each entry of a list of drives must be a drive; entry {k} is {kind}"
+            )
+    return tuple(actuation)
+
+
+def _is_drive(entry: Any) -> bool:
+    """Check if an entry of a list is a drive and not a number of constant torques."""
+    arrays = isinstance(entry, (list, tuple)) or (isinstance(entry, np.ndarray) and entry.ndim > 0)
+    return arrays or callable(entry) or is_dataclass(entry) or by_name(entry) is not None
+
+
+def drives_of(actuation: Any) -> tuple[Any, ...]:
+    """Return the drives of an actuation: none, one, or those of a list.
+
+    Args:
+        actuation: the actuation of a scene, as returned by `given_actuation`.
+    """
+    if actuation is None:
+        return ()
+    is_list = isinstance(actuation, tuple) and any(map(_is_drive, actuation))
+    return actuation if is_list else (actuation,)
+
+
+def requesting_drives(actuation: Any) -> list[Any]:
+    """Return the drives that request torques, those within effort limits included.
+
+    Args:
+        actuation: the actuation of a scene, as returned by `given_actuation`.
+    """
+    found: list[Any] = []
+    for drive in drives_of(actuation):
+        found += drives_of(drive.actuation) if isinstance(drive, EffortLimits) else [drive]
+    return found
+
+
+def sampled_drives(actuation: Any) -> list[Any]:
+    """Return the drives that hold their torque between samples of a period.
+
+    Args:
+        actuation: the actuation of a scene, as returned by `given_actuation`.
+    """
+    kinds = (SampledControl, SceneDrive)
+    return [d for d in requesting_drives(actuation) if isinstance(d, kinds) and d.period is not None]
+
+
+def delayed_control(actuation: Any) -> SampledControl | None:
+    """Return the sampled control with a delay, or None; it commands all joints, so there is one at most.
+
+    Args:
+        actuation: the actuation of a scene, as returned by `given_actuation`.
+    """
+    controls = (d for d in requesting_drives(actuation) if isinstance(d, SampledControl))
+    return next((d for d in controls if d.delay_in_samples), None)
+
+
+def switching_drives(actuation: Any) -> list[Any]:
+    """Return the drives whose torques jump at times that end steps.
+
+    Args:
+        actuation: the actuation of a scene, as returned by `given_actuation`.
+    """
+    held = [d for d in requesting_drives(actuation) if isinstance(d, Table) and d.interpolation == "hold"]
+    return sampled_drives(actuation) + held

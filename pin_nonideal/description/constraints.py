@@ -15,7 +15,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from pin_nonideal.errors import InputError
+from pin_nonideal.errors import InputError, short_repr
 from pin_nonideal.validation import (
     count,
     function,
@@ -95,7 +95,8 @@ class PointAnchor:
             or len(set(given)) != len(given)
         ):
             raise InputError(
-                f'{label(self)}: axes must be one or more of the letters "xyz", each once; got {given!r}'
+                f'{label(self)}: axes must be one or more of the letters "xyz", each once; '
+                f"got {short_repr(given)}"
             )
         object.__setattr__(self, "axes", "".join(sorted(given)))
 

@@ -41,27 +41,27 @@ class Constant:
 
 @dataclass(frozen=True)
 class Sinusoid:
-    """f(t) = offset + amplitude sin(frequency t + phase).
+    """f(t) = offset + amplitude sin(omega t + phase).
 
     Args:
         amplitude: amplitude, in the unit of the driven quantity.
-        frequency: angular frequency [rad/s].
+        omega: angular frequency [rad/s].
         phase: phase angle [rad].
         offset: mean value.
     """
 
     amplitude: float
-    frequency: float
+    omega: float
     phase: float = 0.0
     offset: float = 0.0
 
     def __post_init__(self) -> None:
-        for key in ("amplitude", "frequency", "phase", "offset"):
+        for key in ("amplitude", "omega", "phase", "offset"):
             object.__setattr__(self, key, number(f"Sinusoid: {key}", getattr(self, key)))
 
     def __call__(self, t: float) -> Sample:
         """(value, rate, acceleration) at time t [s]; NaN if the angle overflows."""
-        w = self.frequency
+        w = self.omega
         angle = w * t + self.phase
         if not math.isfinite(angle):
             return (math.nan, math.nan, math.nan)
@@ -162,12 +162,12 @@ def constant(value: float) -> Constant:
     return Constant(value)
 
 
-def sinusoid(amplitude: float, frequency: float, phase: float = 0.0, offset: float = 0.0) -> Sinusoid:
-    """f(t) = offset + amplitude sin(frequency t + phase); see `Sinusoid`.
+def sinusoid(amplitude: float, omega: float, phase: float = 0.0, offset: float = 0.0) -> Sinusoid:
+    """f(t) = offset + amplitude sin(omega t + phase); see `Sinusoid`.
 
     Args:
         amplitude: amplitude, in the unit of the driven quantity.
-        frequency: angular frequency [rad/s].
+        omega: angular frequency [rad/s].
         phase: phase angle [rad].
         offset: mean value.
 
@@ -177,7 +177,7 @@ def sinusoid(amplitude: float, frequency: float, phase: float = 0.0, offset: flo
     Raises:
         InputError: an argument is no finite number.
     """
-    return Sinusoid(amplitude, frequency, phase, offset)
+    return Sinusoid(amplitude, omega, phase, offset)
 
 
 def polynomial(coefficients: Sequence[float]) -> Polynomial:

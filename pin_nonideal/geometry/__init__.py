@@ -1,1 +1,1 @@
-"""Shapes of a collision model, and the contacts of pairs of them."""
+"""Shapes of a collision model, and the contacts of pairs of shapes."""

@@ -1,9 +1,9 @@
-"""Two cylinders or cones as the contacts of their analytic manifold.
+"""Contacts of two cylinders or cones: their analytic manifold.
 
-Each is modelled with its rims and tip rounded, faces and side where they are.  What touches at one point does
-so with a rim or tip of one, or with both sides crosswise.  What lies along a line or on a face needs more:
-the rims carry two sides along each other, the points of a face what it stands on and the chords between them
-the side that it lies on, or where two faces overlap the rest of what they share.
+Rims and tips are rounded. Faces and sides keep their positions. A contact at a single point involves a rim or
+a tip of one shape, or both sides crosswise. Contacts along a line or on a face need more points. The rims
+support two sides that lie along each other. The points of a face support it on another face, and the chords
+between these points support a side on that face. Chords of both faces support two overlapping faces.
 """
 
 from __future__ import annotations
@@ -21,76 +21,79 @@ from pin_nonideal.errors import InputError
 from pin_nonideal.validation import Vector3
 
 from .cylinder import (
-    LEAST_ROUNDING,
-    PASSED_ON,
-    at_place,
-    between,
+    DEFAULT_ROUNDING,
+    SIDE_INSET,
+    capsule_contact,
+    end_coordinates,
     face_points,
     faces,
-    heights,
-    line_on_revolved,
-    on_revolved,
-    side_of,
+    inset_side,
+    section,
+    sphere_contact,
+    to_joint_frame,
 )
 from .shapes import Shape
 
-# Part of the largest ball inside a cylinder or cone that rims may be rounded to: its faces stand back by as
-# much, and something has to be left.
-MOST_ROUNDING = 0.4
-# Radii of rounding between a rim and the points that carry its face, at the least.
-WITHIN_RIM = 2.0
+# Maximum rounding of rims, relative to the radius of the largest inscribed ball. The inset of the faces
+# equals the rounding, so a larger value would leave no core.
+MAX_ROUNDING = 0.4
+# Minimum distance between a rim and the support points of its face, in radii of rounding.
+MIN_RIM_DISTANCE = 2.0
 
 
-def two_revolved(
-    who: str, first: Shape, second: Shape, rounding: float | None, more: dict[str, Any]
+def cylinder_contacts(
+    who: str, first: Shape, second: Shape, rounding: float | None, options: dict[str, Any]
 ) -> list[CylinderContact | CapsuleContact | RevolvedContact]:
-    """The contacts of two cylinders or cones.
+    """Return the contacts of two cylinders or cones.
 
     Args:
-        who: words for messages.
-        first: one of them.
-        second: the other.
-        rounding: radius to which rims are rounded, and by which they stand back [m]; None for the default.
-        more: mu, static_ratio and restitution of each.
+        who: prefix of error messages.
+        first: first shape.
+        second: second shape, on another body.
+        rounding: radius of the rounded rims, equal to their inset [m]; None for the default.
+        options: mu, static_ratio and restitution of each contact.
 
     Raises:
-        InputError: the rounding does not fit.
+        InputError: the rounding is too large.
     """
     ball = min(_ball(first), _ball(second))
-    by = LEAST_ROUNDING * ball if rounding is None else rounding
-    if not by < MOST_ROUNDING * ball:
+    inset = DEFAULT_ROUNDING * ball if rounding is None else rounding
+    if not inset < MAX_ROUNDING * ball:
         raise InputError(
-            f"{who}: rounding must be less than {MOST_ROUNDING:g} of the largest ball inside both, of radius "
-            f"{ball:g} m; got {by:g} m"
+            f"{who}: rounding must be less than {MAX_ROUNDING:g} of the largest ball inside both, of radius "
+            f"{ball:g} m; got {inset:g} m"
         )
-    found: list[CylinderContact | CapsuleContact | RevolvedContact] = []
-    one, another = (_core(side_of(solid, by, PASSED_ON * by), by) for solid in (first, second))
-    found.append(_pair(one, another, by, more))
+    contacts: list[CylinderContact | CapsuleContact | RevolvedContact] = []
+    core, other_core = (
+        _core(inset_side(solid, inset, SIDE_INSET * inset), inset) for solid in (first, second)
+    )
+    contacts.append(_pair(core, other_core, inset, options))
     for own, other in ((first, second), (second, first)):
-        whole = _core(other, by)
-        found += [_pair(rim, whole, by, more) for rim in _rims(own, by)]
-        for tip in _core(own, by).points:
-            found.append(replace(on_revolved(tip, by, own.frame, whole, more), radius2=by))
-        for ring in _rings(own, by):
-            found += [
-                on_revolved(np.array(at), 0.0, own.frame, whole, {**more, "radius2": by}) for at in ring
+        whole = _core(other, inset)
+        contacts += [_pair(rim, whole, inset, options) for rim in _rims(own, inset)]
+        for tip in _core(own, inset).points:
+            contacts.append(replace(sphere_contact(tip, inset, own.frame, whole, options), radius2=inset))
+        for ring in _rings(own, inset):
+            contacts += [
+                sphere_contact(np.array(at), 0.0, own.frame, whole, {**options, "radius2": inset})
+                for at in ring
             ]
-        beside = _core(side_of(other, by, PASSED_ON * by), by)
-        chords = [chord for ring in _rings(own, by) for chord in _chords(ring)]
-        found += [
-            line_on_revolved(chord, 0.0, own.frame, beside, {**more, "radius2": by}) for chord in chords
+        side = _core(inset_side(other, inset, SIDE_INSET * inset), inset)
+        chords = [chord for ring in _rings(own, inset) for chord in _chords(ring)]
+        contacts += [
+            capsule_contact(chord, 0.0, own.frame, side, {**options, "radius2": inset}) for chord in chords
         ]
     lower = [
-        [chord for ring in _rings(solid, by, depth) for chord in _chords(ring)]
-        for solid, depth in ((first, 0.0), (second, by))
+        [chord for ring in _rings(solid, inset, depth) for chord in _chords(ring)]
+        for solid, depth in ((first, 0.0), (second, inset))
     ]
     for line1, line2 in product(*lower):
-        found.append(CapsuleContact(first.frame, second.frame, line1, line2, 0.0, by, **more))
-    return found
+        contacts.append(CapsuleContact(first.frame, second.frame, line1, line2, 0.0, inset, **options))
+    return contacts
 
 
 def _ball(solid: Shape) -> float:
-    """Radius of the largest ball inside [m]."""
+    """Return the radius of the largest inscribed ball [m]."""
     assert solid.ends is not None
     half, below, above = solid.ends
     if below > 0.0 < above:
@@ -99,38 +102,40 @@ def _ball(solid: Shape) -> float:
     return 2.0 * half * radius / (radius + float(np.hypot(2.0 * half, radius)))
 
 
-def _core(solid: Shape, by: float) -> Shape:
-    """All places inside that are at least so far from faces and side; of a cone's its tip too."""
+def _core(solid: Shape, inset: float) -> Shape:
+    """Return the part of a solid that is at least the given depth below faces and side; it keeps its tip."""
     assert solid.ends is not None
     half, below, above = solid.ends
     slant = float(np.hypot(2.0 * half, below - above)) / (2.0 * half)
-    low, high = heights(solid, by)
+    low, high = end_coordinates(solid, inset)
     if above == 0.0:
-        high = half - 2.0 * half * by * slant / below
+        high = half - 2.0 * half * inset * slant / below
     elif below == 0.0:
-        low = 2.0 * half * by * slant / above - half
-    first, last = ((below * (half - z) + above * (half + z)) / (2.0 * half) - by * slant for z in (low, high))
-    place = pin.SE3(solid.place.rotation, np.array(at_place(solid, 0.0, 0.0, 0.5 * (low + high))))
+        low = 2.0 * half * inset * slant / above - half
+    first, last = (
+        (below * (half - z) + above * (half + z)) / (2.0 * half) - inset * slant for z in (low, high)
+    )
+    place = pin.SE3(solid.place.rotation, np.array(to_joint_frame(solid, 0.0, 0.0, 0.5 * (low + high))))
     ends = 0.5 * (high - low), first if below > 0.0 else 0.0, last if above > 0.0 else 0.0
     tips = [end for end, radius in ((low, below), (high, above)) if radius == 0.0]
-    points = np.array([at_place(solid, 0.0, 0.0, end) for end in tips]).reshape(-1, 3)
+    points = np.array([to_joint_frame(solid, 0.0, 0.0, end) for end in tips]).reshape(-1, 3)
     return replace(solid, place=place, points=points, ends=ends)
 
 
-def _rims(solid: Shape, by: float) -> list[Shape]:
-    """The rims that stand back behind their faces, as disks with the rounding around them."""
-    core = _core(between(solid, *heights(solid, by), 1.0), by)
+def _rims(solid: Shape, inset: float) -> list[Shape]:
+    """Return the inset rims of a cylinder or cone as disks of thickness zero, without the rounding."""
+    core = _core(section(solid, *end_coordinates(solid, inset), 1.0), inset)
     disks = []
     for end, radius in faces(core):
-        place = pin.SE3(core.place.rotation, np.array(at_place(core, 0.0, 0.0, end)))
+        place = pin.SE3(core.place.rotation, np.array(to_joint_frame(core, 0.0, 0.0, end)))
         disks.append(replace(core, place=place, ends=(0.0, radius, radius)))
     return disks
 
 
-def _rings(solid: Shape, by: float, depth: float = 0.0) -> list[list[Vector3]]:
-    """The points that carry each face, that deep under it."""
+def _rings(solid: Shape, inset: float, depth: float = 0.0) -> list[list[Vector3]]:
+    """Return the support points of each face, at a depth below the face [m]."""
     return [
-        face_points(solid, end - float(np.copysign(depth, end)), radius, radius - WITHIN_RIM * by)
+        face_points(solid, end - float(np.copysign(depth, end)), radius, radius - MIN_RIM_DISTANCE * inset)
         for end, radius in faces(solid)
     ]
 
@@ -139,8 +144,8 @@ def _chords(ring: list[Vector3]) -> list[Segment]:
     return list(zip(ring, ring[1:] + ring[:1], strict=True))
 
 
-def _pair(first: Shape, second: Shape, by: float, more: dict[str, Any]) -> RevolvedContact:
-    """Two of them, or a rim and one, with the rounding around both."""
+def _pair(first: Shape, second: Shape, inset: float, options: dict[str, Any]) -> RevolvedContact:
+    """Return the contact of two cylinders, cones or disks that are rounded by the same radius."""
     places: dict[str, Any] = {}
     for number, solid in ((1, first), (2, second)):
         assert solid.ends is not None
@@ -148,4 +153,4 @@ def _pair(first: Shape, second: Shape, by: float, more: dict[str, Any]) -> Revol
         places[f"solid{number}"] = (2.0 * half, below, above)
         places[f"xyz{number}"] = tuple(solid.place.translation.tolist())
         places[f"rpy{number}"] = tuple(pin.rpy.matrixToRpy(solid.place.rotation).tolist())
-    return RevolvedContact(first.frame, second.frame, radius1=by, radius2=by, **places, **more)
+    return RevolvedContact(first.frame, second.frame, radius1=inset, radius2=inset, **places, **options)

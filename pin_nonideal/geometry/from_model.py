@@ -1,10 +1,10 @@
-"""Contacts of collision geometry: each pair of shapes as the contacts of its analytic manifold.
+"""Contacts of collision geometry: each pair of shapes is replaced by the contacts of its analytic manifold.
 
-A half-space meets a sphere or an ellipsoid at one point, a capsule at its two ends, a box or a convex mesh at
-its corners, a cylinder or a cone at its rims, its faces and its tip.  Spheres and capsules meet each other at
-one place.  Boxes and convex meshes meet spheres, capsules and each other with corners on faces and edges on
-edges: solids with flat faces touch in no other way.  Cylinders and cones meet spheres, and with their faces,
-sides, rims and tips capsules, boxes, convex meshes and each other.
+A half-space touches a sphere or an ellipsoid at one point, a capsule at its two ends, a box or a convex mesh
+at its corners, and a cylinder or a cone at its rims, faces and tip. Spheres and capsules touch each other at
+one point. Boxes and convex meshes touch spheres, capsules and each other with corners on faces and with edges
+on edges; solids with flat faces have no other contacts. Cylinders and cones touch spheres, and they touch
+capsules, boxes, convex meshes and each other with faces, sides, rims and tips.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ import pinocchio as pin
 
 from pin_nonideal.atomic_files import file_path
 from pin_nonideal.description.laws import static_ratio as ratio_of_static
-from pin_nonideal.errors import InputError, LoadingError
+from pin_nonideal.errors import InputError, LoadingError, short_repr
 from pin_nonideal.validation import fraction, label, nonnegative, optional_text, positive, text
 
-from .manifold import Place, manifold
+from .manifold import ManifoldContact, manifold
 from .shapes import shape_of
 
 __all__ = ["GeometryContact", "geometry_contacts"]
@@ -30,28 +30,29 @@ __all__ = ["GeometryContact", "geometry_contacts"]
 
 @dataclass(frozen=True)
 class GeometryContact:
-    """Two shapes of a scene's collision model touch, with Coulomb friction there.
+    """Contact of two shapes of a scene's collision model, with Coulomb friction.
 
-    Gap: the least distance of the shapes [m].  They become the contacts of their analytic manifold when the
-    scene is made: a half-space with spheres, ellipsoids, capsules (both ends), boxes and convex meshes
-    (corners), cylinders and cones (rims, eight points of a face, the tip); spheres and capsules with each
-    other (one place); boxes and convex meshes with spheres, capsules and each other (corners on faces, edges
-    on edges); cylinders and cones with all of these and each other (sides, rims, eight points of a face and
-    the chords between them, the tip).  Where edges meet edges they are rounded; the faces
-    stay where they are.
-    Rows: 1 for each place that is closed.  lam: the normal force there [N].
+    Gap: least distance of the shapes [m]. When a scene is compiled, the pair is replaced by the contacts of
+    its analytic manifold. A half-space touches spheres, ellipsoids, capsules (both ends), boxes and convex
+    meshes (corners), cylinders and cones (rims, eight points of a face, tip). Spheres and capsules touch each
+    other at one point. Boxes and convex meshes touch spheres, capsules and each other (corners on faces,
+    edges on edges). Cylinders and cones touch all of these and each other (sides, rims, eight points of a
+    face and the chords between them, tip). Edges that touch edges are rounded. The faces keep their
+    positions.
+    Rows: 1 for each closed contact point. lam: normal force at that point [N].
 
     Args:
         geometry1: name of a geometry object of the collision model.
-        geometry2: name of another one, on another body.
+        geometry2: name of a geometry object on another body.
         mu: kinetic coefficient of friction.
         static_ratio: static over kinetic friction, at least 1.
         restitution: rate at which the gap opens after an impact over that at which it closed, 0 to 1.
-        name: used in messages and results; several places are numbered.
-        rounding: radius to which edges are rounded where boxes and convex meshes meet each other, cylinders
-            or cones, and rims where these meet each other, and how far the rim of a cylinder or cone stands
-            back behind its face, but against spheres [m]; a thousandth of the least edge of both, of the
-            radius, and of the largest ball inside two cylinders or cones, when None.
+        name: name in messages and results; if there are several contact points, their names are numbered.
+        rounding: radius of rounded edges [m], for boxes and convex meshes against each other and against
+            cylinders or cones. The same length rounds the rims of two cylinders or cones, and is the inset of
+            a cylinder's or cone's rim behind its face, except against spheres. None selects a thousandth of
+            the shortest edge of both shapes, of the radius, or of the radius of the largest ball inside two
+            cylinders or cones.
     """
 
     geometry1: str
@@ -82,23 +83,23 @@ def geometry_contacts(
     mu: float = 0.0,
     static_ratio: float = 1.0,
     restitution: float = 0.0,
-) -> list[Place]:
-    """The contacts of a collision model's pairs.
+) -> list[ManifoldContact]:
+    """Return the contacts of the pairs of a collision model.
 
     Args:
         model: pinocchio.Model.
-        collision_model: pinocchio.GeometryModel; its own collision pairs, or where it has none all pairs of
-            different bodies.
-        srdf: path of an SRDF file whose disabled pairs are left out.
-        mu: kinetic coefficient of friction of all.
-        static_ratio: static over kinetic friction of all, at least 1.
-        restitution: of all, 0 to 1.
+        collision_model: pinocchio.GeometryModel. Its collision pairs are used, or all pairs on different
+            bodies if it has no collision pairs.
+        srdf: path of an SRDF file whose disabled pairs are excluded.
+        mu: kinetic coefficient of friction of all contacts.
+        static_ratio: static over kinetic friction of all contacts, at least 1.
+        restitution: coefficient of restitution of all contacts, 0 to 1.
 
     Returns:
         Descriptions for `Scene(contacts=)`.
 
     Raises:
-        InputError: an argument does not fit, a pair has no analytic manifold, or a mesh is not convex.
+        InputError: an argument is invalid, a pair has no analytic manifold, or a mesh is not convex.
         LoadingError: the SRDF file cannot be read.
     """
     for what, value, kind in (
@@ -106,7 +107,9 @@ def geometry_contacts(
         ("collision_model", collision_model, pin.GeometryModel),
     ):
         if not isinstance(value, kind):
-            raise InputError(f"geometry_contacts: {what} must be a pinocchio.{kind.__name__}; got {value!r}")
+            raise InputError(
+                f"geometry_contacts: {what} must be a pinocchio.{kind.__name__}; got {short_repr(value)}"
+            )
     mu = nonnegative("geometry_contacts: mu", mu)
     static_ratio = ratio_of_static("geometry_contacts", static_ratio)
     restitution = fraction("geometry_contacts: restitution", restitution)
@@ -120,7 +123,7 @@ def geometry_contacts(
         path = file_path("geometry_contacts: srdf", srdf)
         try:
             pin.removeCollisionPairs(model, pairs, str(path), False)
-        except Exception as error:  # Pinocchio's and its XML reader's own
+        except Exception as error:  # errors of Pinocchio and of its XML reader
             raise LoadingError(f'geometry_contacts: srdf "{path}" must be an SRDF file: {error}') from error
     found = []
     for pair in pairs.collisionPairs:
@@ -129,34 +132,34 @@ def geometry_contacts(
     return found
 
 
-def with_geometry(contacts: Iterable[Any], model: pin.Model, geometry: Any) -> tuple[Any, ...]:
-    """Contacts with those of geometry in place of each `GeometryContact`.
+def expand_geometry_contacts(contacts: Iterable[Any], model: pin.Model, geometry: Any) -> tuple[Any, ...]:
+    """Return contacts in which each `GeometryContact` is replaced by the contacts of its manifold.
 
     Args:
-        contacts: descriptions.
+        contacts: descriptions of contacts.
         model: pinocchio.Model.
-        geometry: pinocchio.GeometryModel, or a function without arguments that gives it or None.
+        geometry: pinocchio.GeometryModel, or a function without arguments that returns it or None.
 
     Raises:
-        InputError, UnknownNameError: a geometry does not exist or has no analytic manifold with the other.
+        InputError, UnknownNameError: a geometry does not exist, or the pair has no analytic manifold.
     """
-    given = tuple(contacts)
-    if not any(isinstance(c, GeometryContact) for c in given):
-        return given
+    items = tuple(contacts)
+    if not any(isinstance(c, GeometryContact) for c in items):
+        return items
     shapes = geometry() if callable(geometry) else geometry
     if shapes is None:
         raise InputError("a GeometryContact needs the scene's collision_model; pass one, or use PointContact")
-    nested = [_manifold(c, model, shapes) if isinstance(c, GeometryContact) else [c] for c in given]
+    nested = [_manifold(c, model, shapes) if isinstance(c, GeometryContact) else [c] for c in items]
     return tuple(c for several in nested for c in several)
 
 
-def _manifold(c: GeometryContact, model: pin.Model, geometry: pin.GeometryModel) -> list[Place]:
-    """The contacts of one pair of shapes."""
+def _manifold(c: GeometryContact, model: pin.Model, geometry: pin.GeometryModel) -> list[ManifoldContact]:
+    """Return the contacts of one pair of shapes."""
     who = label(c)
     first, second = (shape_of(who, name, model, geometry) for name in (c.geometry1, c.geometry2))
     if first.frame == second.frame:
         raise InputError(f"{who}: both geometries are on the same body, which cannot touch itself")
     ground, thing = (first, second) if first.normal is not None else (second, first)
     base = c.name or f"{thing.name} on {ground.name}"
-    more = {"mu": c.mu, "static_ratio": c.static_ratio, "restitution": c.restitution}
-    return manifold(who, first, second, c.rounding, base, more)
+    options = {"mu": c.mu, "static_ratio": c.static_ratio, "restitution": c.restitution}
+    return manifold(who, first, second, c.rounding, base, options)

@@ -1,4 +1,4 @@
-"""Lowest points of shapes over a plane."""
+"""Heights of the lowest points of shapes above a plane."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from pin_nonideal.types import Array, GeometryModel, Model, Placement
 
 
 def lowest_height(model: Model, shapes: GeometryModel, q: Array, plane: Placement) -> float:
-    """Height of the lowest point of the shapes of moving bodies over a plane [m].
+    """Return the height of the lowest point of the shapes of moving bodies above a plane [m].
 
     Args:
         model: pinocchio.Model.
-        shapes: pinocchio.GeometryModel; shapes on the world are left out.
+        shapes: pinocchio.GeometryModel; shapes on the world are ignored.
         q: configuration, (nq,).
-        plane: its point and, as the third axis, its normal.
+        plane: placement of the plane; its origin lies on the plane, its third axis is the normal.
 
     Raises:
-        InputError: no shape is on a moving body, or one has no lowest point here.
+        InputError: no shape is on a moving body, or a shape has no lowest point.
     """
     data, of_shapes = model.createData(), shapes.createData()
     pin.updateGeometryPlacements(model, data, shapes, of_shapes, q)
@@ -36,14 +36,14 @@ def lowest_height(model: Model, shapes: GeometryModel, q: Array, plane: Placemen
 
 
 def depth(item: Any, place: Placement) -> float:
-    """Height of the lowest point of one shape over the plane z = 0 [m].
+    """Return the height of the lowest point of one shape above the plane z = 0 [m].
 
     Args:
         item: pinocchio.GeometryObject.
-        place: of the shape's axes.
+        place: placement of the shape's axes.
 
     Raises:
-        InputError: the shape is unbounded, or of a kind without a lowest point here.
+        InputError: the shape is unbounded, or its kind is not supported.
     """
     shape, kind = item.geometry, type(item.geometry).__name__
     height, normal = float(place.translation[2]), place.rotation[2]  # the normal in the shape's axes
@@ -68,7 +68,7 @@ def depth(item: Any, place: Placement) -> float:
 
 
 def _vertices(item: Any) -> Array | None:
-    """Vertices of a mesh, or None of anything else."""
+    """Return the vertices of a mesh, or None for other shapes."""
     mesh, kind = item.geometry, type(item.geometry).__name__
     if kind.startswith("Convex"):
         points = np.array([mesh.point(i) for i in range(mesh.num_points)])

@@ -1,4 +1,4 @@
-"""Pairs of shapes as the contacts of their analytic manifold: a place for each way in which they touch."""
+"""Analytic contact manifolds of pairs of shapes: one contact for each pair of features that can touch."""
 
 from __future__ import annotations
 
@@ -25,23 +25,23 @@ from pin_nonideal.types import Array
 from pin_nonideal.validation import Vector3
 
 from .cylinder import (
-    LEAST_ROUNDING,
-    PASSED_ON,
-    at_place,
-    between,
+    DEFAULT_ROUNDING,
+    SIDE_INSET,
+    capsule_contact,
+    end_coordinates,
     face_points,
     faces,
-    heights,
-    line_on_revolved,
-    on_revolved,
-    side_of,
-    slices,
-    standing_back,
+    inset_side,
+    rim_inset,
+    rim_slices,
+    section,
+    sphere_contact,
+    to_joint_frame,
 )
-from .cylinder_manifold import two_revolved
+from .cylinder_manifold import cylinder_contacts
 from .shapes import CORNERS, Shape
 
-Place = (
+ManifoldContact = (
     PointContact
     | CapsuleContact
     | BoxContact
@@ -52,66 +52,69 @@ Place = (
     | RevolvedContact
 )
 
-# Places of one pair beyond which it is refused: rows of all of them take room by the square of their number.
-MOST_PLACES = 1000
+# Maximum number of contacts of one pair. The rows of all contacts need memory proportional to the square of
+# their number.
+MAX_CONTACTS = 1000
 
 
 def manifold(
-    who: str, first: Shape, second: Shape, rounding: float | None, base: str, more: dict[str, Any]
-) -> list[Place]:
-    """The contacts of one pair of shapes.
+    who: str, first: Shape, second: Shape, rounding: float | None, base: str, options: dict[str, Any]
+) -> list[ManifoldContact]:
+    """Return the contacts of one pair of shapes.
 
     Args:
-        who: words for messages.
-        first: one shape.
-        second: another one, on another body.
-        rounding: radius to which edges are rounded where edges meet edges [m]; None for the default.
-        base: name of all; several are numbered.
-        more: mu, static_ratio and restitution of each.
+        who: prefix of error messages.
+        first: first shape.
+        second: second shape, on another body.
+        rounding: radius of edges that can touch edges [m]; None for the default.
+        base: name of the contacts; several contacts are numbered.
+        options: mu, static_ratio and restitution of each contact.
 
     Raises:
-        InputError: no contacts are known for the pair, they are too many, or the rounding does not fit.
+        InputError: the pair has no manifold, the contacts are too many, or the rounding is too large.
     """
     if first.normal is not None:
         first, second = second, first
-    found: list[Any]
+    contacts: list[Any]
     if second.normal is not None and first.normal is None:
-        found = list(_on_half_space(who, first, second, rounding, more))
+        contacts = list(_half_space_contacts(who, first, second, rounding, options))
     elif first.is_round and second.is_round:
         ends = _segment(first.points), _segment(second.points)
-        found = [CapsuleContact(first.frame, second.frame, *ends, first.radius, second.radius, **more)]
+        contacts = [CapsuleContact(first.frame, second.frame, *ends, first.radius, second.radius, **options)]
     else:
         if first.solid and (second.solid or second.is_round):
             first, second = second, first
         if first.ends is not None:
             first, second = second, first
         if second.solid and (first.solid or first.is_round):
-            found = _solid_manifold(who, first, second, rounding, more)
+            contacts = _solid_manifold(who, first, second, rounding, options)
         elif second.ends is not None and first.kind == "Sphere":
-            found = [on_revolved(first.points[0], first.radius, first.frame, second, more)]
+            contacts = [sphere_contact(first.points[0], first.radius, first.frame, second, options)]
         elif second.ends is not None and (first.solid or first.is_round):
-            found = _revolved_manifold(who, first, second, rounding, more)
+            contacts = _cylinder_manifold(who, first, second, rounding, options)
         elif first.ends is not None and second.ends is not None:
-            found = two_revolved(who, first, second, rounding, more)
+            contacts = cylinder_contacts(who, first, second, rounding, options)
         else:
             raise InputError(
                 f"{who}: no contacts are known for this pair of shapes, a {first.kind} and a {second.kind}; "
                 "a half-space with any other shape is one, and so are spheres, capsules, boxes, convex "
                 "meshes, cylinders and cones with each other: use PointContact for the places that touch"
             )
-    return [replace(c, name=base if len(found) == 1 else f"{base} {k + 1}") for k, c in enumerate(found)]
+    return [
+        replace(c, name=base if len(contacts) == 1 else f"{base} {k + 1}") for k, c in enumerate(contacts)
+    ]
 
 
-def _on_half_space(
-    who: str, shape: Shape, ground: Shape, rounding: float | None, more: dict[str, Any]
-) -> Iterator[Place]:
-    """Any shape over a half-space: its corners and ends, points of its faces and its rims."""
+def _half_space_contacts(
+    who: str, shape: Shape, ground: Shape, rounding: float | None, options: dict[str, Any]
+) -> Iterator[ManifoldContact]:
+    """Yield the contacts of a shape with a half-space: corners, ends, points of faces, and rims."""
     assert ground.normal is not None
     level: dict[str, Any] = {
         "plane": None if ground.frame == "universe" else ground.frame,
         "normal": tuple(ground.normal.tolist()),
         "height": float(ground.normal @ ground.points[0]),
-        **more,
+        **options,
     }
     for point in np.unique(shape.points, axis=0):
         yield PointContact(shape.frame, offset=tuple(point.tolist()), radius=shape.radius, **level)
@@ -121,24 +124,24 @@ def _on_half_space(
         yield EllipsoidContact(shape.frame, semiaxes, offset=xyz, rpy=rpy, **level)
     if shape.ends is None:
         return
-    back = standing_back(who, shape, rounding)
+    inset = rim_inset(who, shape, rounding)
     for end, radius in faces(shape):
         for point in face_points(shape, end, radius):
             yield PointContact(shape.frame, offset=point, **level)
-        middle = at_place(shape, 0.0, 0.0, end - np.copysign(back, end))
+        middle = to_joint_frame(shape, 0.0, 0.0, end - np.copysign(inset, end))
         yield EllipsoidContact(shape.frame, (radius, radius, 0.0), offset=middle, rpy=rpy, **level)
 
 
-def _revolved_manifold(
-    who: str, other: Shape, solid: Shape, rounding: float | None, more: dict[str, Any]
-) -> list[Place]:
-    """A capsule, box or convex mesh with a cylinder or cone.
+def _cylinder_manifold(
+    who: str, other: Shape, solid: Shape, rounding: float | None, options: dict[str, Any]
+) -> list[ManifoldContact]:
+    """Return the contacts of a capsule, box or convex mesh with a cylinder or cone.
 
-    Corners, and a capsule's ends, on the whole solid; edges, and its middle line, on a side that stands back
-    a little from these, on the rims and on the chords between the points that carry the faces; those points
-    and the tip on the faces of a box or mesh, and rims on its faces and edges.
+    Corners, and the ends of a capsule, touch the whole solid. Edges, and the segment of a capsule, touch the
+    slightly inset side, the rims and the chords between the support points of the faces. These support points
+    and the tip touch the faces of a box or mesh. The rims touch its faces and edges.
     """
-    back = standing_back(who, solid, rounding)
+    inset = rim_inset(who, solid, rounding)
     radius = _edge_radius(who, [other], rounding) if other.solid else other.radius
     core = _core(who, other, radius)
     lines = _edges(other, core)
@@ -148,53 +151,53 @@ def _revolved_manifold(
     on_faces = len(tips) if other.solid else 0
     count = len(core) + len(lines) * (1 + len(chords)) + on_faces + len(rings)
     _check_count(who, count, f"{len(lines)} edges by {1 + len(chords)}")
-    side = side_of(solid, back, PASSED_ON * (radius if other.solid else back))
-    found: list[Place] = [on_revolved(at, radius, other.frame, solid, more) for at in core]
-    found += [line_on_revolved(line, radius, other.frame, side, more) for line in lines]
+    side = inset_side(solid, inset, SIDE_INSET * (radius if other.solid else inset))
+    contacts: list[ManifoldContact] = [sphere_contact(at, radius, other.frame, solid, options) for at in core]
+    contacts += [capsule_contact(line, radius, other.frame, side, options) for line in lines]
     for line, chord in product(lines, chords):
-        found.append(CapsuleContact(other.frame, solid.frame, line, chord, radius, 0.0, **more))
+        contacts.append(CapsuleContact(other.frame, solid.frame, line, chord, radius, 0.0, **options))
     if not other.solid:
-        rims = slices(solid, back)
-        return found + [
-            line_on_revolved(line, radius, other.frame, rim, more) for line in lines for rim in rims
+        rims = rim_slices(solid, inset)
+        return contacts + [
+            capsule_contact(line, radius, other.frame, rim, options) for line in lines for rim in rims
         ]
-    found += [_on_solid(solid, np.array(at), other, core, 0.0, radius, more) for at in tips]
+    contacts += [_solid_contact(solid, np.array(at), other, core, 0.0, radius, options) for at in tips]
     rpy = tuple(pin.rpy.matrixToRpy(solid.place.rotation).tolist())
-    inner = between(solid, *heights(solid, back), 1.0)
+    inner = section(solid, *end_coordinates(solid, inset), 1.0)
     for end, rim in faces(inner):
-        middle = at_place(inner, 0.0, 0.0, end)
-        found.append(
-            RimContact(solid.frame, other.frame, _rows(core), rim, radius, offset=middle, rpy=rpy, **more)
+        middle = to_joint_frame(inner, 0.0, 0.0, end)
+        contacts.append(
+            RimContact(solid.frame, other.frame, _rows(core), rim, radius, offset=middle, rpy=rpy, **options)
         )
-    return found
+    return contacts
 
 
 def _solid_manifold(
-    who: str, first: Shape, solid: Shape, rounding: float | None, more: dict[str, Any]
-) -> list[Place]:
-    """A box or convex mesh with a sphere, a capsule or another one: corners on faces, then edges on edges."""
+    who: str, first: Shape, solid: Shape, rounding: float | None, options: dict[str, Any]
+) -> list[ManifoldContact]:
+    """Return the contacts of a box or convex mesh with a sphere, a capsule, a box or a convex mesh."""
     r2 = _edge_radius(who, [first, solid], rounding) if first.solid else 0.0
     r1 = r2 if first.solid else first.radius
     cores = _core(who, first, r1), _core(who, solid, r2)
     lines = _edges(first, cores[0]), _edges(solid, cores[1])
     count = len(cores[0]) + first.solid * len(cores[1]) + len(lines[0]) * len(lines[1])
     _check_count(who, count, f"{len(lines[0])} edges by {len(lines[1])}")
-    found: list[Place] = []
+    contacts: list[ManifoldContact] = []
     for ball, points, target, core, radius in (
         (first, cores[0], solid, cores[1], r1),
         (solid, cores[1], first, cores[0], r2),
     ):
         if target.solid:
-            found += [_on_solid(ball, at, target, core, radius, r2, more) for at in points]
+            contacts += [_solid_contact(ball, at, target, core, radius, r2, options) for at in points]
     for one, other in product(*lines):
-        found.append(CapsuleContact(first.frame, solid.frame, one, other, r1, r2, **more))
-    return found
+        contacts.append(CapsuleContact(first.frame, solid.frame, one, other, r1, r2, **options))
+    return contacts
 
 
 def _edge_radius(who: str, shapes: list[Shape], rounding: float | None) -> float:
-    """To which the edges of boxes and meshes are rounded [m]."""
-    edge = min(_least_edge(shape) for shape in shapes if shape.solid)
-    radius = LEAST_ROUNDING * edge if rounding is None else rounding
+    """Return the radius of the rounded edges of boxes and meshes [m]."""
+    edge = min(_min_edge(shape) for shape in shapes if shape.solid)
+    radius = DEFAULT_ROUNDING * edge if rounding is None else rounding
     if not 2.0 * radius < edge:
         raise InputError(
             f"{who}: rounding must be less than half the least edge {edge:g} m; got {radius:g} m"
@@ -203,9 +206,9 @@ def _edge_radius(who: str, shapes: list[Shape], rounding: float | None) -> float
 
 
 def _check_count(who: str, count: int, edges: str) -> None:
-    if count > MOST_PLACES:
+    if count > MAX_CONTACTS:
         raise InputError(
-            f"{who}: two shapes may touch at {MOST_PLACES} places at most, and these have {count}: "
+            f"{who}: two shapes may touch at {MAX_CONTACTS} places at most, and these have {count}: "
             f"{edges} and all corners; use simpler shapes, or PointContact"
         )
 
@@ -214,28 +217,36 @@ def _rows(points: Array) -> tuple[Vector3, ...]:
     return tuple((x, y, z) for x, y, z in points.tolist())
 
 
-def _on_solid(
-    ball: Shape, at: Array, target: Shape, core: Array, radius: float, rounding: float, more: dict[str, Any]
+def _solid_contact(
+    ball: Shape,
+    at: Array,
+    target: Shape,
+    core: Array,
+    radius: float,
+    rounding: float,
+    options: dict[str, Any],
 ) -> BoxContact | HullContact:
-    """A sphere or a point on a box or a mesh with these corners, both rounded."""
+    """Return the contact of a sphere or a point with a rounded box or mesh with these corners."""
     if target.half is not None:
-        return _on_box(ball, at, target, radius, rounding, more)
+        return _box_contact(ball, at, target, radius, rounding, options)
     offset = tuple(at.tolist())
-    return HullContact(ball.frame, target.frame, _rows(core), radius, rounding, offset, **more)
+    return HullContact(ball.frame, target.frame, _rows(core), radius, rounding, offset, **options)
 
 
-def _on_box(
-    ball: Shape, at: Array, box: Shape, radius: float, rounding: float, more: dict[str, Any]
+def _box_contact(
+    ball: Shape, at: Array, box: Shape, radius: float, rounding: float, options: dict[str, Any]
 ) -> BoxContact:
     assert box.half is not None
     size = tuple((2.0 * box.half).tolist())
     rpy = tuple(pin.rpy.matrixToRpy(box.place.rotation).tolist())
     xyz = tuple(box.place.translation.tolist())
     offset = tuple(at.tolist())
-    return BoxContact(ball.frame, box.frame, size, radius, rounding, offset=offset, xyz=xyz, rpy=rpy, **more)
+    return BoxContact(
+        ball.frame, box.frame, size, radius, rounding, offset=offset, xyz=xyz, rpy=rpy, **options
+    )
 
 
-def _least_edge(shape: Shape) -> float:
+def _min_edge(shape: Shape) -> float:
     if shape.half is not None:
         return 2.0 * float(shape.half.min())
     ends = np.array(_edges(shape, shape.points))
@@ -243,7 +254,7 @@ def _least_edge(shape: Shape) -> float:
 
 
 def _core(who: str, shape: Shape, radius: float) -> Array:
-    """The corners of a solid less a radius on all sides; of others the points that the radius is around."""
+    """Return the corners of a solid shrunk by a radius, or the points of a sphere or capsule."""
     if not shape.solid:
         return np.unique(shape.points, axis=0)
     if shape.half is None:
@@ -253,7 +264,7 @@ def _core(who: str, shape: Shape, radius: float) -> Array:
 
 
 def _edges(shape: Shape, points: Array) -> list[Segment]:
-    """The edges of a solid with these corners, or the one of a capsule."""
+    """Return the edges of a solid with these corners, or the segment of a capsule."""
     if not shape.solid:
         return [_segment(points)] if len(points) == 2 else []
     if shape.half is None:

@@ -1,4 +1,4 @@
-"""Shapes of a collision model, read into what their contacts are made of."""
+"""Shapes of a collision model in terms of the parameters of their contacts."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ KNOWN = "spheres, capsules, boxes, cylinders, cones, ellipsoids, half-spaces and
 
 @dataclass(frozen=True)
 class Shape:
-    """A geometry object in the axes of its joint's frame.
+    """Geometry object in the frame of its joint.
 
     Attributes:
-        name: of the geometry object.
-        kind: as Coal calls it.
+        name: name of the geometry object.
+        kind: name of the shape's class in Coal.
         frame: name of the joint.
-        place: of the shape's own axes.
-        points: corners, ends of a capsule's middle line, the middle of a sphere, or the tip of a cone; one of
-            a half-space's boundary, (n, 3).
-        radius: around these.
-        normal: of a half-space, outward.
-        half: of a box, its edges halved.
-        ends: of a cylinder or cone, half its length and the radii of its lower and upper face.
-        semiaxes: of an ellipsoid.
-        solid: whether it is the convex hull of its points.
+        place: placement of the shape's own axes.
+        points: corners of a solid, ends of a capsule's segment, center of a sphere, tip of a cone, or one
+            point on the boundary of a half-space, (n, 3).
+        radius: radius around the points of a sphere or capsule [m].
+        normal: outward normal of a half-space, (3,).
+        half: half edges of a box [m], (3,).
+        ends: half length and radii of the lower and upper face of a cylinder or cone [m].
+        semiaxes: semi-axes of an ellipsoid [m], (3,).
+        solid: whether the shape is the convex hull of its points.
     """
 
     name: str
@@ -51,22 +51,22 @@ class Shape:
 
     @property
     def is_round(self) -> bool:
-        """Whether it is a sphere or a capsule."""
+        """Check if the shape is a sphere or a capsule."""
         return self.radius > 0.0
 
 
 def shape_of(who: str, name: str, model: pin.Model, geometry: pin.GeometryModel) -> Shape:
-    """A geometry object as a shape of one of the known kinds.
+    """Return a geometry object as a shape of a supported kind.
 
     Args:
-        who: words for messages.
-        name: of the object.
+        who: prefix of error messages.
+        name: name of the geometry object.
         model: pinocchio.Model.
         geometry: pinocchio.GeometryModel.
 
     Raises:
-        InputError: of another kind, or a mesh that is not convex.
-        UnknownNameError: there is no such object.
+        InputError: the kind is not supported, or a mesh is not convex.
+        UnknownNameError: the collision model has no such object.
     """
     known = [g.name for g in geometry.geometryObjects]
     if name not in known:
@@ -102,10 +102,10 @@ def shape_of(who: str, name: str, model: pin.Model, geometry: pin.GeometryModel)
 
 
 def _corners(what: str, mesh: Any, scale: Array) -> Array:
-    """Corners of a convex mesh.
+    """Return the corners of a convex mesh.
 
     Raises:
-        InputError: it is no mesh, or not convex.
+        InputError: the shape is no mesh, or is not convex.
     """
     kind = type(mesh).__name__
     if kind.startswith("Convex"):

@@ -1,1 +1,1 @@
-"""Robots as files describe them: URDF, MJCF, robot.yaml, and generated ones."""
+"""Robots from files (URDF, MJCF, robot.yaml) and generated robots."""

@@ -1,4 +1,4 @@
-"""From a name or a path to a Scene."""
+"""Loading of a scene by the name of a robot or by a path."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ import numpy as np
 
 from pin_nonideal.compilation.contacts import has_stops
 from pin_nonideal.description.contacts import JointLimit
-from pin_nonideal.errors import InputError, LoadingError, nearest
+from pin_nonideal.errors import InputError, LoadingError, nearest, short_repr
 from pin_nonideal.loading.library.example_robots import example_names, example_robot
 from pin_nonideal.loading.library.generators import GENERATORS
-from pin_nonideal.loading.urdf.loop_tolerance import relaxed
+from pin_nonideal.loading.urdf.loop_tolerance import remove_dependent_rows
 from pin_nonideal.loading.urdf.reader import RobotFile, read_urdf
 from pin_nonideal.loading.urdf.xml import listed
 from pin_nonideal.loading.yaml.assembly import scene_arguments
-from pin_nonideal.loading.yaml.initial_state import Start, held_start
+from pin_nonideal.loading.yaml.initial_state import Start, held_entries
 from pin_nonideal.loading.yaml.robot import MODEL_KEYS, check_keys, optional_string, read_yaml
 from pin_nonideal.scene.scene import Scene, with_origin
 from pin_nonideal.states.held import Held
@@ -28,9 +28,9 @@ from pin_nonideal.types import Table
 from pin_nonideal.validation import choice, flag, positive, sequence
 
 FILE_PARAMETERS = ("free_flyer", "package_dirs", "merge_ball_joints", "density")
-ASSEMBLY = 1e-6  # to which exports of CAD give the frames of loops [m or rad], with some room
+ASSEMBLY_TOLERANCE = 1e-6  # accuracy of the loop frames in CAD exports [m or rad], with a margin
 MJCF_PARAMETERS = ("allow", "ctrl")
-URDF, MJCF = (".urdf", ".xacro"), (".xml", ".mjcf")  # endings, in any case
+URDF, MJCF = (".urdf", ".xacro"), (".xml", ".mjcf")  # suffixes, in lower or upper case
 
 
 def load(
@@ -39,55 +39,65 @@ def load(
     terms: str = "core",
     q0: Start = None,
     v0: Start = None,
-    assembly_tolerance: float = ASSEMBLY,
+    assembly_tolerance: float = ASSEMBLY_TOLERANCE,
     limits: bool = False,
     **parameters: Any,
 ) -> Scene:
-    """Loads a robot as a scene.
+    """Load a robot as a scene.
 
-    `name` is one of
+    `name` is one of the following:
 
     - a robot of this package (`robots()` lists them), such as "four_bar";
     - a path to a folder with robot.urdf and, beside it, robot.yaml (loops, laws, contacts, initial state);
     - a path to a .urdf file, or to a .xml file in MJCF;
     - a robot of example-robot-data, such as "panda".
 
-    URDF damping and friction become `JointFriction` laws, mimic joints become `JointCoupling`, three
-    revolutes that make a ball joint around massless links become one spherical joint.  `scene.notes` says
-    what was done.
+    URDF damping and friction become `JointFriction` laws, and mimic joints become `JointCoupling`. Three
+    revolute joints that form a ball joint around massless links become one spherical joint. `scene.notes`
+    lists these changes.
 
     Args:
-        name: see above.
-        terms: who computes M(q) and the bias forces, "core" or "pinocchio", see `Scene`.
-        q0: initial configuration in place of the file's: numbers (nq,), a table by joint name that changes
-            some of them (see `Scene`), or the name of a reference configuration (of a keyframe of an MJCF
-            file, whose velocities and controls come along).
-        v0: initial velocity in place of the file's: numbers (nv,), or a table by joint name.  Entries of
-            tables, and without them those that the file's own tables name, are held while the others follow
-            the constraints.
-        assembly_tolerance: to which the frames of the file's loops are given [m or rad], as exports of CAD
-            round them: rows that depend on others to this tolerance are left out, which `notes` tell.
-        limits: whether the limits of positions in the file are stops of the joints, each a `JointLimit`
-            without restitution; `notes` tell of those that are not used.
-        **parameters: of a generated robot, such as N for "n_four_bar"; of URDF files and folders:
+        name: name of a robot, or a path, as above.
+        terms: implementation of M(q) and the bias forces, "core" or "pinocchio", see `Scene`.
+        q0: initial configuration that replaces the file's: numbers (nq,), a table by joint name that changes
+            some of them (see `Scene`), or the name of a reference configuration. The keyframe of an MJCF file
+            also sets velocities and controls.
+        v0: initial velocity that replaces the file's: numbers (nv,), or a table by joint name. Projection
+            onto the constraints holds the entries of these tables, or of the file's tables if none are given.
+        assembly_tolerance: accuracy of the frames of the file's loops [m or rad], for rounded CAD exports.
+            Rows that depend on others to this tolerance are removed and listed in `notes`.
+        limits: whether the position limits of the file become stops of the joints, each a `JointLimit`
+            without restitution; `notes` lists unused limits.
+        **parameters: parameters of a generated robot, such as N for "n_four_bar". URDF files and folders:
             `free_flyer` (bool, a floating base), `package_dirs` (folders for package:// paths),
-            `merge_ball_joints` (bool, True), `density` (of links that state no inertia [kg/m^3], which is
-            then computed from their shapes); of MJCF files: `allow` (what may be left out although it moves
-            the robot, such as ("fluid", "muscle")), `ctrl` (controls of the actuators: numbers (nu,), a table
-            by actuator's name, or a function (t, q, v) -> (nu,); zero when left out).
+            `merge_ball_joints` (bool, True), `density` (density of links without an inertia [kg/m^3], to
+            compute it from their shapes). MJCF files: `allow` (active features that may be ignored, such as
+            ("fluid", "muscle")), `ctrl` (controls of the actuators: numbers (nu,), a table by actuator name,
+            or a function (t, q, v) -> (nu,); default zero).
 
     Returns:
-        The scene; `simulate` takes it.
+        Scene of the robot, for `simulate`.
 
     Raises:
-        UnknownNameError: no robot of that name, or no joint.
-        LoadingError: a file is missing, truncated, malformed, or states something that cannot be honored.
+        UnknownNameError: no robot or joint has that name.
+        LoadingError: a file is missing, truncated, malformed, or has an unsupported feature.
         SingularMassError: the mass matrix at the initial configuration is not positive definite.
-        InputError: an unknown parameter, or a bad value of one.
+        InputError: a parameter is unknown, or its value is invalid.
     """
     text = os.fspath(name) if isinstance(name, (str, os.PathLike)) else None
     if not isinstance(text, str) or not text or "\0" in text:
-        raise InputError(f"name must be the name of a robot or a path; got {name!r}")
+        raise InputError(f"name must be the name of a robot or a path; got {short_repr(name)}")
+    try:
+        Path(text).expanduser().is_dir()
+    except (
+        OSError,
+        RuntimeError,
+        ValueError,
+    ) as error:  # too long, or of an unknown user
+        raise InputError(
+            f"name must be the name of a robot or a path; got {short_repr(name)}: "
+            f"{getattr(error, 'strerror', None) or error}"
+        ) from None
     found = _find(name, text, parameters)
     arguments = scene_arguments(found.robot, found.table, found.name, merge=found.merge, start=q0, speed=v0)
     given = dict(parameters)
@@ -96,24 +106,24 @@ def load(
     for key, state in (("q0", q0), ("v0", v0)):
         if state is not None:
             given[key] = state if isinstance(state, (str, Mapping)) else np.asarray(state).tolist()
-    if assembly_tolerance != ASSEMBLY:
+    if assembly_tolerance != ASSEMBLY_TOLERANCE:
         given["assembly_tolerance"] = assembly_tolerance
     if flag("load: limits", limits):
         given["limits"] = True
-    _use_limits(arguments, limits)
+    _add_limits(arguments, limits)
     arguments["terms"] = terms
     scene = Scene(**arguments, assembly_tolerance=assembly_tolerance)
-    parts = relaxed(scene, assembly_tolerance)
+    parts = remove_dependent_rows(scene, assembly_tolerance)
     if parts is not None:
         arguments.update(model=parts.model, constraints=parts.constraints, q0=parts.q)
         arguments["notes"] = (*scene.notes, parts.note)
         scene = Scene(**arguments, assembly_tolerance=assembly_tolerance)
-    held = held_start(found.robot, found.table, q0, v0)
+    held = held_entries(found.robot, found.table, q0, v0)
     return _with_origin(scene, _origin(text, given), found, held)
 
 
-def _use_limits(arguments: Table, used: bool) -> None:
-    """Stops of the joints whose positions the model bounds, or a note that there are some."""
+def _add_limits(arguments: Table, used: bool) -> None:
+    """Add stops to the joints with position limits, or a note that such limits exist."""
     model = arguments["model"]
     single = [(i, j.idx_q) for i, j in enumerate(model.joints) if i and j.nq == j.nv == 1]
     low, high = model.lowerPositionLimit, model.upperPositionLimit
@@ -130,21 +140,21 @@ def _use_limits(arguments: Table, used: bool) -> None:
         arguments["notes"] = (*arguments.get("notes", ()), note)
 
 
-def load_again(origin: Table) -> Scene:
-    """The scene of an origin, as `load` made it.
+def load_from_origin(origin: Table) -> Scene:
+    """Load the scene of an origin again, as `load` created it.
 
     Args:
-        origin: name and parameters.
+        origin: name and parameters of `load`.
     """
     return load(origin["name"], **origin["parameters"])
 
 
 @dataclass(frozen=True)
-class ShapesOf:
-    """Reads the shapes of a loaded robot again, in a process that does not have them.
+class ShapeReader:
+    """Function that reads the shapes of a loaded robot again, in a process that does not have them.
 
     Attributes:
-        origin: name and parameters.
+        origin: name and parameters of `load`.
         kind: "visual_model" or "collision_model".
     """
 
@@ -152,30 +162,30 @@ class ShapesOf:
     kind: str
 
     def __call__(self) -> Any:
-        """The shapes."""
-        return getattr(load_again(self.origin), self.kind)
+        """Return the shapes."""
+        return getattr(load_from_origin(self.origin), self.kind)
 
 
-def _with_origin(scene: Scene, origin: Table | None, found: Found, held: Held) -> Scene:
-    """The scene with its origin, the name and parameters that `load` was called with."""
+def _with_origin(scene: Scene, origin: Table | None, found: LoadedRobot, held: Held) -> Scene:
+    """Return the scene with its origin, the name and parameters of the call of `load`."""
     sources = None
     if origin is not None:
         kinds = {"visual_model": found.robot.visual, "collision_model": found.robot.collision}
         visual, collision = (
-            ShapesOf(origin, kind) if shapes is not None else None for kind, shapes in kinds.items()
+            ShapeReader(origin, kind) if shapes is not None else None for kind, shapes in kinds.items()
         )
         sources = visual, collision
     return with_origin(scene, origin, shapes=sources, friction=found.robot.contact_friction, held=held)
 
 
-class Found(NamedTuple):
-    """A robot's file as read, with what stands beside it.
+class LoadedRobot(NamedTuple):
+    """Content of a robot's file and of its robot.yaml.
 
     Attributes:
-        robot: what the file holds.
-        table: content of robot.yaml, {} when there is none.
+        robot: content of the robot's file.
+        table: content of robot.yaml, {} if there is none.
         name: name of the scene.
-        merge: merge three revolutes with massless links between into ball joints.
+        merge: whether three revolute joints with massless links are merged into a ball joint.
     """
 
     robot: RobotFile
@@ -185,7 +195,7 @@ class Found(NamedTuple):
 
 
 def _origin(text: str, parameters: Table) -> Table | None:
-    """Name and parameters that load the same scene from any folder; None when a file cannot hold them."""
+    """Return name and parameters that load the scene from any folder, or None if JSON cannot encode them."""
     kept, path = dict(parameters), Path(text).expanduser()
     folders = kept.get("package_dirs")
     if folders is not None:
@@ -200,21 +210,21 @@ def _origin(text: str, parameters: Table) -> Table | None:
         return None
 
 
-def _find(name: str | os.PathLike[str], text: str, parameters: Table) -> Found:
+def _find(name: str | os.PathLike[str], text: str, parameters: Table) -> LoadedRobot:
     path = Path(text).expanduser()
     folders = robot_folders()
     if text in folders:
-        return _noting_folder(_load_folder(folders[text], parameters), path)
+        return _note_folder(_load_folder(folders[text], parameters), path)
     if path.is_dir() and (text not in example_names() or os.sep in text or isinstance(name, Path)):
         return _load_folder(path, parameters)
     if path.is_file() or path.suffix.lower() in (*URDF, *MJCF) or isinstance(name, Path) or os.sep in text:
         return _load_file(path, parameters)
     check_parameters(parameters, (), text)
-    return _noting_folder(Found(example_robot(text, list(folders)), {}, text), path)
+    return _note_folder(LoadedRobot(example_robot(text, list(folders)), {}, text), path)
 
 
-def _noting_folder(found: Found, path: Path) -> Found:
-    """A robot found by its name, with a note where a folder or file of that name lies there too."""
+def _note_folder(found: LoadedRobot, path: Path) -> LoadedRobot:
+    """Add a note to a robot found by its name, if a file or folder of that name exists too."""
     if path.exists():
         found.robot.notes.append(
             f'"{path}" of the working directory is not what was loaded, for it is the name of a robot; '
@@ -224,7 +234,7 @@ def _noting_folder(found: Found, path: Path) -> Found:
 
 
 def robots() -> list[tuple[str, str]]:
-    """The robots of this package, as (name, one line on what it is), in alphabetical order."""
+    """Return the robots of this package, as (name, one-line description), in alphabetical order."""
     return [
         (name, optional_string(read_yaml(folder / "robot.yaml"), "description", f'"{name}"') or "")
         for name, folder in sorted(robot_folders().items())
@@ -232,7 +242,7 @@ def robots() -> list[tuple[str, str]]:
 
 
 def robot_folders() -> dict[str, Path]:
-    """Folders of this package's robots by name: installed with the package, or beside it in a checkout."""
+    """Return the folders of this package's robots by name: of the installed package, or of the checkout."""
     here = Path(__file__).resolve().parent.parent
     for base in (here / "robots", here.parent / "robots"):
         if base.is_dir():
@@ -241,10 +251,10 @@ def robot_folders() -> dict[str, Path]:
 
 
 def check_parameters(parameters: Table, known: tuple[str, ...], name: str) -> None:
-    """Raises on a parameter that the robot does not take.
+    """Check that a robot takes all given parameters.
 
     Raises:
-        InputError: names the nearest known one.
+        InputError: a parameter is unknown; the message has the nearest known name.
     """
     for key in parameters:
         if key not in known:
@@ -255,7 +265,7 @@ def _file_options(parameters: Table, name: str) -> tuple[Table, bool]:
     check_parameters(parameters, FILE_PARAMETERS, name)
     for key in ("free_flyer", "merge_ball_joints"):
         if not isinstance(parameters.get(key, False), bool):
-            raise InputError(f"{key} must be True or False; got {parameters[key]!r}")
+            raise InputError(f"{key} must be True or False; got {short_repr(parameters[key])}")
     options = {k: v for k, v in parameters.items() if k != "merge_ball_joints"}
     if isinstance(options.get("package_dirs"), (str, Path)):
         options["package_dirs"] = [options["package_dirs"]]
@@ -263,12 +273,12 @@ def _file_options(parameters: Table, name: str) -> tuple[Table, bool]:
         options["density"] = positive("density", options["density"])
     folders = sequence("package_dirs", options.get("package_dirs", []))
     if not all(isinstance(folder, (str, Path)) for folder in folders):
-        raise InputError(f"package_dirs must be folders; got {options['package_dirs']!r}")
+        raise InputError(f"package_dirs must be folders; got {short_repr(options['package_dirs'])}")
     return options, parameters.get("merge_ball_joints", True)
 
 
-def _load_mjcf(path: Path, parameters: Table) -> Found:
-    # Imported where such a file is loaded: not every program has one.
+def _load_mjcf(path: Path, parameters: Table) -> LoadedRobot:
+    # Imported on use, since most programs load no MJCF file.
     from pin_nonideal.loading.mjcf.reader import read_mjcf
     from pin_nonideal.loading.mjcf.unsupported import ALLOWED
 
@@ -277,15 +287,15 @@ def _load_mjcf(path: Path, parameters: Table) -> Found:
     allow = (allow,) if isinstance(allow, str) else tuple(sequence("allow", allow))
     for key in allow:
         choice("allow", key, ALLOWED)
-    return Found(read_mjcf(path, **{**parameters, "allow": allow}), {}, path.stem)
+    return LoadedRobot(read_mjcf(path, **{**parameters, "allow": allow}), {}, path.stem)
 
 
-def _load_file(path: Path, parameters: Table) -> Found:
+def _load_file(path: Path, parameters: Table) -> LoadedRobot:
     if not path.is_file():
         raise LoadingError(f'no file or folder "{path}"; give a path that exists, or the name of a robot')
     if path.suffix.lower() in URDF:
         options, merge = _file_options(parameters, path.name)
-        return Found(read_urdf(path, **options), {}, path.stem, merge)
+        return LoadedRobot(read_urdf(path, **options), {}, path.stem, merge)
     if path.suffix.lower() in MJCF:
         return _load_mjcf(path, parameters)
     raise LoadingError(
@@ -293,15 +303,16 @@ def _load_file(path: Path, parameters: Table) -> Found:
     )
 
 
-def _load_folder(folder: Path, parameters: Table) -> Found:
-    """A folder with robot.yaml, robot.urdf, or both."""
+def _load_folder(folder: Path, parameters: Table) -> LoadedRobot:
+    """Load a folder with robot.yaml, robot.urdf, or both."""
     name = folder.resolve().name
     yaml_path = folder / "robot.yaml"
     table = read_yaml(yaml_path) if yaml_path.is_file() else {}
     entry = table.get("model") or {}
     if not isinstance(entry, dict):
         raise LoadingError(
-            f'"{yaml_path}": model must be a table with keys out of {", ".join(MODEL_KEYS)}; got {entry!r}'
+            f'"{yaml_path}": model must be a table with keys out of {", ".join(MODEL_KEYS)}; '
+            f"got {short_repr(entry)}"
         )
     check_keys(entry, MODEL_KEYS, f'"{yaml_path}": model')
     entry = {key: value for key, value in entry.items() if value is not None}
@@ -318,11 +329,11 @@ def _load_folder(folder: Path, parameters: Table) -> Found:
     if "example_robot_data" in entry:
         check_parameters(parameters, (), name)
         robot = example_robot(entry["example_robot_data"], [])
-        return Found(robot, table, name)
+        return LoadedRobot(robot, table, name)
     return _from_urdf(folder, entry, table, parameters, name)
 
 
-def _from_urdf(folder: Path, entry: Table, table: Table, parameters: Table, name: str) -> Found:
+def _from_urdf(folder: Path, entry: Table, table: Table, parameters: Table, name: str) -> LoadedRobot:
     urdf = folder / entry.get("urdf", "robot.urdf")
     if not urdf.resolve().is_relative_to(folder.resolve()):
         raise LoadingError(f'model: urdf must lie in the folder "{folder}"; got "{entry["urdf"]}"')
@@ -333,26 +344,28 @@ def _from_urdf(folder: Path, entry: Table, table: Table, parameters: Table, name
         raise LoadingError(f'"{folder}" must hold a {urdf.name}; there is none{hint}')
     options, merge = _file_options(parameters, name)
     options.setdefault("free_flyer", _flag(entry, "free_flyer", name))
-    return Found(read_urdf(urdf, **options), table, name, merge)
+    return LoadedRobot(read_urdf(urdf, **options), table, name, merge)
 
 
 def _flag(entry: Table, key: str, name: str) -> bool:
     value = entry.get(key, False)
     if not isinstance(value, bool):
-        raise LoadingError(f'robot.yaml of "{name}": model: {key} must be true or false; got {value!r}')
+        raise LoadingError(
+            f'robot.yaml of "{name}": model: {key} must be true or false; got {short_repr(value)}'
+        )
     return value
 
 
-def _generated(entry: Table, table: Table, parameters: Table, name: str, path: Path) -> Found:
-    """A robot that a function of this package builds from parameters."""
+def _generated(entry: Table, table: Table, parameters: Table, name: str, path: Path) -> LoadedRobot:
+    """Return a robot that a function of this package builds from parameters."""
     key = entry["generator"]
     if key not in GENERATORS:
         raise LoadingError(f'"{path}": no generator "{key}"{nearest(key, GENERATORS)}')
     defaults = entry.get("parameters") or {}
     if not isinstance(defaults, dict):
-        raise LoadingError(f'"{path}": model: parameters must be a table; got {defaults!r}')
+        raise LoadingError(f'"{path}": model: parameters must be a table; got {short_repr(defaults)}')
     generator: Callable[..., RobotFile] = GENERATORS[key]
     known = tuple(generator.__kwdefaults__ or ())
     check_keys(defaults, known, f'"{path}": model: parameters')
     check_parameters(parameters, known, name)
-    return Found(generator(**{**defaults, **parameters}), table, name, True)
+    return LoadedRobot(generator(**{**defaults, **parameters}), table, name, True)

@@ -15,13 +15,14 @@ from pin_nonideal.compilation.lowering import Descriptions
 from pin_nonideal.compilation.report import report
 from pin_nonideal.compilation.summary import Description, describe
 from pin_nonideal.core_loader import core
-from pin_nonideal.description.actuation import Actuation
+from pin_nonideal.description.actuation import Actuation, given_actuation
 from pin_nonideal.description.contacts import Contact
 from pin_nonideal.description.forces import Force
 from pin_nonideal.description.laws import Law
 from pin_nonideal.equation import Solution
 from pin_nonideal.errors import InputError
-from pin_nonideal.geometry.from_model import GeometryContact, with_geometry
+from pin_nonideal.geometry.from_model import GeometryContact, expand_geometry_contacts
+from pin_nonideal.html_tables import names, table
 from pin_nonideal.states.held import Held
 from pin_nonideal.states.loop_closure import CLOSURE_TOLERANCE
 from pin_nonideal.states.report import ProjectionReport
@@ -69,10 +70,12 @@ class Scene:
         laws: descriptions of `description.laws`.
         contacts: descriptions of `description.contacts`.
         forces: descriptions of `description.forces`.
-        actuation: None, constant torques, (nv,) or by joint name, a function (t, q, v) -> tau, or a
-            description of `pin_nonideal.description.actuation`.
+        actuation: None, constant torques, (nv,) or by joint name, a function (t, q, v) -> tau, a description
+            of `pin_nonideal.description.actuation`, or a list of such drives. The torques of a list add, and
+            each joint is commanded by one drive: a drive by joint name commands the joints that it names, and
+            other drives command all joints.
         q0: initial configuration; the neutral one when None. Anchors without a second frame hold their frame
-            at its placement in q0. Every configuration argument is an array (nq,), a table by joint name such
+            at its placement in q0. A configuration is an array (nq,), a table by joint name such
             as {"crank": 1.0, "base": {"xyz": [0, 0, 1], "rpy": [0, 0, 1.57]}}, or the name of a reference
             configuration. Joints missing in a table keep their neutral value, and in `solve`, `project` and
             `simulate` their value in the scene's initial state. Projection onto the constraints holds the
@@ -138,9 +141,9 @@ class Scene:
         self.model = model
         self.name = optional_text("Scene: name", name) or model.name or "scene"
         self.constraints, self.laws = sequence("constraints", constraints), sequence("laws", laws)
-        self.contacts = with_geometry(sequence("contacts", contacts), model, collision_model)
+        self.contacts = expand_geometry_contacts(sequence("contacts", contacts), model, collision_model)
         self.forces = sequence("forces", forces)
-        self.actuation, self.terms = actuation, choice("Scene: terms", terms, TERMS)
+        self.actuation, self.terms = given_actuation(actuation), choice("Scene: terms", terms, TERMS)
         self.impact = choice("Scene: impact", impact, IMPACTS)
         self.contact_friction: dict[str, tuple[float, float, float]] = {}
         self.source, self.licence = (
@@ -150,11 +153,10 @@ class Scene:
         check_model(model)
         initial = InitialState(model, q0, v0)
         self.q0, self.v0 = initial.q, initial.v
-        spec = Descriptions(
-            self.constraints, self.contacts, self.laws, self.forces, actuation, terms, self.impact
-        )
         tolerance = nonnegative("Scene: assembly_tolerance", assembly_tolerance)
-        compiled = CompiledScene(model, initial.q, spec, tolerance, initial.is_given)
+        lists = self.constraints, self.contacts, self.laws, self.forces
+        spec = Descriptions(*lists, self.actuation, terms, self.impact, tolerance)
+        compiled = CompiledScene(model, initial.q, spec, initial.is_given)
         if initial.is_given:
             compiled.check_functions(initial.q, initial.v, 0.0)
         self.constraint_slices, self.anchor_frames = compiled.slices, compiled.anchors
@@ -200,6 +202,21 @@ class Scene:
             f'<Scene "{self.name}": nv {self.model.nv}, {len(self.constraints)} constraints, '
             f"{len(self.laws)} laws, {len(self.contacts)} contacts>"
         )
+
+    def _repr_html_(self) -> str:
+        joints = [str(name) for name in self.model.names[1:]]
+        actuation = type(self.actuation).__name__ if self.actuation is not None else "none"
+        contacts = set(self.contact_names)
+        rows = [
+            ("joints", names(joints)),
+            ("degrees of freedom", self.model.nv),
+            ("constraints", names([name for name in self.constraint_slices if name not in contacts])),
+            ("contacts", names(self.contact_names)),
+            ("laws", names(self.law_names)),
+            ("forces", len(self.forces)),
+            ("actuation", "a function" if actuation == "function" else actuation),
+        ]
+        return table(f'Scene "{self.name}"', rows)
 
     # --- states ---------------------------------------------------------------------------------------------
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pin_nonideal.compilation.compiled_scene import CompiledScene
+from pin_nonideal.compilation.delay import DelayedTorque
 from pin_nonideal.core_loader import core
 from pin_nonideal.errors import InputError
 from pin_nonideal.states.parsing import named_joint_values
@@ -35,10 +36,13 @@ class Stepper:
     Args:
         run: stepped run of the core.
         compiled: the compiled scene.
+        delayed: delayed torques of the run, or None.
     """
 
-    def __init__(self, run: core.SteppedRun, compiled: CompiledScene) -> None:
-        self._run, self._compiled = run, compiled
+    def __init__(
+        self, run: core.SteppedRun, compiled: CompiledScene, delayed: DelayedTorque | None = None
+    ) -> None:
+        self._run, self._compiled, self._delayed = run, compiled, delayed
 
     def __repr__(self) -> str:
         at = f"at t = {self.t:g} s" if self._run.begun else "stopped"
@@ -102,6 +106,8 @@ class Stepper:
         at, speed = array("Stepper: q", q, (model.nq,)), array("Stepper: v", v, (model.nv,))
         time = number("Stepper: t", t)
         self._compiled.check_functions(at, speed, time)
+        if self._delayed is not None:
+            self._delayed.begin(time)
         self._guarded(lambda torque: self._run.begin(at, speed, time, torque), tau)
 
     def _guarded(self, act: Callable[[Any], None], tau: ArrayLike | None) -> None:
@@ -146,7 +152,9 @@ class SceneStepper:
         if run is None:
             choice("step: method", method, FIXED)
             length = positive("step: dt", dt)
-            run = self._runs[method, length] = self._new_run(method, length, length, RTOL, ATOL)
+            run = self._runs[method, length] = self._new_run(
+                self._compiled.program, method, length, length, RTOL, ATOL
+            )
         if self._compiled.unchecked:
             self._states.check_functions_at(q, v, t)
         try:  # arrays of the right shape go straight to the core, which checks sizes, lengths and finiteness
@@ -183,13 +191,15 @@ class SceneStepper:
             RTOL if rtol is None else positive("stepper: rtol", rtol),
             ATOL if atol is None else nonnegative("stepper: atol", atol),
         )
-        made = Stepper(self._new_run(method, length, size, *tolerances), self._compiled)
         begin = number("stepper: t0", t0)
+        program, delayed = self._compiled.program_of_runs(begin)
+        made = Stepper(self._new_run(program, method, length, size, *tolerances), self._compiled, delayed)
         at, speed, _ = self._states.project(q, v, begin)
         made.reset(at, speed, begin, tau)
         return made
 
-    def _new_run(self, method: str, period: float, dt: float, rtol: float, atol: float) -> core.SteppedRun:
-        program = self._compiled.program
+    def _new_run(
+        self, program: core.Program, method: str, period: float, dt: float, rtol: float, atol: float
+    ) -> core.SteppedRun:
         tolerance = np.full(2 * self._compiled.model.nv + program.states, atol)
         return core.SteppedRun(program, method, period, dt, rtol, tolerance)

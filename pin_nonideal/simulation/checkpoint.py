@@ -20,12 +20,15 @@ from typing import Any
 import numpy as np
 
 from pin_nonideal.atomic_files import file_path, whole_file
+from pin_nonideal.compilation.actuation import initial_torque
+from pin_nonideal.compilation.delay import DelayedTorque
 from pin_nonideal.compilation.lowering import lower
 from pin_nonideal.compilation.resolver import Resolution
 from pin_nonideal.core_loader import core
+from pin_nonideal.description.actuation import delayed_control
 from pin_nonideal.errors import InputError, LoadingError, OutputError
 from pin_nonideal.scene.scene import Scene, compiled_scene, scene_origin
-from pin_nonideal.trajectory.file import UNREADABLE
+from pin_nonideal.trajectory.file import UNREADABLE, reason_of
 from pin_nonideal.types import Table
 from pin_nonideal.validation import nonnegative
 from pin_nonideal.version import __version__
@@ -49,6 +52,7 @@ class Checkpoint:
         interval: wall time between checkpoints [s].
         wall_s: wall time so far [s].
         notes: notes on the start of the run.
+        delayed: samples of a delayed control that have not acted yet, see `DelayedTorque.pending`.
         state: state of the core.
     """
 
@@ -59,6 +63,7 @@ class Checkpoint:
     interval: float
     wall_s: float
     notes: list[str]
+    delayed: list[tuple[float, list[float]]]
     state: bytes
 
 
@@ -72,6 +77,7 @@ class Saver:
         interval: wall time between checkpoints [s].
         wall_s: wall time that earlier parts of the run took [s].
         notes: notes on the start of the run.
+        delayed: delayed torques of the run, or None.
 
     Attributes:
         interval: wall time between checkpoints, bounded [s].
@@ -85,7 +91,9 @@ class Saver:
         interval: float,
         wall_s: float = 0.0,
         notes: Sequence[str] = (),
+        delayed: DelayedTorque | None = None,
     ) -> None:
+        self._delayed = delayed
         self._path = file_path("simulate: checkpoint", path)
         self._wall = wall_s - time.perf_counter()
         self._written = False
@@ -109,6 +117,7 @@ class Saver:
         """
         wall = self._wall + time.perf_counter()
         header = {**self._header, "wall_s": wall, "digest": hashlib.sha256(state).hexdigest()}
+        header["delayed"] = [] if self._delayed is None else self._delayed.pending
         arrays: Table = {
             "header": np.array(json.dumps(header)),
             "state": np.frombuffer(state, dtype=np.uint8),
@@ -153,13 +162,14 @@ def read_checkpoint(path: Path) -> Checkpoint:
             interval=float(header["interval"]),
             wall_s=float(header["wall_s"]),
             notes=[str(note) for note in header["notes"]],
+            delayed=[(float(t), [float(x) for x in tau]) for t, tau in header.get("delayed", [])],
             state=state,
         )
     except LoadingError:
         raise
     except UNREADABLE as error:
         raise LoadingError(
-            f'cannot read a checkpoint from "{path}": {type(error).__name__}: {error}; '
+            f'cannot read a checkpoint from "{path}": {reason_of(error)}; '
             "it must be a file that simulate(..., checkpoint=path) wrote"
         ) from error
 
@@ -180,6 +190,10 @@ def fingerprint(scene: Scene) -> str:
     digest = hashlib.sha256((scene.model.saveToString() + scene.terms).encode())
     transcript: Any = _Transcript(core.Builder(scene.model), digest)
     lower(compiled_scene(scene).said, transcript, Resolution(scene.model, scene.q0))
+    control = delayed_control(scene.actuation)
+    if control is not None:  # the builder has no delay
+        initial = initial_torque(control, scene.model).tolist()
+        digest.update(json.dumps([control.delay_in_samples, initial]).encode())
     return digest.hexdigest()
 
 

@@ -32,7 +32,14 @@ def stepped_apart(scene: Scene, options: RunOptions) -> list[Component]:
     return components(scene) if apart and options.max_steps == 0 and options.max_wall == 0.0 else []
 
 
-def run_together(scene: Scene, q0: Array, v0: Array, options: RunOptions, **more: Any) -> core.Outcome:
+def run_together(
+    scene: Scene,
+    q0: Array,
+    v0: Array,
+    options: RunOptions,
+    program: core.Program | None = None,
+    **more: Any,
+) -> core.Outcome:
     """Run all mechanisms in common steps, in a workspace reused from an earlier run of the scene.
 
     Args:
@@ -40,8 +47,11 @@ def run_together(scene: Scene, q0: Array, v0: Array, options: RunOptions, **more
         q0: initial configuration, (nq,).
         v0: initial velocity, (nv,).
         options: options of the run.
+        program: the program of this run, if it is not the one of the scene.
         **more: further arguments of the core's `simulate`.
     """
+    if program is not None and program is not compiled_scene(scene).program:
+        return program.runner().simulate(q0, v0, options, **more)
     idle: list[core.Runner] = scene.__dict__.setdefault("_idle_runners", [])
     try:
         runner = idle.pop()

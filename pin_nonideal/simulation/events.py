@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pin_nonideal.compilation.callbacks import checked, named, numbers_of
-from pin_nonideal.errors import InputError
+from pin_nonideal.errors import InputError, short_repr
 from pin_nonideal.types import Array
 from pin_nonideal.validation import count
 
@@ -55,7 +55,8 @@ def asked_events(events: object) -> Asked:
     for f in functions:
         if not callable(f):
             raise InputError(
-                f'simulate: events must be functions (t, q, v) -> number, or "{SEPARATE}"; got {f!r}'
+                f'simulate: events must be functions (t, q, v) -> number, or "{SEPARATE}"; '
+                f"got {short_repr(f)}"
             )
         name = base = str(getattr(f, "__name__", type(f).__name__))
         number = 1
@@ -77,7 +78,9 @@ def _direction(f: Callable[..., Any], who: str) -> int:
     """Return the sign of the attribute `direction`, as in solve_ivp."""
     given = getattr(f, "direction", 0)
     if isinstance(given, bool) or not isinstance(given, (int, float, np.number)) or not np.isfinite(given):
-        raise InputError(f"{who}: direction must be a number, of which the sign counts; got {given!r}")
+        raise InputError(
+            f"{who}: direction must be a number, of which the sign counts; got {short_repr(given)}"
+        )
     return int(np.sign(given))
 
 
@@ -102,7 +105,7 @@ def asked_callback(callback: object, nv: int) -> Callable[[float, Array, Array],
     if callback is None:
         return None
     if not callable(callback):
-        raise InputError(f"simulate: callback must be a function (t, q, v); got {callback!r}")
+        raise InputError(f"simulate: callback must be a function (t, q, v); got {short_repr(callback)}")
     ask = named(callback, "callback")
 
     def call(t: float, q: Array, v: Array) -> Any:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pin_nonideal.core_loader import core
-from pin_nonideal.description.actuation import SampledControl, asked_by
+from pin_nonideal.description.actuation import sampled_drives
 from pin_nonideal.errors import InputError
 from pin_nonideal.scene.evaluation import SEVERAL
 from pin_nonideal.scene.scene import Scene, compiled_scene
@@ -32,6 +32,8 @@ MOST_KEPT = 32  # maximum number of cached options of a scene
 MOST_SAMPLES = 1e8  # some gigabytes for a small robot
 # Smallest tolerances: no step meets rtol below rounding, and the square of error / atol must not overflow.
 LEAST_RTOL, LEAST_ATOL = 1e-14, 1e-100
+# Largest relative tolerance: a step that changes a coordinate by more than a tenth of it follows nothing.
+MOST_RTOL = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,17 +126,7 @@ def run_options(
     Raises:
         InputError: an option is invalid, or two options exclude each other.
     """
-    choice("simulate: method", method, tuple(METHODS))
-    if not METHODS[method]:
-        if dt is None:
-            raise InputError(f'simulate: method "{method}" needs a step dt')
-        unused = [name for name, value in (("rtol", rtol), ("atol", atol)) if value is not None]
-        if unused:
-            raise InputError(
-                f'simulate: method "{method}" takes steps of the length dt; leave {" and ".join(unused)} out'
-            )
-    elif dt is not None:
-        raise InputError(f'simulate: method "{method}" chooses its own steps; leave dt out, or set output_dt')
+    _check_method(method, rtol, atol, dt)
     if opening := compiled_scene(scene).opening_names:
         _check_opening(method, record, opening[0])
     nv = scene.model.nv
@@ -149,32 +141,27 @@ def run_options(
             tolerance[2 * nv :] = tolerance[: 2 * nv].min()
             if (tolerance < 0.0).any():
                 raise InputError(f"simulate: atol must not be negative; got {tolerance.min():g}")
-    relative = DEFAULT_RTOL if rtol is None else nonnegative("simulate: rtol", rtol)
+    relative = _relative(rtol)
     if relative == 0.0 and not (tolerance > 0.0).all():
         raise InputError("simulate: rtol and atol must not both be zero; set one of them")
     begin, length = number("simulate: t0", t0), positive("simulate: duration", duration)
-    steps = {"dt": dt, "output_dt": output_dt}
-    lengths = {key: positive(f"simulate: {key}", value) for key, value in steps.items() if value is not None}
+    lengths = _lengths(dt, output_dt)
     if separate and output_dt is None:
         raise InputError(
             'simulate: events="separate" needs an output_dt: without one, every step is a sample'
         )
     _check_clock(scene, begin, length, lengths)
-    wanted = {record} if isinstance(record, str) else set(sequence("simulate: record", record))
-    groups = set()
-    for name in wanted:
-        groups.add(FIELDS.get(name, name))
-        choice("simulate: record", FIELDS.get(name, name), RECORDS)
+    groups = _groups(record)
     return RunOptions(
         method=method,
         duration=length,
         t0=begin,
-        rtol=max(relative, LEAST_RTOL) if relative else 0.0,
+        rtol=relative,
         atol=np.ascontiguousarray(np.maximum(tolerance, LEAST_ATOL)),
         dt=lengths.get("dt", 0.0),
         output_dt=lengths.get("output_dt", 0.0),
         max_steps=_most_steps(max_steps),
-        a="a" in groups,
+        a="a" in groups or "reactions" in groups,  # wrenches of fixed joints need accelerations
         forces="forces" in groups,
         energy="energy" in groups,
         power="power" in groups,
@@ -183,11 +170,60 @@ def run_options(
         tau="tau" in groups or "forces" in groups,
         several=choice("simulate: several", several, SEVERAL),
         dense="dense" in groups,
-        max_wall=0.0 if max_wall in (None, np.inf) else positive("simulate: max_wall", max_wall),
+        max_wall=_most_wall(max_wall),
         event_names=event_names,
         separate=separate,
         strict=flag("simulate: strict", strict),
     )
+
+
+def check_values(
+    duration: float,
+    *,
+    t0: float = 0.0,
+    method: str = "dop853",
+    rtol: float | None = None,
+    atol: ArrayLike | None = None,
+    dt: float | None = None,
+    output_dt: float | None = None,
+    max_steps: float | None = None,
+    max_wall: float | None = None,
+    record: str | Sequence[str] = (),
+    several: str = "error",
+    strict: bool = False,
+    **others: Any,
+) -> None:
+    """Check the options of `simulate` that do not depend on the scene.
+
+    Args:
+        duration: duration [s].
+        t0: initial time [s].
+        method: integration method.
+        rtol: relative tolerance, or None.
+        atol: absolute tolerance, or None.
+        dt: step of the fixed-step methods [s], or None.
+        output_dt: time between samples [s], or None.
+        max_steps: maximum number of accepted steps, or None.
+        max_wall: maximum wall time [s], or None.
+        record: names of quantities to record.
+        several: "error" or "continue".
+        strict: whether an impact that gains energy is an error.
+        others: further options, which are not checked.
+
+    Raises:
+        InputError: an option is invalid, or two options exclude each other.
+    """
+    del others
+    _check_method(method, rtol, atol, dt)
+    _relative(rtol)
+    _lengths(dt, output_dt)
+    _groups(record)
+    _most_steps(max_steps)
+    _most_wall(max_wall)
+    number("simulate: t0", t0)
+    positive("simulate: duration", duration)
+    choice("simulate: several", several, SEVERAL)
+    flag("simulate: strict", strict)
 
 
 def kept_options(scene: Scene, *asked: Any) -> RunOptions:
@@ -208,6 +244,72 @@ def kept_options(scene: Scene, *asked: Any) -> RunOptions:
         kept.clear()
     kept[key] = options = run_options(scene, *asked)
     return options
+
+
+def _check_method(method: str, rtol: float | None, atol: ArrayLike | None, dt: float | None) -> None:
+    """Check that a method exists and gets the options that it needs.
+
+    Raises:
+        InputError: see above.
+    """
+    choice("simulate: method", method, tuple(METHODS))
+    if not METHODS[method]:
+        if dt is None:
+            raise InputError(f'simulate: method "{method}" needs a step dt')
+        unused = [name for name, value in (("rtol", rtol), ("atol", atol)) if value is not None]
+        if unused:
+            raise InputError(
+                f'simulate: method "{method}" takes steps of the length dt; leave {" and ".join(unused)} out'
+            )
+    elif dt is not None:
+        raise InputError(f'simulate: method "{method}" chooses its own steps; leave dt out, or set output_dt')
+
+
+def _relative(rtol: float | None) -> float:
+    """Return the relative tolerance, 0 for none.
+
+    Raises:
+        InputError: rtol is outside its bounds.
+    """
+    if rtol is None:
+        return DEFAULT_RTOL
+    relative = nonnegative("simulate: rtol", rtol)
+    if relative and not LEAST_RTOL <= relative <= MOST_RTOL:
+        raise InputError(
+            f"simulate: rtol must be from {LEAST_RTOL:g} (rounding) to {MOST_RTOL:g}, or zero for atol alone"
+            f"; got {relative:g}"
+        )
+    return relative
+
+
+def _lengths(dt: float | None, output_dt: float | None) -> dict[str, float]:
+    """Return the lengths of steps that are given [s], by name."""
+    steps = {"dt": dt, "output_dt": output_dt}
+    return {key: positive(f"simulate: {key}", value) for key, value in steps.items() if value is not None}
+
+
+def _groups(record: str | Sequence[str]) -> set[str]:
+    """Return the groups of quantities to record.
+
+    Raises:
+        InputError: a name is unknown.
+    """
+    groups = set()
+    for name in (record,) if isinstance(record, str) else sequence("simulate: record", record):
+        group = FIELDS.get(name, name) if isinstance(name, str) else name
+        groups.add(choice("simulate: record", group, RECORDS))
+    return groups
+
+
+def _most_wall(max_wall: float | None) -> float:
+    """Return the maximum wall time [s] in the form of the core: 0 for no limit.
+
+    Raises:
+        InputError: max_wall has another value.
+    """
+    if max_wall is None or (isinstance(max_wall, float) and max_wall == np.inf):
+        return 0.0
+    return positive("simulate: max_wall", max_wall)
 
 
 def _check_opening(method: str, record: str | Sequence[str], name: str) -> None:
@@ -262,8 +364,8 @@ def _check_clock(scene: Scene, t0: float, duration: float, lengths: dict[str, fl
     end = max(abs(t0), abs(t0 + duration))
     spacing = float(np.spacing(end))
     named = {f"simulate: {key}": value for key, value in {"duration": duration, **lengths}.items()}
-    control = asked_by(scene.actuation)
-    if isinstance(control, SampledControl):
+    controls = sampled_drives(scene.actuation)
+    for control in controls:
         named[f"{label(control)}: period"] = control.period
     for what, value in named.items():
         if not value >= LEAST_SPACINGS * spacing:  # true for an infinite end as well
@@ -277,9 +379,10 @@ def _check_clock(scene: Scene, t0: float, duration: float, lengths: dict[str, fl
             f"simulate: {key} must leave at most {MOST_SAMPLES:g} samples; {lengths[key]:g} s leaves "
             f"{duration / lengths[key]:.2g}; set a longer {'output_dt' if key == 'dt' else key}"
         )
-    if isinstance(control, SampledControl) and duration / control.period > MOST_SAMPLES:
-        raise InputError(
-            f"{label(control)}: period must leave at most {MOST_SAMPLES:g} calls in a run; "
-            f"{control.period:g} s leaves {duration / control.period:.2g}; "
-            "set a longer period"
-        )
+    for control in controls:
+        if duration / control.period > MOST_SAMPLES:
+            raise InputError(
+                f"{label(control)}: period must leave at most {MOST_SAMPLES:g} calls in a run; "
+                f"{control.period:g} s leaves {duration / control.period:.2g}; "
+                "set a longer period"
+            )

@@ -80,7 +80,7 @@ def finish(
     cause: BaseException | None = None
     if isinstance(stopped, core.CoreFailure):
         error = compiled_scene(scene).named(stopped)
-        error.args = (f"{error}{_fixed_step_hint(error, options)}; {KEPT}", *error.args[1:])
+        error.args = (f"{error}{_overflow_hint(error, options)}; {KEPT}", *error.args[1:])
     elif isinstance(stopped, KeyboardInterrupt):
         error = RunInterrupted(f"the run was interrupted at t = {last:.4g} s; {KEPT}", time=last)
     elif isinstance(stopped, RunError):
@@ -125,10 +125,12 @@ def _opened(scene: Scene, trajectory: Trajectory) -> LoopClosureError:
     return stopped
 
 
-def _fixed_step_hint(error: RunError, options: RunOptions) -> str:
-    """Return a hint for a fixed-step run that has overflowed; empty for other failures."""
-    if not (isinstance(error, NonFiniteError) and options.dt > 0.0):
+def _overflow_hint(error: RunError, options: RunOptions) -> str:
+    """Return a hint for a run that has overflowed; empty for other failures."""
+    if not isinstance(error, NonFiniteError):
         return ""
+    if options.dt == 0.0:
+        return "; look at the last samples for a force, stiffness or function that grows without bound"
     return (
         f": where steps of dt = {options.dt:g} s are too long for the stiffest force the motion overflows; "
         'take a shorter dt, or method="dop853", with max_steps where it calls the scene stiff'

@@ -10,7 +10,7 @@ from pin_nonideal.errors import InputError, LoadingError
 from pin_nonideal.loading.load import load
 from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.trajectory.trajectory import Trajectory
-from pin_nonideal.validation import choice
+from pin_nonideal.validation import choice, nonnegative
 
 from .checkpoint import Saver, read_checkpoint, refuse_other_scene
 from .progress import progress_bar
@@ -50,6 +50,11 @@ def resume(
         RunInterrupted: Ctrl-C was pressed; its `trajectory` holds the samples before the stop.
     """
     source = file_path("resume: path", path)
+    choice("resume: progress", progress, (True, False, None))
+    if checkpoint_interval is not None:
+        nonnegative("resume: checkpoint_interval", checkpoint_interval)
+    if not (scene is None or isinstance(scene, Scene)):
+        raise InputError(f"resume: scene must be a Scene; got {type(scene).__name__}")
     held = read_checkpoint(source)
     if scene is None:
         if held.origin is None:
@@ -58,17 +63,17 @@ def resume(
                 "and pass it: resume(path, scene=scene)"
             )
         scene = load(held.origin["name"], **held.origin["parameters"])
-    elif not isinstance(scene, Scene):
-        raise InputError(f"resume: scene must be a Scene; got {type(scene).__name__}")
     refuse_other_scene(held, scene, source)
-    choice("resume: progress", progress, (True, False, None))
     options = held.options
     interval = held.interval if checkpoint_interval is None else checkpoint_interval
-    saver = Saver(source, scene, options, interval, held.wall_s, held.notes)
+    program, delayed = compiled_scene(scene).program_of_runs(options.t0)
+    if delayed is not None:
+        delayed.pending = held.delayed
+    saver = Saver(source, scene, options, interval, held.wall_s, held.notes, delayed)
     begin = time.perf_counter()
     try:
         with progress_bar(progress, options) as tick:
-            runner = compiled_scene(scene).program.runner()
+            runner = program.runner()
             outcome = runner.resume(held.state, options, tick=tick, save=saver, save_interval=saver.interval)
     except ValueError as error:
         raise LoadingError(f'"{source}" is damaged: {error}') from error

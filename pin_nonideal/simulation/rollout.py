@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from pin_nonideal.compilation.parameter_overrides import RunNumbers, run_numbers
 from pin_nonideal.core_loader import core
-from pin_nonideal.errors import InputError, PinNonidealError, RunError, RunInterrupted
+from pin_nonideal.errors import InputError, PinNonidealError, RunError, RunInterrupted, short_repr
 from pin_nonideal.scene.scene import Scene, compiled_scene, scene_states
 from pin_nonideal.states.joint_layout import require_resolved
 from pin_nonideal.types import Array
@@ -21,6 +22,8 @@ from .decoupled import roll_apart, stepped_apart
 from .options import SCIPY, RunOptions, run_options
 from .results import finish
 from .rollout_arrays import RunArrays, run_arrays
+
+MOST_JOBS = 100_000  # of negative numbers: -n leaves n - 1 processors free
 
 
 def rollout(
@@ -39,7 +42,7 @@ def rollout(
     max_steps: float | None = None,
     record: str | Sequence[str] = (),
     several: str = "error",
-    threads: int = 1,
+    jobs: int = 1,
     failures: str = "raise",
     as_arrays: bool = False,
 ) -> Any:
@@ -75,7 +78,7 @@ def rollout(
         max_steps: as in `simulate`.
         record: as in `simulate`; "dense" is not supported with parameters.
         several: "error" or "continue", as in `simulate`.
-        threads: number of native threads.
+        jobs: number of parallel jobs, in native threads; -1 for all processors, -2 for all but one.
         failures: "raise" raises the error of the first failed run after all runs have ended. "keep" returns
             errors in place of the trajectories of failed runs.
         as_arrays: whether to return a `RunArrays` with states by run and sample, without an object per run.
@@ -92,7 +95,7 @@ def rollout(
     """
     if not isinstance(scene, Scene):
         raise InputError(f"rollout: scene must be a Scene; got {type(scene).__name__}")
-    threads = count("rollout: threads", threads, least=1)
+    threads = _threads(jobs)
     keep = choice("rollout: failures", failures, ("raise", "keep")) == "keep"
     starts_q, starts_v = _starts(scene, q, v, parameters)
     options = run_options(scene, duration, t0, method, rtol, atol, dt, output_dt, max_steps, record, several)
@@ -114,10 +117,21 @@ def rollout(
     return results
 
 
+def _threads(jobs: int) -> int:
+    """Return the number of threads for a number of jobs, of which a negative one counts free processors.
+
+    Raises:
+        InputError: it is zero or no number of jobs.
+    """
+    if count("rollout: jobs", jobs, least=-MOST_JOBS) == 0:
+        raise InputError("rollout: jobs must not be zero; use 1 for no parallel jobs, -1 for all processors")
+    return jobs if jobs > 0 else max(1, (os.cpu_count() or 1) + 1 + jobs)
+
+
 def _starts(scene: Scene, q: Any, v: Any, parameters: Any) -> tuple[Array, Array]:
     """Return the initial states of all runs; a missing state is the scene's initial state."""
     if parameters is not None and not isinstance(parameters, Mapping):
-        raise InputError(f"rollout: parameters must be values by name; got {parameters!r}")
+        raise InputError(f"rollout: parameters must be values by name; got {short_repr(parameters)}")
     starts_q = None if q is None else array("rollout: q", q, (None, scene.model.nq), copy=False)
     starts_v = None if v is None else array("rollout: v", v, (None, scene.model.nv), copy=False)
     given: list[Any] = [each for each in (starts_q, starts_v) if each is not None]
@@ -191,7 +205,8 @@ def _run(
     if not numbers.names and (parts := stepped_apart(scene, options)):
         outcomes = roll_apart(scene, parts, *started, options, threads)
     else:
-        outcomes = core.rollout(compiled.program, *started, options, threads, numbers.names, values)
+        program = compiled.program_of_runs(options.t0, by_thread=True)[0]
+        outcomes = core.rollout(program, *started, options, threads, numbers.names, values)
     wall = time.perf_counter() - begin
     for i, outcome in zip(going, outcomes, strict=True):
         if outcome is None:  # an interrupt ended all runs before this one started

@@ -79,8 +79,9 @@ def run_arrays(
         outcomes = [one for one in roll_apart(scene, parts, q0, v0, options, threads) if one is not None]
         return _of_outcomes(scene, outcomes)
     numbers_of_runs = np.ascontiguousarray(numbers.values)
+    program = compiled.program_of_runs(options.t0, by_thread=True)[0]
     t, q, v, samples, violation, steps, stopped = core.rollout_arrays(
-        compiled.program, q0, v0, options, threads, numbers.names, numbers_of_runs
+        program, q0, v0, options, threads, numbers.names, numbers_of_runs
     )
     most = t.size // n if n else 0
     made = RunArrays(

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from pin_nonideal.core_loader import core
-from pin_nonideal.description.actuation import SampledControl, asked_by
+from pin_nonideal.description.actuation import switching_drives
 from pin_nonideal.errors import InputError, RunError, StepSizeError
 from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.types import Array
@@ -147,12 +147,13 @@ def simulate_stiff(
         Outcome recorded by the core, and the exception that stopped the run, or None.
 
     Raises:
-        InputError: the actuation is a SampledControl, whose samples these methods would step over.
+        InputError: torques of the actuation jump, and these methods would step over the jumps.
     """
     from scipy import integrate
 
-    if isinstance(asked_by(scene.actuation), SampledControl):
-        raise InputError(f'simulate: SampledControl needs one of the core\'s methods; got "{options.method}"')
+    if switching := switching_drives(scene.actuation):
+        kind = type(switching[0]).__name__
+        raise InputError(f'simulate: {kind} needs one of the core\'s methods; got "{options.method}"')
     run = _Run(scene, options, tick, events)
     try:
         with _one_blas_thread():

@@ -10,12 +10,13 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
+from pin_nonideal.atomic_files import check_writable, file_path
 from pin_nonideal.compilation.error_context import stiff_hint
 from pin_nonideal.errors import InputError
 from pin_nonideal.scene.scene import Scene, compiled_scene, scene_states
 from pin_nonideal.trajectory.trajectory import Trajectory
 from pin_nonideal.types import State
-from pin_nonideal.validation import choice
+from pin_nonideal.validation import choice, nonnegative
 
 from .decoupled import run_apart, run_together, stepped_apart
 from .events import Asked, asked_callback, asked_events
@@ -64,7 +65,7 @@ def simulate(
         t0: initial time [s].
         method: "dop853" (order 8) or "dopri5" (order 5), adaptive; "rk4", "semi_implicit_euler" or "moreau"
             (time stepping at velocity level), fixed dt; "Radau", "BDF" or "LSODA" by SciPy, for stiff scenes.
-        rtol: relative tolerance of adaptive methods, 1e-8 when None.
+        rtol: relative tolerance of adaptive methods, from 1e-14 to 0.1, or 0 for atol alone; 1e-8 when None.
         atol: absolute tolerance, a number or an array (2 nv,) for positions and velocities, 1e-10 when None;
             for states of laws, the number or the smallest entry of the array.
         dt: step of the fixed-step methods [s].
@@ -73,8 +74,9 @@ def simulate(
         max_steps: maximum number of steps. None sets no limit, except that a stiff scene stops as soon as an
             explicit method would need 100,000 more steps.
         max_wall: maximum wall time [s]; no limit when None.
-        record: any of "a", "tau", "forces" (which include "laws" and "tau"), "laws", "reactions", "energy",
-            "power", "dense" (interpolants of the steps, for `run.at`), or names of fields that they fill.
+        record: any of "a", "tau", "forces" (which include "laws" and "tau"), "laws", "reactions" (which
+            include "a"), "energy", "power", "dense" (interpolants of the steps, for `run.at`), or names of
+            fields that they fill.
         events: functions (t, q, v) -> number whose zeros are events, as in SciPy's solve_ivp. A function may
             have the attributes `terminal` (True, or the number of events that ends the run) and `direction`
             (positive for rising zeros only, negative for falling ones). A step ends at each event, with the
@@ -113,10 +115,15 @@ def simulate(
     """
     if not isinstance(scene, Scene):
         raise InputError(f"simulate: scene must be a Scene; got {type(scene).__name__}")
-    asked = asked_events(events)
+    asked, between = asked_events(events), asked_callback(callback, scene.model.nv)
+    choice("simulate: progress", progress, (True, False, None))
     steps = (method, rtol, atol, dt, output_dt, max_steps)
     kept = (max_wall, asked.names, asked.separate)
     options = kept_options(scene, duration, t0, *steps, record, several, *kept, strict)
+    _check_together(method, asked, callback, checkpoint)
+    nonnegative("simulate: checkpoint_interval", checkpoint_interval)
+    if checkpoint is not None:
+        check_writable(file_path("simulate: checkpoint", checkpoint), "the checkpoint")
     q0, v0 = (
         scene.project(q, v, options.t0) if (q is not None or v is not None or t0) else scene.initial_state()
     )
@@ -128,14 +135,12 @@ def simulate(
     for given, told in ((q, moved), (v, followed)):
         if told and given is not None and not isinstance(given, Mapping):
             warnings.warn(f"simulate: {told[0]}", RuntimeWarning, stacklevel=2)
-    choice("simulate: progress", progress, (True, False, None))
-    between = asked_callback(callback, scene.model.nv)
-    _check_together(method, asked, callback, checkpoint)
+    program, delayed = compiled_scene(scene).program_of_runs(options.t0)
     saver = None
     if checkpoint is not None:
         from .checkpoint import Saver
 
-        saver = Saver(checkpoint, scene, options, checkpoint_interval, notes=notes)
+        saver = Saver(checkpoint, scene, options, checkpoint_interval, notes=notes, delayed=delayed)
     hints: list[str] = []
     explicit_only = compiled_scene(scene).explicit_only
 
@@ -158,6 +163,7 @@ def simulate(
                 q0,
                 v0,
                 options,
+                program,
                 tick=tick,
                 save=saver,
                 save_interval=saver.interval if saver else 0.0,

@@ -90,3 +90,76 @@ def frame_motion(model: Model, name: str, q: Array, v: Array) -> tuple[Array, Ar
         places[k], axes[k] = placement.translation, placement.rotation
         rates[k] = np.concatenate([axes[k] @ velocity.linear, axes[k] @ velocity.angular])
     return places, axes, rates
+
+
+class BodyMotions:
+    """Placements, velocities and accelerations of bodies at one state, each computed when it is needed.
+
+    The recursion is a_i = X_i^-1 a_parent + S_i dv_i + c_i + v_i x (S_i v_i), in body axes.
+
+    Args:
+        model: pinocchio.Model.
+        q: configuration, (nq,).
+        v: velocity, (nv,).
+        a: acceleration, (nv,).
+    """
+
+    def __init__(self, model: Model, q: Array, v: Array, a: Array) -> None:
+        self._model, self._q, self._v, self._a = model, q, v, a
+        world = (pin.SE3.Identity(), pin.Motion.Zero(), pin.Motion(-model.gravity.vector))
+        self._known: dict[int, tuple[Placement, pin.Motion, pin.Motion]] = {0: world}
+
+    def placement(self, joint: int) -> Placement:
+        """Return the placement of a body in the world, pinocchio.SE3.
+
+        Args:
+            joint: index of the joint that moves it.
+        """
+        return self._motion(joint)[0]
+
+    def velocity(self, joint: int) -> pin.Motion:
+        """Return the twist of a body in its own axes.
+
+        Args:
+            joint: index of the joint that moves it.
+        """
+        return self._motion(joint)[1]
+
+    def acceleration(self, joint: int) -> pin.Motion:
+        """Return the spatial acceleration of a body relative to free fall, in its own axes.
+
+        Args:
+            joint: index of the joint that moves it.
+        """
+        return self._motion(joint)[2]
+
+    def point(self, frame: tuple[int, list[float], list[float]]) -> Array:
+        """Return the origin of a frame in the world [m], (3,).
+
+        Args:
+            frame: joint index, rotation by rows and translation.
+        """
+        return np.asarray(self.placement(frame[0]).act(np.array(frame[2])))
+
+    def point_velocity(self, frame: tuple[int, list[float], list[float]]) -> Array:
+        """Return the velocity of the origin of a frame in world axes [m/s], (3,).
+
+        Args:
+            frame: joint index, rotation by rows and translation.
+        """
+        twist, lever = self.velocity(frame[0]), np.array(frame[2])
+        return np.asarray(self.placement(frame[0]).rotation @ (twist.linear + np.cross(twist.angular, lever)))
+
+    def _motion(self, joint: int) -> tuple[Placement, pin.Motion, pin.Motion]:
+        if joint not in self._known:
+            model = self._model
+            item, parent = model.joints[joint], self._motion(int(model.parents[joint]))
+            data = item.createData()
+            item.calc(data, self._q, self._v)
+            step, own = model.jointPlacements[joint] * pin.SE3(data.M), pin.Motion(data.v)
+            rates = self._a[item.idx_v : item.idx_v + item.nv]
+            velocity = step.actInv(parent[1]) + own
+            gained = pin.Motion(np.asarray(data.S).reshape(6, -1) @ rates) + pin.Motion(data.c)
+            acceleration = step.actInv(parent[2]) + gained + velocity.cross(own)
+            self._known[joint] = (parent[0] * step, velocity, acceleration)
+        return self._known[joint]

@@ -183,6 +183,38 @@ def named_joint_samples(model: Model, given: Any, count: int, what: str) -> Arra
     return values
 
 
+def named_configuration_samples(model: Model, given: Any, base: Array, count: int, what: str) -> Array:
+    """Samples of a configuration from an array or by joint name, (nt, nq).
+
+    Args:
+        model: pinocchio.Model.
+        given: array (nt, nq), or by joint name samples (nt,) or (nt, n) of the n values of a joint, of which
+            an angle [rad] replaces (cos, sin).
+        base: configuration of the joints that a table leaves out, (nq,).
+        count: nt.
+        what: words for messages.
+
+    Raises:
+        InputError: wrong shape, not finite, or a part far from unit length.
+        UnknownNameError: there is no such joint.
+    """
+    table = by_name(given)
+    if table is None:
+        samples = np.array(array(what, given, (count, model.nq)))
+    else:
+        samples = np.tile(base, (count, 1))
+        for name, values in table.items():
+            j = joint_named(model, name, what)
+            first, size, words = model.idx_qs[j], model.nqs[j], f'{what} of "{name}"'
+            part = array(words, values, (count,) if np.ndim(values) == 1 else (count, None))
+            for k in range(count):
+                now = samples[k, first : first + size]
+                samples[k, first : first + size] = _values(model, j, 0, part[k], now, words)
+    for k in range(count):
+        with_unit_lengths(model, samples[k], f"{what}[{k}]")
+    return samples
+
+
 def named_entries(model: Model, given: State | None) -> NDArray[np.bool_] | None:
     """Return the mask of entries that a table of a velocity names, (nv,), or None without a table.
 

@@ -62,23 +62,23 @@ class Equilibrium:
 
 def equilibrium(
     scene: Scene,
-    q0: State | None = None,
+    q: State | None = None,
     tau: State | None = None,
     *,
     t: float = 0.0,
     stable: bool = True,
     starts: int = 8,
 ) -> Equilibrium:
-    """Find an equilibrium on the constraints near q0, without dry friction.
+    """Find an equilibrium on the constraints near q, without dry friction.
 
     The equations are free^T F(q) = 0 and phi(q, t) = 0: forces vanish along the motions that the constraints
-    admit. Contacts that touch at q0, or close during the search, are held. Open contacts exert no force.
+    admit. Contacts that touch at q, or close during the search, are held. Open contacts exert no force.
     Newton steps with the stiffness made positive in the metric of M descend to a stable state. The first
-    start is q0; further starts lie around it. `rest` checks if dry friction holds other configurations.
+    start is q; further starts lie around it. `rest` checks if dry friction holds other configurations.
 
     Args:
         scene: the scene.
-        q0: start configuration, (nq,) or by joint name; the scene's initial configuration when None.
+        q: start configuration, (nq,) or by joint name; the scene's initial configuration when None.
         tau: torques that replace the scene's actuation, (nv,) or by joint name.
         t: time at which actuation and constraints are evaluated [s].
         stable: whether to search for a stable equilibrium. False accepts any equilibrium of Newton's method.
@@ -98,7 +98,7 @@ def equilibrium(
     still = np.zeros(scene.model.nv)
     torque = None if tau is None else named_velocity(scene.model, tau, still, "equilibrium: tau")
     time, attempts = number("equilibrium: t", t), count("equilibrium: starts", starts, least=1)
-    start = scene.project(q0, still, time)[0]
+    start = scene.project(q, still, time)[0]
     search = _Search(AtRest(scene, torque, time, start), downhill)
     best: Equilibrium | None = None
     for k in range(attempts):

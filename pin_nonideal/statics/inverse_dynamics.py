@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from pin_nonideal.core_loader import core
-from pin_nonideal.errors import FrictionConvergenceError, InputError
+from pin_nonideal.errors import FrictionConvergenceError, InputError, short_repr
 from pin_nonideal.scene.scene import Scene
 from pin_nonideal.states.parsing import (
     joint_named,
@@ -20,9 +21,10 @@ from pin_nonideal.states.parsing import (
     named_velocity,
 )
 from pin_nonideal.states.rows import DEPENDENT, rows_at, shortest
-from pin_nonideal.types import Array, State
+from pin_nonideal.types import Array, State, Table
 from pin_nonideal.validation import array, by_name, number, sequence
 
+from .holding import HoldingTorque, holding_torques
 from .residual import AtRest, weight
 
 # Tolerance of A a = b, relative to its terms.
@@ -49,6 +51,19 @@ class InverseDynamics:
     tau: Array
     lam: Array
     left: float
+    _holding: Callable[[], dict[str, HoldingTorque]] = field(default=dict, repr=False)
+
+    @cached_property
+    def holding(self) -> dict[str, HoldingTorque]:
+        """Torques that friction holds and torques of slow motion, by joint name, computed on first access.
+
+        The joints are the actuated ones of one degree of freedom that a law of dry friction acts on. The
+        other joints keep the torques `tau`. Empty unless v = 0 and a = 0.
+        """
+        return self._holding()
+
+    def __getstate__(self) -> Table:
+        return {**vars(self), "holding": self.holding, "_holding": dict}
 
 
 def inverse_dynamics(
@@ -68,8 +83,9 @@ def inverse_dynamics(
 
     The torques satisfy free^T (M a - F - C - tau) = 0 along the motions `free` that the constraints admit.
     They act on the actuated joints only. Friction C follows from the reactions under these torques. The
-    scene's actuation is ignored. A sticking element that stays at rest exerts no friction. Contacts that are
-    open, or that the motion opens, exert no force.
+    scene's actuation is ignored. A sticking element that stays at rest exerts no friction; at rest, `holding`
+    has the torques that friction holds around tau. Contacts that are open, or that the motion opens, exert no
+    force.
 
     Args:
         scene: the scene.
@@ -104,7 +120,10 @@ def inverse_dynamics(
         allowed = _allowed(rest, at, A, b, wanted)
         _open_contacts(rest, A, b, rate, wanted, allowed)
         _check_follows(scene, A, b, wanted, rest.open, allowed)
-    return _Torques(rest, at, speed, wanted, dofs).solve(limits)
+    found = _Torques(rest, at, speed, wanted, dofs).solve(limits)
+    if speed.any() or wanted.any():
+        return found
+    return replace(found, _holding=partial(holding_torques, scene, at, found.tau, time, rest.open, dofs))
 
 
 def _driven(scene: Scene, actuated: Sequence[str] | None) -> list[int]:
@@ -112,7 +131,7 @@ def _driven(scene: Scene, actuated: Sequence[str] | None) -> list[int]:
     if actuated is None:
         return list(range(scene.model.nv))
     if isinstance(actuated, str):
-        raise InputError(f"inverse_dynamics: actuated must be a list of joints; got {actuated!r}")
+        raise InputError(f"inverse_dynamics: actuated must be a list of joints; got {short_repr(actuated)}")
     joints = [
         joint_named(scene.model, name, "inverse_dynamics: actuated")
         for name in sequence("actuated", actuated)
@@ -123,7 +142,9 @@ def _driven(scene: Scene, actuated: Sequence[str] | None) -> list[int]:
 def _bounds(scene: Scene, bounds: Any, dofs: list[int]) -> tuple[Array, Array]:
     """Least and largest torque of each actuated degree of freedom."""
     if not isinstance(bounds, (tuple, list)) or len(bounds) != 2:
-        raise InputError(f"inverse_dynamics: bounds must be a pair (least, largest); got {bounds!r}")
+        raise InputError(
+            f"inverse_dynamics: bounds must be a pair (least, largest); got {short_repr(bounds)}"
+        )
 
     def bound(k: int, others: float) -> Array:
         given, what = bounds[k], f"bounds[{k}]"

@@ -2,32 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-from itertools import pairwise
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property, partial
 
 import numpy as np
 
-from pin_nonideal.core_loader import core
-from pin_nonideal.description.constraints import Rolling
 from pin_nonideal.errors import InputError
 from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.states.parsing import named_velocity
-from pin_nonideal.states.rows import DEPENDENT
-from pin_nonideal.types import Array, State
+from pin_nonideal.types import Array, Model, State, Table
 from pin_nonideal.validation import number
 
-from .residual import AtRest, weight
+from .holding import HoldingTorque, holding_torques
+from .limit_cones import FOUND, MOST_FACTOR, LimitCones
+from .residual import AtRest
 
-# Tolerance of cone violations relative to the largest force, and maximum number of rounds of cuts.
-CUT, MOST_CUTS = 1e-9, 60
-# Number of initial cut directions of a disk.
-FIRST = 8
-# Tolerance of the margin, and friction factor above which no friction suffices.
-FOUND, MOST_FACTOR = 1e-9, 1e6
-# Smallest force scale, relative to the weight; forces balance to CUT times the force scale.
-LIGHT = 1e-3
-PARTS = ("", "torsional", "rolling")  # suffixes of the names of a contact's friction elements
+MOST_NAMED = 4  # names in a reason
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,12 +33,29 @@ class Rest:
         friction: force of each friction element by name, along its slip directions, for the smallest factor
             [N or N m]; empty if no friction suffices.
         lam: multipliers of all rows with this friction; contacts press, (m,).
+        reason: reason why the scene does not rest, with the names of joints, friction elements or contacts
+            that cannot hold; empty if it rests.
     """
 
     rests: bool
     margin: float
     friction: dict[str, Array]
     lam: Array
+    reason: str = ""
+    _holding: Callable[[], dict[str, HoldingTorque]] = field(default=dict, repr=False)
+
+    @cached_property
+    def holding(self) -> dict[str, HoldingTorque]:
+        """Torques that friction holds and torques of slow motion, by joint name, computed on first access.
+
+        The joints are those of one degree of freedom that a law of dry friction acts on. The other joints
+        keep their torques. The torque of a joint is the whole torque of its drive, with that of the scene's
+        actuation.
+        """
+        return self._holding()
+
+    def __getstate__(self) -> Table:
+        return {**vars(self), "holding": self.holding, "_holding": dict}
 
 
 def rest(scene: Scene, q: State | None = None, tau: State | None = None, *, t: float = 0.0) -> Rest:
@@ -77,175 +85,61 @@ def rest(scene: Scene, q: State | None = None, tau: State | None = None, *, t: f
     torque = None if tau is None else named_velocity(scene.model, tau, still, "rest: tau")
     time = number("rest: t", t)
     at = scene.project(q, still, time)[0]
-    cones = _Cones(scene, AtRest(scene, torque, time, at), at)
+    at_rest = AtRest(scene, torque, time, at)
+    drives = at_rest.forces(at) - at_rest.undriven(at)
+    cones = LimitCones(scene, at_rest, at)
     factor = cones.least_factor()
+    holding = partial(holding_torques, scene, at, drives, time, at_rest.open)
     if factor > MOST_FACTOR:
-        return Rest(False, -np.inf, {}, np.zeros(len(cones.A)))
+        reason = _unheld(scene, at_rest, at, cones)
+        return Rest(False, -np.inf, {}, np.zeros(len(cones.A)), reason, holding)
     forces = cones.solve(factor)[1]
     friction = {name: forces[s] for name, s in zip(scene.element_names, cones.parts, strict=True)}
     margin = 1.0 - factor
-    return Rest(margin >= -10.0 * FOUND, margin, friction, forces[: len(cones.A)])
+    rests = margin >= -10.0 * FOUND
+    reason = "" if rests else _overloaded(scene, cones, factor)
+    return Rest(rests, margin, friction, forces[: len(cones.A)], reason, holding)
 
 
-class _Cones:
-    """Linear programs for the cones of one configuration.
+def _overloaded(scene: Scene, cones: LimitCones, factor: float) -> str:
+    """Return the elements at their limits where friction needs larger limits."""
+    names = [scene.element_names[e] for e in cones.at_limits(factor)]
+    where = f"; at their limits: {_quoted(names)}" if names else ""
+    return f"dry friction needs {factor:.4g} times its limits{where}"
 
-    The unknowns are lam (m), the friction forces (d) and an excess s over all limits. They are measured in
-    the metric of M^-1, over the greatest length of their row or element, and over the largest force.
-    Tolerances are therefore independent of units and of the mount.
 
-    Attributes:
-        A: rows of constraints and contacts, (m, nv).
-        parts: slice of each element's forces in the unknowns.
-        balance: forces of the unknowns along an orthonormal basis of their span, (r, m + d).
-        load: forces that the unknowns must balance along that basis, (r,).
-        holds: whether the load lies in the span of that basis.
-    """
-
-    def __init__(self, scene: Scene, at_rest: AtRest, q: Array) -> None:
-        self.sizes = list(compiled_scene(scene).program.element_sizes)
-        root = at_rest.root(q)
-        self.A, reach, rows = at_rest.scaled_rows(q, root)
-        _, lengths, D = at_rest.directions(q)
-        m, ends = len(self.A), np.cumsum([0, *self.sizes])
-        known, self.following = self._limits(scene, at_rest, q)
-        self.open = np.flatnonzero(at_rest.open)
-        for (first, end), follows in zip(pairwise(ends.tolist()), self.following, strict=True):
-            lengths[first:end] = lengths[first:end].max(initial=0.0)
-            if follows is not None and at_rest.open[follows[0]]:
-                D[first:end] = 0.0
-        self.parts = [slice(m + a, m + b) for a, b in pairwise(ends.tolist())]
-        self.count = m + int(ends[-1])
-        self.lengths = np.concatenate([reach, lengths])
-        self.lengths[self.lengths == 0.0] = 1.0
-        self.contacts = [first for first, _, contact in compiled_scene(scene).rows.values() if contact]
-        limits = known * np.array([self.lengths[part.start] for part in self.parts])
-        scaled, acting = (
-            np.vstack([rows, D / self.lengths[m:, None]]),
-            np.linalg.solve(root, -at_rest.forces(q)),
+def _unheld(scene: Scene, at_rest: AtRest, q: Array, cones: LimitCones) -> str:
+    """Return the joint, the contacts or the elements that cannot hold, whatever the friction limits are."""
+    if not cones.holds:
+        force, way = at_rest.forces(q), cones.unheld
+        shares = force * way
+        dof = int(np.abs(shares).argmax())
+        at_joint = float(force @ way) / float(way[dof])
+        return (
+            f'nothing holds the motion of joint "{_joint_of(scene.model, dof)}": {at_joint:.4g} (N or N m) '
+            "is left on it, and no constraint, contact or friction acts along this motion"
         )
-        largest = float(np.linalg.norm(acting))
-        self.unit = max(largest, CUT * float(limits.max(initial=0.0)), LIGHT * weight(scene)) or 1.0
-        self.constant = limits / self.unit
-        reached, values, _ = np.linalg.svd(scaled.T)
-        reached = reached[:, : int((values > DEPENDENT).sum())].T
-        self.balance, self.load = reached @ scaled.T, reached @ acting / self.unit
-        self.holds = bool(np.linalg.norm(acting - reached.T @ (reached @ acting)) <= CUT * self.unit)
-        self.cuts: list[tuple[int, Array]] = [
-            (e, n) for e, size in enumerate(self.sizes) for n in _directions(size)
-        ]
-
-    def _limits(
-        self, scene: Scene, at_rest: AtRest, q: Array
-    ) -> tuple[Array, list[tuple[int, float] | None]]:
-        """Return known limits [N or N m], and (row, coefficient) of limits that depend on a contact force."""
-        elements = len(self.sizes)
-        following: list[tuple[int, float] | None] = [None] * elements
-        rows = scene.constraint_slices
-        said = dict(zip(rows, (*scene.constraints, *scene.contacts), strict=True))
-        for e, name in enumerate(scene.element_names):
-            for part in PARTS:
-                about = said.get(name.removesuffix(f" {part}") if part else name)
-                if not hasattr(about, "torsional") or (part and not name.endswith(f" {part}")):
-                    continue
-                row = rows[name.removesuffix(f" {part}") if part else name].start
-                coefficient = getattr(about, part or "mu", 0.0) * getattr(about, "static_ratio", 1.0)
-                following[e] = (row + (2 if isinstance(about, Rolling) else 0), coefficient)
-        known = np.zeros(elements)
-        modes, lasts = [core.Mode.sticking] * elements, any(each is None for each in following)
-        while lasts:
-            stuck = at_rest.runner.solve(q, at_rest.still, at_rest.t, at_rest.tau, modes, frozen=True)
-            known = np.array([0.0 if f else x for f, x in zip(following, stuck.limits, strict=True)])
-            before = modes
-            modes = [
-                core.Mode.unloaded if mode == core.Mode.sticking and x == 0.0 else mode
-                for mode, x in zip(modes, stuck.limits, strict=True)
-            ]  # an element with a zero limit cannot stick
-            lasts = modes != before
-        return known, following
-
-    def solve(self, factor: float) -> tuple[float, Array]:
-        """Return the least scaled excess with all limits multiplied by a factor, and the forces of it."""
-        for _ in range(MOST_CUTS):
-            excess, x = self._program(factor)
-            outside = [
-                (e, self._beyond(e, x, factor) - excess) for e, size in enumerate(self.sizes) if size > 1
-            ]
-            worst = [(e, beyond) for e, beyond in outside if beyond > CUT]
-            if not worst or not np.isfinite(excess):
-                break
-            self.cuts += [(e, x[self.parts[e]] / np.linalg.norm(x[self.parts[e]])) for e, _ in worst]
-        return excess, x * self.unit / self.lengths
-
-    def _limit(self, e: int, factor: float) -> tuple[Array, float]:
-        """Return a limit as coefficients of the unknowns and a constant."""
-        row = np.zeros(self.count)
-        follows = self.following[e]
-        if follows is not None:
-            row[follows[0]] = (
-                factor * follows[1] * self.lengths[self.parts[e].start] / self.lengths[follows[0]]
-            )
-        return row, factor * self.constant[e]
-
-    def _beyond(self, e: int, x: Array, factor: float) -> float:
-        row, constant = self._limit(e, factor)
-        return float(np.linalg.norm(x[self.parts[e]]) - row @ x - constant)
-
-    def _program(self, factor: float) -> tuple[float, Array]:
-        """Solve the linear program of the current cuts: least s with n f - limit <= s for each cut."""
-        from scipy.optimize import linprog
-
-        rows, bounds = [], []
-        for e, n in self.cuts:
-            row, constant = self._limit(e, factor)
-            row = -row
-            row[self.parts[e]] += n
-            rows.append(np.append(row, -1.0))
-            bounds.append(constant)
-        limits: list[tuple[float | None, float | None]] = [(None, None)] * self.count + [(0.0, None)]
-        for first in self.contacts:
-            limits[first] = (0.0, None)
-        for idle in self.open:
-            limits[idle] = (0.0, 0.0)
-        if not self.holds:
-            return np.inf, np.zeros(self.count)
-        equal = np.hstack([self.balance, np.zeros((len(self.load), 1))])
-        found = linprog(
-            np.append(np.zeros(self.count), 1.0),
-            A_ub=np.array(rows) if rows else None,
-            b_ub=bounds or None,
-            A_eq=equal if len(equal) else None,
-            b_eq=self.load if len(equal) else None,
-            bounds=limits,
-            method="highs",
-            options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
+    pulls, rubs = cones.missing()
+    rows = {first: name for name, (first, _, contact) in compiled_scene(scene).rows.items() if contact}
+    parts = []
+    if pulls:
+        most = max(pulls.values())
+        parts.append(
+            f"contacts would have to pull, with up to {most:.4g} N: {_quoted([rows[k] for k in pulls])}"
         )
-        if found.x is None:
-            return np.inf, np.zeros(self.count)
-        return float(found.x[-1]), np.asarray(found.x[:-1])
-
-    def least_factor(self) -> float:
-        """Return the least factor of all limits for which forces balance, by bisection, or infinity."""
-        low, high = 0.0, MOST_FACTOR / (1.0 + MOST_FACTOR)
-        if self.solve(0.0)[0] <= CUT:
-            return 0.0
-        if not self.solve(MOST_FACTOR)[0] <= CUT:
-            return np.inf
-        while high - low > FOUND * (1.0 - high):
-            middle = 0.5 * (low + high)
-            if self.solve(middle / (1.0 - middle))[0] <= CUT:
-                high = middle
-            else:
-                low = middle
-        return high / (1.0 - high)
+    if rubs:
+        names = _quoted([scene.element_names[e] for e in rubs])
+        most = max(rubs.values())
+        parts.append(f"friction without a load would have to hold up to {most:.4g} (N or N m): {names}")
+    return "; ".join(parts) or "no forces balance the scene"
 
 
-def _directions(size: int) -> Iterator[Array]:
-    """Yield unit vectors of the initial cuts around an interval, a disk or a ball."""
-    if size == 1:
-        yield from (np.array([1.0]), np.array([-1.0]))
-    elif size == 2:
-        for k in range(FIRST):
-            yield np.array([np.cos(2.0 * np.pi * k / FIRST), np.sin(2.0 * np.pi * k / FIRST)])
-    else:
-        yield from np.vstack([np.eye(size), -np.eye(size)])
+def _joint_of(model: Model, dof: int) -> str:
+    """Return the name of the joint with a degree of freedom."""
+    joints = range(1, model.njoints)
+    return next(str(model.names[j]) for j in joints if 0 <= dof - int(model.idx_vs[j]) < int(model.nvs[j]))
+
+
+def _quoted(names: list[str]) -> str:
+    shown = ", ".join(f'"{name}"' for name in names[:MOST_NAMED])
+    return shown + (", ..." if len(names) > MOST_NAMED else "")

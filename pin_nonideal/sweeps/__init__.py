@@ -1,1 +1,1 @@
-"""Runs over a grid of parameters, stored as they end."""
+"""Parameter sweeps: many runs over a set of parameters, stored as the runs end."""

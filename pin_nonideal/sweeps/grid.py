@@ -1,4 +1,4 @@
-"""Parameters of sweeps: grids, and samples that fill a box evenly."""
+"""Parameters of sweeps: grids and space-filling samples of a box."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ from typing import Any
 
 import numpy as np
 
-from pin_nonideal.errors import InputError
+from pin_nonideal.errors import InputError, short_repr
 from pin_nonideal.types import Table
 from pin_nonideal.validation import array, choice, count
 
 
 def sweep_grid(**axes: Iterable[Any]) -> list[Table]:
-    """Every combination of the values of each parameter, the last one changing fastest.
+    """Return all combinations of the values of each parameter; the last parameter changes fastest.
 
     Args:
-        axes: values of each parameter, by its name.
+        axes: values of each parameter, by name.
 
     Returns:
-        One mapping a run, for `sweep`.
+        One mapping for each run, for `sweep`.
 
     Raises:
-        InputError: the values of one are no list.
+        InputError: the values of a parameter are not a list.
     """
     for name, values in axes.items():
         if (
@@ -32,7 +32,7 @@ def sweep_grid(**axes: Iterable[Any]) -> list[Table]:
             or not isinstance(values, Iterable)
             or getattr(values, "ndim", 1) == 0
         ):
-            raise InputError(f"sweep_grid: {name} must be a list of values; got {values!r}")
+            raise InputError(f"sweep_grid: {name} must be a list of values; got {short_repr(values)}")
     listed = [[_plain(value) for value in values] for values in axes.values()]
     return [dict(zip(axes, point, strict=True)) for point in itertools.product(*listed)]
 
@@ -40,19 +40,19 @@ def sweep_grid(**axes: Iterable[Any]) -> list[Table]:
 def sweep_samples(
     n: int, *, kind: str = "sobol", seed: int = 0, **ranges: tuple[float, float]
 ) -> list[Table]:
-    """Points that fill a box evenly, by scipy.stats.qmc.
+    """Return samples of a box of parameters, drawn by scipy.stats.qmc.
 
     Args:
-        n: how many; a power of two for "sobol" to be balanced.
+        n: number of samples; a power of two keeps "sobol" balanced.
         kind: "sobol" (scrambled), "latin" (hypercube), "halton", or "random".
-        seed: of the scrambling: the same points again.
-        ranges: (least, largest) of each parameter, by its name.
+        seed: seed of the scrambling; equal seeds give equal samples.
+        ranges: (minimum, maximum) of each parameter, by name.
 
     Returns:
-        One mapping a run, for `sweep`.
+        One mapping for each run, for `sweep`.
 
     Raises:
-        InputError: an argument does not fit.
+        InputError: an argument is invalid.
     """
     number = count("sweep_samples: n", n, least=1)
     choice("sweep_samples: kind", kind, ("sobol", "latin", "halton", "random"))
@@ -67,7 +67,7 @@ def sweep_samples(
         unit = np.random.default_rng(seed).random((number, d))
     else:
         engines = {"sobol": qmc.Sobol, "latin": qmc.LatinHypercube, "halton": qmc.Halton}
-        with warnings.catch_warnings():  # that a number which is no power of two is not balanced
+        with warnings.catch_warnings():  # the warning that a number is not a power of two
             warnings.simplefilter("ignore", UserWarning)
             unit = engines[kind](d=d, seed=int(seed)).random(number)
     points = bounds[:, 0] + unit * (bounds[:, 1] - bounds[:, 0])

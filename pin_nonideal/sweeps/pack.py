@@ -1,7 +1,7 @@
-"""Files that hold runs of a sweep, several in one: a line of JSON and an .npz archive a run, as they come.
+"""Files that hold several runs of a sweep: a line of JSON and an .npz archive for each run.
 
-A file for each run would cost more than a short run does, and a hundred thousand of them are a burden to any
-disk.  A run that is written whole is there, whatever becomes of the process that goes on with the next.
+A separate file for each run would cost more than a short run, and many file systems are slow with a hundred
+thousand files. A completely written run stays readable if the process dies during a later run.
 """
 
 from __future__ import annotations
@@ -20,11 +20,12 @@ SUFFIX = ".runs"
 
 
 class Pack:
-    """A file that grows by a run at a time; made when the first one comes.
+    """File to which runs are appended; it is created with the first run.
 
     Args:
-        folder: of the sweep.
-        first: number of the first run that it may hold; it bears a name that no other one bears.
+        folder: folder of the sweep.
+        first: number of the first run of the file; the file name also has a random part, so that it is
+            unique.
     """
 
     def __init__(self, folder: Path, first: int) -> None:
@@ -40,17 +41,17 @@ class Pack:
             self._stream.close()
 
     def add(self, record: Table, content: bytes) -> Table:
-        """Writes a run, handed to the operating system before it returns.
+        """Append a run, and return after the data is passed to the operating system.
 
         Args:
-            record: what the index tells of it.
-            content: its archive, or nothing.
+            record: entry of the index for the run.
+            content: archive of the run, or empty.
 
         Returns:
-            The record with the place of the archive.
+            The record with the position of the archive.
 
         Raises:
-            OutputError: it cannot be written.
+            OutputError: the file cannot be written.
         """
         head = json.dumps(record | {"size": len(content)}).encode() + b"\n"
         try:
@@ -66,12 +67,12 @@ class Pack:
         return record | {"at": [self.path.name, at, len(content)]}
 
 
-def runs_in(path: Path, start: int) -> Iterator[Table]:
-    """Records of the runs that stand whole in a file, with their places.
+def read_records(path: Path, start: int) -> Iterator[Table]:
+    """Yield the records of the completely written runs of a file, with their positions.
 
     Args:
-        path: the file.
-        start: where to begin, behind a run.
+        path: path of the file.
+        start: byte offset at which to begin, at the end of a run.
     """
     with path.open("rb") as stream:
         end = os.fstat(stream.fileno()).st_size
@@ -82,18 +83,18 @@ def runs_in(path: Path, start: int) -> Iterator[Table]:
                 at, size = stream.tell(), int(record.pop("size"))
             except (ValueError, LookupError, TypeError, AttributeError):
                 return
-            if at + size > end:  # a kill cut it off
+            if at + size > end:  # truncated when the process was killed
                 return
             yield record | {"at": [path.name, at, size]}
             stream.seek(at + size)
 
 
-def archive_of(folder: Path, place: tuple[str, int, int]) -> bytes:
-    """The archive of a run.
+def read_archive(folder: Path, place: tuple[str, int, int]) -> bytes:
+    """Return the archive of a run.
 
     Args:
-        folder: of the sweep.
-        place: file, beginning and size.
+        folder: folder of the sweep.
+        place: name of the file, offset and size of the archive [bytes].
     """
     name, at, size = place
     with (folder / name).open("rb") as stream:

@@ -1,4 +1,4 @@
-"""Runs of a sweep in a folder: files that hold them, and an index of what became of each."""
+"""Runs of a sweep in a folder: files of runs, and an index with the result of each run."""
 
 from __future__ import annotations
 
@@ -14,32 +14,34 @@ from typing import Any
 import numpy as np
 
 from pin_nonideal.atomic_files import file_path
-from pin_nonideal.errors import InputError, LoadingError, OutputError, RunError
+from pin_nonideal.errors import InputError, LoadingError, OutputError, RunError, short_repr
+from pin_nonideal.html_tables import table
 from pin_nonideal.scene.scene import Scene
-from pin_nonideal.trajectory.file import read_from
-from pin_nonideal.trajectory.trajectory import Trajectory, restored
+from pin_nonideal.trajectory.file import read_from, reason_of
+from pin_nonideal.trajectory.trajectory import Trajectory, restore_trajectory
 from pin_nonideal.types import Table
 
-from .pack import SUFFIX, archive_of, runs_in
+from .pack import SUFFIX, read_archive, read_records
 
 FORMAT = 2
+ROWS_SHOWN = 20  # runs in the table of a notebook
 QUANTILES = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)
 
 
 class Sweep(Sequence[Trajectory]):
-    """Runs of a sweep that are kept in a folder, read one at a time when asked for.
+    """Runs of a sweep in a folder; each run is read from its file on access.
 
     Args:
-        folder: that `sweep(..., store=folder)` filled.
+        folder: folder that `sweep(..., store=folder)` filled.
 
     Attributes:
-        folder: see above.
-        records: of each run, in order: its `parameters`, `error` (what stopped it, or None), `t_end`,
-            `steps`, `evaluations`, `violation` (largest), `wall_s`, and what `measure` gave; None of a run
-            that is missing.
+        folder: path of the folder.
+        records: entry of each run, in order, or None for a missing run. The keys are `parameters`, `error`
+            (the message of the error that stopped the run, or None), `t_end`, `steps`, `evaluations`,
+            `violation` (maximum over the run), `wall_s`, and the results of `measure`.
 
     Raises:
-        LoadingError: there is no sweep in it.
+        LoadingError: the folder holds no sweep.
     """
 
     def __init__(self, folder: str | os.PathLike[str]) -> None:
@@ -48,34 +50,42 @@ class Sweep(Sequence[Trajectory]):
             with (self.folder / "index.jsonl").open(encoding="utf-8") as lines:
                 self._header = json.loads(next(lines))
                 if self._header["format"] != FORMAT:
-                    raise ValueError(f"format {self._header['format']} instead of {FORMAT}")
+                    raise LoadingError(
+                        f'"{self.folder}" holds no sweep of this version: its format is '
+                        f"{short_repr(self._header['format'])} instead of {FORMAT}; finish it with the "
+                        "version that began it"
+                    )
                 self.records: list[Table | None] = [None] * int(self._header["runs"])
                 self._places: list[tuple[str, int, int] | None] = [None] * len(self.records)
                 for line in lines:
-                    if line.endswith("\n"):  # not cut off by a kill
-                        self._take(json.loads(line))
-            self._unlisted = list(self._found())
+                    if line.endswith("\n"):  # complete: no kill truncated the line
+                        self._add_record(json.loads(line))
+            self._unindexed = list(self._unindexed_runs())
+        except LoadingError:
+            raise
         except (OSError, ValueError, LookupError, TypeError, StopIteration) as error:
+            absent = isinstance(error, FileNotFoundError)
+            reason = "there is no index.jsonl in it" if absent else reason_of(error)
             raise LoadingError(
-                f'"{self.folder}" holds no sweep: {type(error).__name__}: {error}; it must be a folder that '
+                f'"{self.folder}" holds no sweep: {reason}; it must be a folder that '
                 "sweep(..., store=folder) made"
             ) from error
 
-    def _take(self, record: Table) -> None:
+    def _add_record(self, record: Table) -> None:
         name, at, size = record.pop("at")
         k = record.pop("run")
         self.records[k], self._places[k] = record, (str(name), int(at), int(size))
 
-    def _found(self) -> Iterator[Table]:
-        """Runs that were done before a kill and did not come into the index."""
+    def _unindexed_runs(self) -> Iterator[Table]:
+        """Yield runs that were written before a kill but are missing in the index."""
         ends: dict[str, int] = {}
         for place in self._places:
             if place is not None:
                 ends[place[0]] = max(ends.get(place[0], 0), place[1] + place[2])
         for entry in sorted(os.scandir(self.folder), key=lambda each: each.name):
             if entry.name.endswith(SUFFIX) and entry.stat().st_size > ends.get(entry.name, 0):
-                for record in runs_in(Path(entry.path), ends.get(entry.name, 0)):
-                    self._take(dict(record))
+                for record in read_records(Path(entry.path), ends.get(entry.name, 0)):
+                    self._add_record(dict(record))
                     yield record
 
     def __len__(self) -> int:
@@ -87,14 +97,14 @@ class Sweep(Sequence[Trajectory]):
         return self.load(k, scene=None)
 
     def load(self, k: int, scene: Scene | str | None = "source") -> Trajectory:
-        """One run, with its scene where that can be had.
+        """Return one run, with its scene if the scene is available.
 
         Args:
             k: number of the run.
-            scene: as in `Trajectory.load`.
+            scene: scene of the run, as in `Trajectory.load`.
 
         Raises:
-            InputError: the scene is not the one of the run.
+            InputError: the scene is not the scene of the run.
             LoadingError: the run is missing, failed before its first sample, or its file is damaged.
         """
         k = range(len(self))[k]
@@ -105,10 +115,10 @@ class Sweep(Sequence[Trajectory]):
             raise LoadingError(f"run {k} of the {self} has no samples; it failed: {record['error']}")
         path = self.folder / place[0]
         try:
-            content = archive_of(self.folder, place)
+            content = read_archive(self.folder, place)
         except OSError as error:
             raise LoadingError(f'cannot read run {k} from "{path}": {error.strerror or error}') from error
-        return restored(*read_from(io.BytesIO(content), path), path, scene)
+        return restore_trajectory(*read_from(io.BytesIO(content), path), path, scene)
 
     def __iter__(self) -> Iterator[Trajectory]:
         return (self[k] for k in range(len(self)))
@@ -117,26 +127,41 @@ class Sweep(Sequence[Trajectory]):
         done = len(self) - len(self.missing)
         return f"sweep in {self.folder}: {done} of {len(self)} runs, {len(self.failures)} of them failed"
 
+    def _repr_html_(self) -> str:
+        numbers = ("t_end", "steps", "violation", "wall_s")
+        rows: list[list[object]] = []
+        for k, record in enumerate(self.records[:ROWS_SHOWN]):
+            if record is None:
+                rows.append([k, "", "missing"])
+                continue
+            said = ", ".join(f"{name}={short_repr(x)}" for name, x in record["parameters"].items())
+            shown = [f"{record[key]:.6g}" if record.get(key) is not None else "" for key in numbers]
+            rows.append([k, said, record["error"] or "done", *shown])
+        if len(self) > ROWS_SHOWN:
+            rows.append(["...", f"{len(self) - ROWS_SHOWN} more", ""])
+        title = str(self)
+        return table(title[0].upper() + title[1:], rows, ("run", "parameters", "outcome", *numbers))
+
     @property
     def missing(self) -> list[int]:
-        """Runs that are not done."""
+        """Return the numbers of the runs that are not complete."""
         return [k for k, record in enumerate(self.records) if record is None]
 
     @property
     def failures(self) -> dict[int, str]:
-        """What stopped the runs that failed."""
+        """Return the error messages of the failed runs, by number of the run."""
         return {k: r["error"] for k, r in enumerate(self.records) if r is not None and r["error"] is not None}
 
     def summary(self) -> Table:
-        """Over all runs that are done, without reading them: mean, deviation and quantiles of each number.
+        """Return mean, deviation and quantiles of each number over all complete runs, from the index alone.
 
         Returns:
-            By name of the number ("violation", "steps", ..., and those of `measure`): "mean", "std", "count",
-            "quantiles" (by level) and "worst" (the run with the largest one).
+            By name of the number ("violation", "steps", ..., and the results of `measure`): "mean", "std",
+            "count", "quantiles" (by level) and "worst" (the run with the largest value).
         """
         done = [(k, r) for k, r in enumerate(self.records) if r is not None]
         names = sorted({key for _, r in done for key, x in r.items() if isinstance(x, (int, float))})
-        table: Table = {}
+        found: Table = {}
         for name in names:
             runs, values = zip(
                 *((k, r[name]) for k, r in done if isinstance(r.get(name), (int, float))), strict=True
@@ -144,24 +169,26 @@ class Sweep(Sequence[Trajectory]):
             x = np.array(values, dtype=float)
             levels = {level: float(np.quantile(x, level)) for level in QUANTILES}
             worst = int(runs[int(np.argmax(x))])
-            table[name] = {"mean": float(x.mean()), "std": float(x.std()), "count": len(x)}
-            table[name] |= {"quantiles": levels, "worst": worst}
-        return table
+            found[name] = {"mean": float(x.mean()), "std": float(x.std()), "count": len(x)}
+            found[name] |= {"quantiles": levels, "worst": worst}
+        return found
 
 
-def opened_store(folder: Path, digest: str, runs: int) -> list[int]:
-    """Begins a sweep in a folder, or goes on with it; the runs that are missing.
+def open_store(folder: Path, digest: str, runs: int) -> list[int]:
+    """Start or continue a sweep in a folder, and return the numbers of the missing runs.
 
     Args:
-        folder: of the sweep.
-        digest: of all that decides it.
-        runs: how many there are.
+        folder: folder of the sweep.
+        digest: digest of all inputs of the sweep.
+        runs: number of runs.
 
     Raises:
         InputError: the folder holds another sweep.
-        OutputError: it cannot be written.
+        OutputError: the folder cannot be written.
     """
     index = folder / "index.jsonl"
+    if folder.exists() and not folder.is_dir():
+        raise OutputError(f'cannot write the sweep to "{folder}": it is a file; name a folder')
     if index.exists():
         held = Sweep(folder)
         if held._header.get("digest") != digest or held._header.get("format") != FORMAT:
@@ -169,8 +196,8 @@ def opened_store(folder: Path, digest: str, runs: int) -> list[int]:
                 f'sweep: store "{folder}" holds another sweep: its parameters, duration or options differ; '
                 "name another folder"
             )
-        if held._unlisted:
-            note(folder, held._unlisted)
+        if held._unindexed:
+            append_records(folder, held._unindexed)
         return held.missing
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -185,15 +212,15 @@ def opened_store(folder: Path, digest: str, runs: int) -> list[int]:
     return list(range(runs))
 
 
-def note(folder: Path, records: Sequence[Table]) -> None:
-    """Adds what became of some runs to the index.
+def append_records(folder: Path, records: Sequence[Table]) -> None:
+    """Append the results of some runs to the index.
 
     Args:
-        folder: of the sweep.
-        records: of the runs, each with its number as "run".
+        folder: folder of the sweep.
+        records: entries of the runs, each with the number of the run as "run".
 
     Raises:
-        OutputError: it cannot be written.
+        OutputError: the index cannot be written.
     """
     index = folder / "index.jsonl"
     try:
@@ -205,7 +232,7 @@ def note(folder: Path, records: Sequence[Table]) -> None:
 
 
 def _end_after_whole_line(stream: Any) -> None:
-    """Goes to the end, without the part of a line that a kill left behind."""
+    """Move to the end of a stream, and remove an incomplete last line."""
     stream.seek(0, os.SEEK_END)
     size = stream.tell()
     stream.seek(max(0, size - 1))
@@ -220,14 +247,14 @@ def _end_after_whole_line(stream: Any) -> None:
 def record_of(
     k: int, parameters: Mapping[str, Any], run: Trajectory | None, error: str | None, more: Table
 ) -> Table:
-    """What the index tells of a run.
+    """Return the index entry of a run.
 
     Args:
-        k: its number.
-        parameters: its own.
-        run: its trajectory, or None where there is none.
-        error: what stopped it, or None.
-        more: what `measure` gave.
+        k: number of the run.
+        parameters: parameters of the run.
+        run: trajectory of the run, or None if it failed before the first sample.
+        error: message of the error that stopped the run, or None.
+        more: results of `measure`.
     """
     record: Table = {
         "run": k,
@@ -243,39 +270,39 @@ def record_of(
 
 
 def digest_of(make: Any, parameters: Sequence[Mapping[str, Any]], duration: float, options: Table) -> str:
-    """Of all that decides a sweep, as far as it has a name.
+    """Return the digest of the inputs of a sweep that have a reproducible representation.
 
     Args:
-        make: what builds its scenes.
-        parameters: of its runs.
-        duration: of each [s].
-        options: of `simulate`.
+        make: function that builds the scenes.
+        parameters: parameters of the runs.
+        duration: duration of each run [s].
+        options: options of `simulate`.
     """
-    said = [_said(make), [dict(p) for p in parameters], duration, sorted(options.items())]
-    return hashlib.sha256(json.dumps(said, default=_said).encode()).hexdigest()
+    content = [_canonical(make), [dict(p) for p in parameters], duration, sorted(options.items())]
+    return hashlib.sha256(json.dumps(content, default=_canonical).encode()).hexdigest()
 
 
-def _said(value: Any) -> Any:
-    """What decides a value that JSON does not know: the same in every process."""
+def _canonical(value: Any) -> Any:
+    """Return a representation that is equal in all processes, for a value that JSON cannot encode."""
     if isinstance(value, partial):
-        return [_said(value.func), value.args, value.keywords]
+        return [_canonical(value.func), value.args, value.keywords]
     if isinstance(value, (np.ndarray, np.generic)):
         return value.tolist()
     if hasattr(value, "__qualname__"):
         return f"{value.__module__}.{value.__qualname__}"
-    if " at 0x" not in (told := repr(value)):
-        return told
-    try:  # an address tells nothing in another process
-        return [type(value).__qualname__, json.dumps(vars(value), default=_said)]
+    if " at 0x" not in (text := repr(value)):
+        return text
+    try:  # an address differs between processes
+        return [type(value).__qualname__, json.dumps(vars(value), default=_canonical)]
     except (TypeError, ValueError, RecursionError):
         return type(value).__qualname__
 
 
-def failed_run(error: RunError) -> Trajectory | None:
-    """What a run had computed when it failed, or None.
+def partial_trajectory(error: RunError) -> Trajectory | None:
+    """Return the samples before the failure of a run, or None.
 
     Args:
-        error: what it raised.
+        error: error that the run raised.
     """
     found = error.trajectory
     return found if isinstance(found, Trajectory) else None

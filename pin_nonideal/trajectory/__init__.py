@@ -1,1 +1,1 @@
-"""Trajectories: samples, events, records, files and states between samples."""
+"""Trajectories: samples, events, records, files, and states between samples."""

@@ -5,18 +5,21 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
 from pin_nonideal.states.joint_layout import CIRCLES
 from pin_nonideal.states.kinematics import frame_motion
 from pin_nonideal.types import Array
-from pin_nonideal.validation import choice
+from pin_nonideal.validation import choice, text
 
+from .frame_reaction import carrier_of, frame_reaction
 from .records import FrameRecord, JointRecord, LawRecord, angles
 
 
 def joint_record(run: Any, name: str) -> JointRecord:
-    """Record of one joint, see `Trajectory.joint`."""
+    """Return the record of one joint; see `Trajectory.joint`."""
+    name = text("joint: name", name)
     floating = [place for place in run.joints if place.kind == "JointModelFreeFlyer"]
     known = {"base": floating[0]} if len(floating) == 1 else {}
     known |= {place.name: place for place in run.joints}
@@ -35,7 +38,8 @@ def joint_record(run: Any, name: str) -> JointRecord:
 
 
 def frame_record(run: Any, name: str) -> FrameRecord:
-    """Record of one frame, see `Trajectory.frame`."""
+    """Return the record of one frame; see `Trajectory.frame`."""
+    name = text("frame: name", name)
     if run.scene is None:
         raise InputError(f'frame("{name}") needs the scene of the run, which this one has lost')
     model = run.scene.model
@@ -46,7 +50,8 @@ def frame_record(run: Any, name: str) -> FrameRecord:
 
 
 def force_of(run: Any, name: str) -> Array:
-    """Force of one constraint or contact, see `Trajectory.force`."""
+    """Return the force of one constraint or contact; see `Trajectory.force`."""
+    name = text("force: name", name)
     if name not in run.rows:
         raise UnknownNameError(f'no constraint or contact "{name}" in this run{nearest(name, run.rows)}')
     first, end, contact = run.rows[name]
@@ -60,15 +65,16 @@ def force_of(run: Any, name: str) -> Array:
 
 
 def law_record(run: Any, name: str) -> LawRecord:
-    """Record of one law, see `Trajectory.law`."""
+    """Return the record of one law; see `Trajectory.law`."""
+    name = text("law: name", name)
     if name not in run.law_names:
         raise UnknownNameError(f'no law "{name}" in this run{nearest(name, run.law_names)}')
     index, force, power = run.law_names.index(name), None, None
-    if run.law_forces is not None:
+    if run.law_forces:
         force = np.zeros(run.v.shape)
         force[:, run.law_dofs[index]] = run.law_forces[name]
         power = np.einsum("ij,ij->i", force, run.v)
-    if run.power is not None:  # after three columns of the scene
+    if run.power:  # after three columns of the scene
         power = list(run.power.values())[len(run.power) - len(run.law_names) + index]
     own = [e for e, law in enumerate(run.element_laws) if law == index]
     columns = own[0] if len(own) == 1 else own
@@ -78,11 +84,32 @@ def law_record(run: Any, name: str) -> LawRecord:
 
 
 def reaction_of(run: Any, name: str, axes: str) -> Array:
-    """Wrench of a joint, anchor or contact, see `Trajectory.reaction`."""
-    if run.reactions is None:
+    """Return the wrench of a joint, anchor or contact; see `Trajectory.reaction`."""
+    name = text("reaction: name", name)
+    if not run.reactions.recorded:
         raise InputError(f'reaction("{name}") needs a run with record="reactions"')
-    if name not in run.reactions:
-        raise UnknownNameError(f'no joint, anchor or contact "{name}"{nearest(name, run.reactions)}')
     begin = 6 * ("own", "world").index(choice("reaction: axes", axes, ("own", "world")))
-    wrench: Array = run.reactions[name][:, begin : begin + 6]
+    wrench: Array = _wrenches(run, name)[:, begin : begin + 6]
     return wrench
+
+
+def _wrenches(run: Any, name: str) -> Array:
+    """Wrenches of a joint, anchor or contact as recorded, or those through a fixed joint or frame."""
+    if name in run.reactions:
+        recorded: Array = run.reactions[name]
+        return recorded
+    model = None if run.scene is None else run.scene.model
+    if model is None or name == "universe" or not model.existFrame(name):
+        frames = [] if model is None else [str(f.name) for f in model.frames][1:]
+        known = [*run.reactions, *frames]
+        lost = (
+            "" if model is not None else "; fixed joints need the scene of the run, which this one has lost"
+        )
+        raise UnknownNameError(f'no joint, frame, anchor or contact "{name}"{nearest(name, known)}{lost}')
+    index = carrier_of(model, name)
+    if model.frames[index].type == pin.FrameType.JOINT:
+        of_joint: Array = run.reactions[str(model.frames[index].name)]
+        return of_joint
+    if run.a is None:
+        raise InputError(f'reaction("{name}") of a fixed joint needs a run with record=("a", "reactions")')
+    return frame_reaction(run, name, index)

@@ -1,4 +1,4 @@
-"""A trajectory as a table of named columns."""
+"""Trajectories as tables of named columns with units."""
 
 from __future__ import annotations
 
@@ -9,50 +9,128 @@ import numpy as np
 
 from pin_nonideal.types import Array
 
+# Kinds of joints by prefix, with the units of their positions as `JointRecord` has them and of their rates.
+# Kinds that are not listed, such as composites, have unknown units.
+KINDS = (
+    ("JointModelFreeFlyer", ("m",) * 3 + ("1",) * 4, ("m",) * 3 + ("rad",) * 3),
+    ("JointModelPlanar", ("m", "m", "rad"), ("m", "m", "rad")),
+    ("JointModelTranslation", ("m",) * 3, ("m",) * 3),
+    ("JointModelSphericalZYX", ("rad",) * 3, ("rad",) * 3),
+    ("JointModelSpherical", ("1",) * 4, ("rad",) * 3),
+    ("JointModelEllipsoid", ("rad",) * 3, ("rad",) * 3),
+    ("JointModelUniversal", ("rad",) * 2, ("rad",) * 2),
+    ("JointModelR", ("rad",), ("rad",)),
+    ("JointModelH", ("rad",), ("rad",)),
+    ("JointModelP", ("m",), ("m",)),
+)
+FORCE_OF = {"m": "N", "rad": "N m"}  # unit of a force by that of the motion on which it does work
+RATES = {"v": "/s", "a": "/s^2"}
+EITHER_FORCE = (
+    "N or N m"  # of rows and elements, some of which are along a displacement and some about an axis
+)
+
 
 def columns(run: Any) -> dict[str, Array]:
-    """All that was recorded as named columns, (nt,) each.
+    """Return all recorded values as named columns, (nt,) each.
+
+    Args:
+        run: trajectory of the run.
+    """
+    return {name: values for name, (values, _) in _with_units(run).items()}
+
+
+def units(run: Any) -> dict[str, str]:
+    """Unit of each column, "1" for numbers without one and empty if it is unknown.
 
     Args:
         run: the Trajectory.
     """
-    table: dict[str, Array] = {"t": run.t}
+    return {name: unit for name, (_, unit) in _with_units(run).items()}
+
+
+def column_name(name: str) -> str:
+    """Return a name as columns contain it: each space becomes "_".
+
+    Args:
+        name: name of a joint, constraint, law or ledger.
+    """
+    return "_".join(name.split())
+
+
+def _with_units(run: Any) -> dict[str, tuple[Array, str]]:
+    """Columns and their units by name without spaces."""
+    table: dict[str, tuple[Array, str]] = {}
+    for given, values, unit in _all(run):
+        base = column_name(given)
+        name, number = base, 1
+        while name in table:
+            number += 1
+            name = f"{base}_{number}"
+        table[name] = (values, unit)
+    return table
+
+
+def _all(run: Any) -> Iterator[tuple[str, Array, str]]:
+    """Each column as its name, its values and its unit."""
+    yield "t", run.t, "s"
     for place in run.joints:
         record = run.joint(place.name)
+        position, rate = _motion(place)
+        forces = [FORCE_OF.get(unit, "") for unit in rate]
+        per = {"q": position, "tau": forces}
+        per |= {key: [unit and unit + end for unit in rate] for key, end in RATES.items()}
         for field in ("q", "v", "a", "tau"):
-            table |= _numbered(f"{place.name}.{field}", getattr(record, field))
+            yield from _numbered(f"{place.name}.{field}", getattr(record, field), per[field])
     for field, values in _by_dof(run):
         for place in run.joints:
             part = values[:, place.v_first : place.v_first + place.nv]
-            table |= _numbered(f"{place.name}.{field}", part[:, 0] if place.nv == 1 else part)
+            forces = [FORCE_OF.get(unit, "") for unit in _motion(place)[1]]
+            yield from _numbered(f"{place.name}.{field}", part[:, 0] if place.nv == 1 else part, forces)
     for name, (first, end, _) in run.rows.items():
         for field in ("lam", "lam_ideal"):
-            values = getattr(run, field)
-            table |= _numbered(f"{name}.{field}", None if values is None else values[:, first:end])
+            multipliers = getattr(run, field)
+            own = None if multipliers is None else multipliers[:, first:end]
+            yield from _numbered(f"{name}.{field}", own, [EITHER_FORCE] * (end - first))
     for k, name in enumerate(run.element_names):
-        for field, values in (("mode", run.modes), ("limit", run.limits)):
-            table |= {} if values is None else {f"{name}.{field}": values[:, k]}
+        for field, of_all, unit in (("mode", run.modes, "1"), ("limit", run.limits, EITHER_FORCE)):
+            if of_all is not None:
+                yield f"{name}.{field}", of_all[:, k], unit
     for name, values in (run.reactions or {}).items():
-        table |= _numbered(f"{name}.reaction", values[:, :6])
-    for field in ("energy", "power"):
-        table |= {f"{field}.{name}": values for name, values in (getattr(run, field) or {}).items()}
-    table |= _numbered("z", run.z)
-    return table | {"violation": run.violation, "violation_rate": run.violation_rate}
+        yield from _numbered(f"{name}.reaction", values[:, :6], ["N"] * 3 + ["N m"] * 3)
+    for field, unit in (("energy", "J"), ("power", "W")):
+        for name, values in (getattr(run, field) or {}).items():
+            yield f"{field}.{name}", values, unit
+    yield from _numbered("z", run.z, [])
+    yield "violation", run.violation, "m or rad"
+    yield "violation_rate", run.violation_rate, "m/s or rad/s"
+
+
+def _motion(place: Any) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Units of the positions and of the displacements of a joint."""
+    for kind, position, rate in KINDS:
+        if place.kind.startswith(kind):
+            return position, rate
+    return (), ("",) * place.nv
 
 
 def _by_dof(run: Any) -> Iterator[tuple[str, Array]]:
-    """Fields with a column for each degree of freedom."""
+    """Yield the fields that have a column for each degree of freedom."""
     for field in ("F_ideal", "F_nonideal"):
         if getattr(run, field) is not None:
             yield field, getattr(run, field)
     for name in run.law_forces or ():
         force = run.law(name).force
         assert force is not None
-        yield f"C {name}", np.asarray(force)
+        yield f"C.{name}", np.asarray(force)
 
 
-def _numbered(name: str, values: Array | None) -> dict[str, Array]:
-    """One column under the name itself, several under the name and their number; none of nothing."""
-    if values is None or values.ndim == 1:
-        return {} if values is None else {name: values}
-    return {f"{name}.{k}": values[:, k] for k in range(values.shape[1])}
+def _numbered(name: str, values: Array | None, units: Any) -> Iterator[tuple[str, Array, str]]:
+    """Return one column under the given name, several columns under numbered names, or none for None."""
+    if values is None:
+        return
+    if values.ndim == 1:
+        yield name, values, units[0] if len(units) == 1 else ""
+        return
+    known = len(units) == values.shape[1]
+    for k in range(values.shape[1]):
+        yield f"{name}.{k}", values[:, k], units[k] if known else ""

@@ -1,8 +1,8 @@
-"""Dense output of a run: the interpolant of every step, and samples of the run at any time from it.
+"""Dense output of a run: the interpolants of the steps, and samples at any time of the run.
 
-A step keeps the values of its method's own interpolant at Chebyshev's points, through which one polynomial
-goes: that of dop853 is of degree 7, so that its local error is of order 8 in the step, as the global one of
-the steps is.  A sample is put back on the constraints, and evaluated under the modes of its step.
+Each step stores its method's interpolant by values at Chebyshev points, which determine one polynomial. The
+polynomial of dop853 has degree 7, so that its local error has order 8 in the step size, as the global error
+of the steps has. Samples are projected onto the constraints and evaluated under the modes of their step.
 """
 
 from __future__ import annotations
@@ -27,15 +27,17 @@ class DenseOutput:
 
     Attributes:
         times: start and end of each step [s], (n, 2).
-        states: q, v, states of laws and work of the ledger at each point of each step, (n, points, size).
-        modes: of the frictional elements over each step, (n, ne).
-        directions: of their slip at each point of each step, (n, points, 3 ne), or without columns if every
-            element slips along one direction.  Steps that did not solve for them store the directions at
-            their end.
-        sought: whether each step solved for the direction of each element, as it does in slow slip, (n, ne).
-        torque: held over each step, (n, nv), not a number where none is; (0, nv) where none ever is.
-        moved: energy moved by projection up to the end of each step [J], (n,).
-        options: what the run was asked for, a RunOptions.
+        states: q, v, states of laws and work of the energy ledger at the points of each step, (n, points,
+            size).
+        modes: modes of the frictional elements during each step, (n, ne).
+        directions: slip directions of the elements at the points of each step, (n, points, 3 ne), or without
+            columns if each element slips along one direction. Steps that did not solve for directions store
+            those at their end.
+        sought: whether each step solved for the slip direction of each element, as in slow slip, (n, ne).
+        torque: torque that each step holds constant, (n, nv), NaN for steps without one; (0, nv) if no step
+            has one.
+        moved: energy change by projection from the start of the run to the end of each step [J], (n,).
+        options: options of the run, a RunOptions.
     """
 
     times: Array
@@ -48,10 +50,10 @@ class DenseOutput:
     options: Any
 
     def check(self) -> None:
-        """Refuses arrays that do not fit together, as a damaged file may hold them.
+        """Check that the shapes of the arrays agree, for example in a damaged file.
 
         Raises:
-            ValueError: see above.
+            ValueError: the shapes do not agree, or a mode is unknown.
         """
         n, elements = len(self.times), self.modes.shape[1]
         shapes = [self.times.shape[1:] == (2,), self.states.ndim == 3, self.moved.shape == (n,)]
@@ -66,16 +68,16 @@ class DenseOutput:
         return len(self.times)
 
     def at(self, scene: Scene, t: Array) -> Table:
-        """Fields of a Trajectory of samples at any times of the run.
+        """Return the fields of a Trajectory with samples at any times of the run.
 
-        At a time where a step ends and another begins, as at an event, the one that begins is taken.
+        At the boundary of two steps, for example at an event, the later step is used.
 
         Args:
-            scene: the scene that ran.
+            scene: scene of the run.
             t: times [s], (k,).
 
         Raises:
-            InputError: a time lies outside of the run.
+            InputError: a time is outside of the run.
         """
         if len(t) and not (len(self) and self.times[0, 0] <= t.min() and t.max() <= self.times[-1, 1]):
             span = f"{self.times[0, 0]:g} to {self.times[-1, 1]:g} s" if len(self) else "no time"
@@ -108,25 +110,25 @@ class DenseOutput:
 
 
 def inside_steps(states: Array, step: NDArray[np.int64], part: Array) -> Array:
-    """Values of the polynomials of steps, through the values at Chebyshev's points of the second kind.
+    """Evaluate the polynomials of steps, given by values at Chebyshev points of the second kind.
 
     Args:
-        states: at the points of each step, (n, points, size).
-        step: in which each value lies, (k,).
-        part: of the step, where it lies, (k,).
+        states: values at the points of each step, (n, points, size).
+        step: index of the step of each value, (k,).
+        part: relative position of each value in its step, 0 to 1, (k,).
 
     Returns:
-        (k, size).
+        Values, (k, size).
     """
     return core.inside_steps(states, step, part).reshape(len(part), states.shape[2])
 
 
 def dense_output(outcome: core.Outcome, options: Any, nv: int, elements: int) -> DenseOutput:
-    """Dense output from the core's flat arrays.
+    """Return the dense output from the core's flat arrays.
 
     Args:
-        outcome: of the core.
-        options: of the run, a RunOptions.
+        outcome: result of the core.
+        options: options of the run, a RunOptions.
         nv: number of velocities.
         elements: number of frictional elements.
     """

@@ -1,4 +1,4 @@
-"""Files of trajectories: one NumPy archive without pickles, a header in JSON and an array a field."""
+"""Files of trajectories: one NumPy archive without pickles, with a JSON header and an array per field."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ import numpy as np
 
 from pin_nonideal.atomic_files import file_path, mode_of, whole_file
 from pin_nonideal.errors import LoadingError, PinNonidealError
-from pin_nonideal.loading.load import load_again
+from pin_nonideal.loading.load import load_from_origin
 from pin_nonideal.scene.scene import Scene, compiled_scene, scene_origin
 from pin_nonideal.states.joint_layout import JointPlace
 from pin_nonideal.types import Table
@@ -26,63 +26,63 @@ from .npz import npz_bytes
 from .records import LEDGER, Event, Stats, UserEventRecord
 
 FORMAT = 1
-# Up to this size [bytes] a file is packed, in less than a tenth of a second; of motions with all their digits
-# that would save a tenth of the room, and take ten to thirty times as long as writing them.
-PACKED_BYTES = 1_000_000
-# What NumPy, zip archives and JSON raise on files that are damaged or something else.
+# Files up to this size [bytes] are compressed, in less than a tenth of a second. Compression of
+# full-precision motions would save a tenth of the size and take ten to thirty times as long as writing.
+MAX_COMPRESSED_BYTES = 1_000_000
+# Errors of NumPy, zip archives and JSON for damaged files or files of another format.
 UNREADABLE: tuple[type[Exception], ...] = (OSError, ValueError, LookupError, TypeError, AttributeError)
 UNREADABLE += (EOFError, RuntimeError, tokenize.TokenError, zipfile.BadZipFile, zlib.error)
 REQUIRED = ("t", "q", "v", "violation", "violation_rate")
 OPTIONAL = ("a", "tau", "F_ideal", "F_nonideal", "lam", "lam_ideal", "z", "modes", "closed", "limits")
-# By name, with one row or number a sample: of these a file holds a table, or nothing.
+# Fields by name, with one row or number for each sample; a file has a table for each, or None.
 GROUPS = ("energy", "power", "law_forces", "reactions", "contact_forces")
 DENSE = ("times", "states", "modes", "directions", "sought", "torque", "moved")
 LISTS = ("element_names", "element_laws", "law_names", "law_dofs")
 
 
 def write(run: Any, path: str | os.PathLike[str]) -> Path:
-    """Writes all arrays of a Trajectory to one .npz file, whole or not at all.
+    """Write all arrays of a Trajectory to one .npz file, completely or not at all.
 
     Args:
-        run: the Trajectory.
-        path: file name; ".npz" is appended when it is missing.
+        run: trajectory of the run.
+        path: file name; ".npz" is appended if it is missing.
 
     Returns:
-        The path written.
+        Path of the written file.
 
     Raises:
-        InputError: `path` is no name of a file.
+        InputError: `path` is not the name of a file.
         OutputError: the file cannot be written.
     """
     target = file_path("Trajectory.save: path", path)
     if target.suffix != ".npz":
-        mode_of(target, "the trajectory")  # /dev/null is no beginning of a name
+        mode_of(target, "the trajectory")  # "/dev/null" must not become "/dev/null.npz"
         target = target.with_name(target.name + ".npz")
     arrays = _arrays(run)
     size = sum(np.asarray(x).nbytes for x in arrays.values())
     with whole_file(target, "the trajectory") as stream:
-        (np.savez_compressed if size <= PACKED_BYTES else np.savez)(stream, **arrays)
+        (np.savez_compressed if size <= MAX_COMPRESSED_BYTES else np.savez)(stream, **arrays)
     return target
 
 
 def to_bytes(run: Any) -> bytes:
-    """What `write` writes, not compressed, for one of very many runs.
+    """Return the content of the file that `write` writes, without compression, for a large number of runs.
 
     Args:
-        run: the Trajectory.
+        run: trajectory of the run.
     """
     arrays = _arrays(run)
-    arrays["header"] = np.array(str(arrays["header"]).encode())  # JSON in ASCII, a quarter of the room
+    arrays["header"] = np.array(str(arrays["header"]).encode())  # JSON in ASCII needs a quarter of the space
     return npz_bytes(arrays)
 
 
 def _arrays(run: Any) -> Table:
-    """All arrays of a trajectory, the header among them, by their names in a file."""
+    """Return all arrays of a trajectory and its header, by their names in a file."""
     arrays: Table = {key: getattr(run, key) for key in REQUIRED}
     arrays |= {key: getattr(run, key) for key in OPTIONAL if getattr(run, key) is not None}
     if run.closed is not None:
         arrays["closed"] = run.closed.astype(np.int8)
-    tables = {group: getattr(run, group) for group in GROUPS}
+    tables = {group: vars(run)[group] for group in GROUPS}
     for group, table in tables.items():
         arrays |= {f"{group}/{i}": x for i, x in enumerate((table or {}).values())}
     header = {
@@ -96,38 +96,38 @@ def _arrays(run: Any) -> Table:
     }
     header |= {key: getattr(run, key) for key in (*LISTS, "joints", "rows")}
     header |= {group: None if table is None else list(table) for group, table in tables.items()}
-    arrays |= {f"loose/{key}": x for key, x in _loose(run).items()}
+    arrays |= {f"loose/{key}": x for key, x in _extra_arrays(run).items()}
     header["user_events"] = [record.name for record in run.user_events]
     if run.dense is not None:
-        asked = vars(run.dense.options)
-        header["dense"] = {**asked, "atol": asked["atol"].tolist()}
+        options = vars(run.dense.options)
+        header["dense"] = {**options, "atol": options["atol"].tolist()}
     arrays["header"] = np.array(json.dumps(header))
     return arrays
 
 
 def read(path: str | os.PathLike[str]) -> tuple[Table, Table | None]:
-    """Fields of the Trajectory in a file, and what its scene was loaded from; nothing in it is executed.
+    """Return the fields of the Trajectory in a file, and the origin of its scene; no content is executed.
 
     Args:
         path: file name.
 
     Raises:
-        InputError: `path` is no name of a file.
-        LoadingError: the file is missing, truncated, or no trajectory.
+        InputError: `path` is not the name of a file.
+        LoadingError: the file is missing, truncated, or not a trajectory.
     """
     source = file_path("Trajectory.load: path", path)
     return read_from(source, source)
 
 
 def read_from(stream: Any, source: Path) -> tuple[Table, Table | None]:
-    """The same of an open file.
+    """Return the fields and the origin of the scene from an open file; see `read`.
 
     Args:
-        stream: the file, or its name.
-        source: its name, for messages.
+        stream: open file, or file name.
+        source: file name, for messages.
 
     Raises:
-        LoadingError: it is truncated, or no trajectory.
+        LoadingError: the file is truncated, or not a trajectory.
     """
     try:
         with np.load(stream, allow_pickle=False) as file:
@@ -142,7 +142,7 @@ def read_from(stream: Any, source: Path) -> tuple[Table, Table | None]:
         _check_arrays(arrays, source)
         fields: Table = {key: arrays.get(key) for key in (*REQUIRED, *OPTIONAL)}
         for group in GROUPS:
-            if header.get(group) is not None:  # files of earlier versions have fewer
+            if header.get(group) is not None:  # files of earlier versions have fewer groups
                 if group == "energy":
                     _check_ledger(header[group], source)
                 fields[group] = {name: arrays[f"{group}/{i}"] for i, name in enumerate(header[group])}
@@ -156,60 +156,90 @@ def read_from(stream: Any, source: Path) -> tuple[Table, Table | None]:
         fields["rows"] = {
             str(n): (int(first), int(end), bool(c)) for n, (first, end, c) in header.get("rows", {}).items()
         }
-        whole = {
+        result = {
             **fields,
-            **_from_loose(loose, header, len(arrays["t"])),
+            **_extra_fields(loose, header, len(arrays["t"])),
             "events": events,
             "stats": Stats(**header["stats"]),
             "name": str(header["name"]),
             "notes": [str(note) for note in header.get("notes", [])],
             "failure": None if header.get("failure") is None else str(header["failure"]),
         }
-        return whole, header.get("origin")
+        return result, header.get("origin")
     except LoadingError:
         raise
     except UNREADABLE as error:
         raise LoadingError(
-            f'cannot read a trajectory from "{source}": {type(error).__name__}: {error}; '
+            f'cannot read a trajectory from "{source}": {reason_of(error)}; '
             "it must be an .npz file written by Trajectory.save"
         ) from error
 
 
-def fits(scene: Scene, joints: Sequence[JointPlace], rows: Table) -> bool:
-    """Whether a scene has the joints and rows of a run.
+def reason_of(error: Exception) -> str:
+    """Return the reason for an unreadable file, without the terms of NumPy, zip archives and JSON.
 
     Args:
-        scene: the scene.
-        joints: of the run.
-        rows: of the run.
+        error: one of `UNREADABLE`.
+    """
+    if isinstance(error, FileNotFoundError):
+        return "there is no such file"
+    if isinstance(error, IsADirectoryError):
+        return "it is a folder"
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror
+    return "its content is damaged or of another kind"
+
+
+def matches_scene(scene: Scene, joints: Sequence[JointPlace], rows: Table) -> bool:
+    """Check if a scene has the joints and rows of a run.
+
+    Args:
+        scene: scene to compare.
+        joints: joints of the run.
+        rows: rows of the run.
     """
     return compiled_scene(scene).joints == list(joints) and compiled_scene(scene).rows == rows
 
 
-def scene_again(origin: Any, joints: Sequence[JointPlace], rows: Table, notes: list[str]) -> Scene | None:
-    """The scene of a saved run, loaded again; None, with a note, where that is not the same any more.
+def described(joints: Sequence[JointPlace], rows: Table) -> str:
+    """Return the joints, constraints and contacts of a run as text.
+
+    Args:
+        joints: joints of the run.
+        rows: rows of the run.
+    """
+    named = [place.name for place in joints]
+    return f"the joints {_few(named)} and " + (f"the rows of {_few(list(rows))}" if rows else "no rows")
+
+
+def _few(names: Sequence[str]) -> str:
+    return ", ".join(f'"{name}"' for name in names[:4]) + (", ..." if len(names) > 4 else "")
+
+
+def reload_scene(origin: Any, joints: Sequence[JointPlace], rows: Table, notes: list[str]) -> Scene | None:
+    """Reload the scene of a saved run; return None and add a note if the scene is missing or has changed.
 
     Args:
         origin: name and parameters of `load`, or None.
-        joints: of the run.
-        rows: of the run.
-        notes: of the run; may grow.
+        joints: joints of the run.
+        rows: rows of the run.
+        notes: notes of the run; may grow.
     """
     if origin is None:
         return None
     try:
-        scene = load_again(origin)
+        scene = load_from_origin(origin)
     except (PinNonidealError, OSError, ValueError, LookupError, TypeError, AttributeError) as error:
         notes.append(f"the scene of the run cannot be loaded again: {error}")
         return None
-    if fits(scene, joints, rows):
+    if matches_scene(scene, joints, rows):
         return scene
     notes.append(f'the robot "{origin["name"]}" is no longer the one of the run; its scene is left out')
     return None
 
 
 def _listed(e: Event) -> list[Any]:
-    """An event as a file holds it."""
+    """Return an event as a list for the header of a file."""
     if e.kind == "relaxed":
         return [e.time, e.kind, e.element, e.miss]
     if e.impulse is None or e.v_minus is None or e.v_plus is None:
@@ -219,15 +249,15 @@ def _listed(e: Event) -> list[Any]:
 
 
 def _event(t: float, kind: str, element: str, change: float = 0.0, *vectors: Sequence[float]) -> Event:
-    """An event as a file gives it."""
+    """Return an event from its list in the header of a file."""
     if not vectors:
         return Event(float(t), str(kind), str(element), miss=float(change))
     impulse, before, after = (np.array(x, dtype=float) for x in vectors)
     return Event(float(t), str(kind), str(element), impulse, float(change), before, after)
 
 
-def _loose(run: Any) -> Table:
-    """Arrays that have no row for each sample, by name."""
+def _extra_arrays(run: Any) -> Table:
+    """Return the arrays without a row for each sample, by name."""
     found: Table = {} if run.grid is None else {"grid": run.grid.astype(np.int8)}
     for k, record in enumerate(run.user_events):
         found |= {f"event/{k}/{key}": getattr(record, key) for key in ("t", "q", "v")}
@@ -236,8 +266,8 @@ def _loose(run: Any) -> Table:
     return found
 
 
-def _from_loose(loose: Table, header: Table, samples: int) -> Table:
-    """Fields made of them; what does not fit raises one of `UNREADABLE`."""
+def _extra_fields(loose: Table, header: Table, samples: int) -> Table:
+    """Return the fields that consist of such arrays; invalid arrays raise an error listed in `UNREADABLE`."""
     fields: Table = {}
     if "loose/grid" in loose:
         fields["grid"] = loose["loose/grid"].astype(bool).reshape(samples)
@@ -251,7 +281,7 @@ def _from_loose(loose: Table, header: Table, samples: int) -> Table:
         dense = {key: loose[f"loose/dense/{key}"] for key in DENSE if key != "sought"}
         if "loose/dense/sought" in loose:
             dense["sought"] = loose["loose/dense/sought"]
-        else:  # a file of an earlier version holds the directions of each step's end
+        else:  # files of earlier versions have directions at the end of each step only
             points = dense["states"].shape[1]
             dense["directions"] = np.repeat(dense["directions"][:, None], points, axis=1)
             dense["sought"] = np.zeros_like(dense["modes"])
@@ -261,10 +291,10 @@ def _from_loose(loose: Table, header: Table, samples: int) -> Table:
 
 
 def _check_ledger(names: Sequence[str], source: Path) -> None:
-    """Raises unless the ledger has the columns that every ledger has.
+    """Check that the energy ledger has its required columns.
 
     Raises:
-        LoadingError: one is missing.
+        LoadingError: a column is missing.
     """
     missing = [name for name in LEDGER if name not in names]
     if missing:
@@ -272,10 +302,10 @@ def _check_ledger(names: Sequence[str], source: Path) -> None:
 
 
 def _check_arrays(arrays: Table, source: Path) -> None:
-    """Raises unless every array holds numbers and has a row for each sample.
+    """Check that every array holds numbers and has a row for each sample.
 
     Raises:
-        LoadingError: one does not.
+        LoadingError: an array is invalid.
     """
     rows = arrays["t"].shape[:1]
     t = arrays["t"]

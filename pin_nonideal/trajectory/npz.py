@@ -1,4 +1,4 @@
-"""NumPy archives made in one go: what np.savez makes member by member, for very many small files."""
+"""NumPy archives built in one pass, faster than np.savez for a large number of small files."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ import numpy as np
 
 from pin_nonideal.types import Array
 
-# Parts of a zip archive whose members are stored as they are: signatures, and the fields that follow them.
+# Records of a zip archive with uncompressed members: signatures and the fields that follow them.
 LOCAL = struct.Struct("<4s5H3I2H")
 CENTRAL = struct.Struct("<4s6H3I5H2I")
 END = struct.Struct("<4s4H2IH")
 VERSION, STORED, UTF8 = 20, 0, 0x800
-TIME, DATE = 0, (1 << 5) | 1  # 1980-01-01: no archive of equal arrays differs from another
-MOST_BYTES = 1_000_000_000  # larger archives need fields of 64 bits, which np.savez writes
+TIME, DATE = 0, (1 << 5) | 1  # 1980-01-01, so that archives of equal arrays are equal
+MAX_BYTES = 1_000_000_000  # larger archives need 64-bit fields, which np.savez writes
 
 
 def npz_bytes(arrays: Mapping[str, Array]) -> bytes:
-    """An .npz archive, not compressed, as np.savez writes it, in a fifth of its time where arrays are small.
+    """Return an uncompressed .npz archive, five times as fast as np.savez for small arrays.
 
     Args:
-        arrays: by name, of numbers or text.
+        arrays: arrays of numbers or text, by name.
     """
-    if sum(x.nbytes for x in arrays.values()) > MOST_BYTES:
+    if sum(x.nbytes for x in arrays.values()) > MAX_BYTES:
         stream = io.BytesIO()
         np.savez(stream, **dict(arrays))  # type: ignore[arg-type]
         return stream.getvalue()
@@ -49,7 +49,7 @@ def npz_bytes(arrays: Mapping[str, Array]) -> bytes:
 
 @lru_cache(maxsize=1000)
 def _header(dtype: str, shape: tuple[int, ...]) -> bytes:
-    """What stands before the numbers of an array in row-major order."""
+    """Return the header of an array in row-major order."""
     stream = io.BytesIO()
     np.lib.format.write_array_header_1_0(stream, {"descr": dtype, "fortran_order": False, "shape": shape})
     return stream.getvalue()

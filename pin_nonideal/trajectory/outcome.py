@@ -1,4 +1,4 @@
-"""What the core hands over, as the fields of a Trajectory."""
+"""Conversion of the core's results to fields of a Trajectory."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from .records import LEDGER, Event, Stats
 
 
 def outcome_stats(outcome: core.Outcome, wall: float) -> Stats:
-    """Counters of a run.
+    """Return the counters of a run.
 
     Args:
-        outcome: of the core.
+        outcome: result of the core.
         wall: wall time [s].
     """
     return Stats(
@@ -37,12 +37,12 @@ def outcome_stats(outcome: core.Outcome, wall: float) -> Stats:
 
 
 def outcome_fields(scene: Scene, outcome: core.Outcome, options: Any) -> Table:
-    """Fields of a Trajectory from the core's flat arrays; all but its counters.
+    """Return the fields of a Trajectory, without its counters, from the core's flat arrays.
 
     Args:
-        scene: the scene that ran.
-        outcome: of the core.
-        options: what was asked for, a RunOptions.
+        scene: scene of the run.
+        outcome: result of the core.
+        options: options of the run, a RunOptions.
     """
     t, nq, nv, program = outcome.t, scene.q0.size, scene.v0.size, compiled_scene(scene).program
     nt = len(t)
@@ -95,7 +95,7 @@ def outcome_fields(scene: Scene, outcome: core.Outcome, options: Any) -> Table:
 
 
 def _of_laws(scene: Scene, outcome: core.Outcome) -> Table:
-    """Forces of the laws on the degrees of freedom that each acts on, and limits of the elements."""
+    """Return the forces of the laws on the degrees of freedom of each law, and the limits of the elements."""
     program, nt = compiled_scene(scene).program, len(outcome.t)
     supports = program.law_supports
     ends = np.cumsum([len(dofs) for dofs in supports])
@@ -109,7 +109,7 @@ def _of_laws(scene: Scene, outcome: core.Outcome) -> Table:
 
 
 def _contact_forces(scene: Scene, outcome: core.Outcome) -> dict[str, Array]:
-    """Force of each contact between two frames, in world axes."""
+    """Return the force of each contact between two frames, in world axes."""
     program = compiled_scene(scene).program
     names = [program.constraints[block].name for block in program.framed_contacts]
     forces = outcome.contact_forces.reshape(len(outcome.t), len(names), 3)
@@ -117,7 +117,7 @@ def _contact_forces(scene: Scene, outcome: core.Outcome) -> dict[str, Array]:
 
 
 def _reactions(scene: Scene, outcome: core.Outcome) -> dict[str, Array]:
-    """Wrenches of joints, then of anchors and contacts, in their own axes and in world axes."""
+    """Return the wrenches of joints, then of anchors and contacts, in their own axes and in world axes."""
     program = compiled_scene(scene).program
     joints = [str(name) for name in scene.model.names][1:]
     names = [*joints, *(program.constraints[block].name for block in program.reaction_blocks)]
@@ -126,14 +126,14 @@ def _reactions(scene: Scene, outcome: core.Outcome) -> dict[str, Array]:
 
 
 def _event(scene: Scene, event: core.Event, functions: Sequence[str]) -> Event:
-    """An event with the name of its element, contact or constraint, or of the user's function."""
+    """Return an event with the name of its element, contact or constraint, or of the user's function."""
     if event.kind is core.EventKind.user:
         return Event(event.time, event.kind.name, functions[event.element])
     if event.kind in (core.EventKind.saturate, core.EventKind.desaturate):
         joint = scene.model.names[joint_of(scene.model, event.element)]
         return Event(event.time, event.kind.name, str(joint))
     if not event.of_contact and event.kind is not core.EventKind.jump:
-        # A cluster of events without any friction is one of contacts.
+        # Without friction, a cluster of events consists of contact events.
         names = scene.element_names or compiled_scene(scene).opening_names
         return Event(event.time, event.kind.name, names[event.element])
     name = compiled_scene(scene).program.constraints[event.element].name
@@ -144,7 +144,7 @@ def _event(scene: Scene, event: core.Event, functions: Sequence[str]) -> Event:
 
 
 def _ledger(columns: Sequence[str], energy: Array) -> dict[str, Array]:
-    """The core's columns of energy, stored and done since the start, and their sums."""
+    """Return the stored energies, the work since the start, and their sums, from the core's columns."""
     stored, done = ("kinetic", "potential"), (*columns, "projection")
     split = len(stored)
     numbers = energy.reshape(-1, split + len(done))
@@ -156,7 +156,7 @@ def _ledger(columns: Sequence[str], energy: Array) -> dict[str, Array]:
 
 
 def _columns(program: core.Program) -> list[str]:
-    """Columns of power, with laws under names that no other column of a ledger bears."""
+    """Return the names of the power columns; laws are renamed if another ledger column has their name."""
     names = program.power_names
     first_law = len(names) - len(program.law_names)
     taken = {*LEDGER, *names[:first_law], "projection"}

@@ -1,4 +1,4 @@
-"""Parts of a run: its events and counters, and what belongs to one law, joint or frame."""
+"""Parts of a run: events, counters, and records of one law, joint or frame."""
 
 from __future__ import annotations
 
@@ -10,32 +10,32 @@ from numpy.typing import NDArray
 
 from pin_nonideal.types import Array, Placement
 
-LEDGER = ("kinetic", "potential", "total", "balance")  # columns of every ledger of energy
+LEDGER = ("kinetic", "potential", "total", "balance")  # columns of every energy ledger
 
 
 @dataclass(frozen=True, eq=False)
 class Event:
-    """Something that happened between two smooth stretches of motion.
+    """Instant between two smooth intervals of the motion, such as an impact or a change of mode.
 
     Attributes:
-        time: when [s].
-        kind: "stick", "slip" or "reverse" of a frictional element, "pull" of a contact or wheel that must
-            pull from now on, however it shares its load with others, "chatter" where a cluster of events was
-            bridged by time stepping, "several" from where on the laws allow other motions too, "paradox" from
-            where on "moreau" goes through modes that allow none; of contacts that may open "impact" with an
-            impulse, "touch_down" where one closes without, or its bouncing ends, and "lift_off" where one
-            opens; of joints with `EffortLimits` "saturate" where a drive is asked for more than it has, and
-            "desaturate" where it gives again what is asked; "jump" of a prescribed motion or length whose
-            rate jumps; "relaxed" of a contact from where on steps of "moreau" miss its laws, because no forces
-            meet them or none were found.
+        time: time of the event [s].
+        kind: kind of the event. Friction elements: "stick", "slip", "reverse". Contacts and wheels: "pull" if
+            the contact needs tension from this time on, for every distribution of its load. Clusters of
+            events: "chatter" if time stepping bridges a cluster. Ambiguity: "several" if the laws also allow
+            other motions from this time on, "paradox" if "moreau" continues from this time on through modes
+            that allow no motion. Unilateral contacts: "impact" with an impulse, "touch_down" if a gap closes
+            without an impulse or its rebounds end, "lift_off" if it opens. Joints with `EffortLimits`:
+            "saturate" if the demand on a drive exceeds its limit, "desaturate" if it returns below.
+            Prescribed motions and lengths: "jump" if the prescribed rate is discontinuous.
+            Time stepping: "relaxed" of a contact if steps of "moreau" violate its laws from this time on.
         element: name of the law, contact, joint or constraint.
-        impulse: of an impact [N s], (3,): along the contact's normal, then along its directions of slip; of a
-            jump (impulse, 0, 0), of the motion's row [N s or N m s].
-        energy_change: kinetic energy that an impact gave at this contact [J], negative for a loss; of a jump
-            the work of the motion's impulse.
+        impulse: impulse of an impact [N s], (3,), along the contact's normal, then along its slip directions;
+            for a jump (impulse, 0, 0) of the motion's row [N s or N m s].
+        energy_change: change of the kinetic energy by an impact at this contact [J], negative for a loss; for
+            a jump, the work of the motion's impulse.
         v_minus: velocity before an impact or jump, (nv,).
-        v_plus: velocity after it, (nv,).
-        miss: of "relaxed" the velocity by which the laws are missed [m/s or rad/s].
+        v_plus: velocity after an impact or jump, (nv,).
+        miss: velocity by which a "relaxed" step violates the laws [m/s or rad/s].
     """
 
     time: float
@@ -67,16 +67,16 @@ class Stats:
         evaluations: evaluations of Eq. (40).
         factorizations: factorizations of the constraint rows.
         projections: projections that moved the state.
-        iterations: passes of the implicit reaction equation.
+        iterations: iterations of the implicit reaction equation.
         wall_s: wall time [s].
-        signorini: in time stepping the largest miss of w_n >= 0, f_n >= 0, f_n w_n = 0 of contacts that may
-            open, as part of what is in play (`ConeResiduals`).
-        coulomb: that of |f_t| <= mu f_n.
-        dissipation: that of maximum dissipation.
-        limited_by_rounding: accepted steps whose error was the rounding of the accelerations, beyond the
-            tolerances: shorter steps would not have made it less.
-        rounding: largest rounding of an acceleration, as part of the largest one, where it was measured (in
-            runs of more than 20,000 adaptive steps of the core), else 0.
+        signorini: largest residual of w_n >= 0, f_n >= 0, f_n w_n = 0 of unilateral contacts in time
+            stepping, relative to the scale that `ConeResiduals` defines.
+        coulomb: largest residual of |f_t| <= mu f_n.
+        dissipation: largest residual of maximum dissipation.
+        limited_by_rounding: accepted steps whose error exceeds the tolerances because of rounding in the
+            accelerations; shorter steps would not reduce it.
+        rounding: largest rounding error of an acceleration relative to the largest acceleration; 0 if it was
+            not measured. It is measured in runs of more than 20,000 adaptive steps of the core.
     """
 
     steps: int = 0
@@ -95,15 +95,16 @@ class Stats:
 
 @dataclass(frozen=True, eq=False)
 class LawRecord:
-    """What one law did over a run.
+    """Force, power, limit and mode of one law over a run.
 
     Attributes:
-        name: of the law.
-        force: its part of C in M a = F + C + A^T lam, what sticks included [N or N m], (nt, nv), or None.
-        power: of that force [W], (nt,), or None.
-        limit: of its frictional element: static where it sticks, else kinetic [N or N m], (nt,), or
-            (nt, n) of a law of n elements; None without any, or not recorded.
-        mode: of its element, +1 or -1 for slip, 0 for stick, shaped alike, or None.
+        name: name of the law.
+        force: part of C in M a = F + C + A^T lam that belongs to the law, including sticking elements [N or N
+            m], (nt, nv), or None.
+        power: power of the force [W], (nt,), or None.
+        limit: friction limit of the law's element, static if it sticks, else kinetic [N or N m], (nt,), or
+            (nt, n) for a law of n elements; None without elements or if not recorded.
+        mode: mode of the element, +1 or -1 for slip, 0 for stick, with the shape of `limit`, or None.
     """
 
     name: str
@@ -115,13 +116,13 @@ class LawRecord:
 
 @dataclass(frozen=True, eq=False)
 class UserEventRecord:
-    """Where a function of the user was zero.
+    """Zeros of a function of the user.
 
     Attributes:
-        name: of the function.
-        t: times [s], (n,).
-        q: configurations there, (n, nq).
-        v: velocities there, (n, nv).
+        name: name of the function.
+        t: times of the zeros [s], (n,).
+        q: configurations at these times, (n, nq).
+        v: velocities at these times, (n, nv).
     """
 
     name: str
@@ -131,20 +132,20 @@ class UserEventRecord:
 
 
 class Sample(SimpleNamespace):
-    """A run at one instant: the fields of a Trajectory that were recorded, each without its first axis."""
+    """Run at one instant: the recorded fields of a Trajectory, each without its first axis."""
 
 
 @dataclass(frozen=True, eq=False)
 class JointRecord:
-    """What one joint did over a run; arrays (nt,) of a joint of one degree of freedom, else (nt, n).
+    """Motion of one joint over a run; arrays (nt,) for one degree of freedom, else (nt, n).
 
     Attributes:
-        name: of the joint.
-        q: its configuration [rad or m]; of an endless joint the angle, counted on over whole turns, and so
-            the last number of a planar joint, (x, y, angle).
-        v: its velocity.
-        a: its acceleration, or None; record "a".
-        tau: torque or force of the actuation in it [N m or N], or None; record "tau" or "forces".
+        name: name of the joint.
+        q: configuration [rad or m]. The angle of an unbounded joint is continuous over full turns, as is the
+            last number of a planar joint, (x, y, angle).
+        v: velocity.
+        a: acceleration, or None; record "a".
+        tau: torque or force of the actuation [N m or N], or None; record "tau" or "forces".
     """
 
     name: str
@@ -156,14 +157,14 @@ class JointRecord:
 
 @dataclass(frozen=True, eq=False)
 class FrameRecord:
-    """How one frame moved over a run.
+    """Motion of one frame over a run.
 
     Attributes:
-        name: of the frame.
-        translation: place of its origin in the world [m], (nt, 3).
-        rotation: its axes in the world, by columns, (nt, 3, 3).
-        velocity: of its origin, then of its rotation, in world axes [m/s; rad/s], (nt, 6); Pinocchio's
-            LOCAL_WORLD_ALIGNED.
+        name: name of the frame.
+        translation: position of the frame's origin in the world [m], (nt, 3).
+        rotation: rotation matrix to world axes, (nt, 3, 3).
+        velocity: linear velocity of the origin and angular velocity, in world axes [m/s; rad/s], (nt, 6), as
+            Pinocchio's LOCAL_WORLD_ALIGNED.
     """
 
     name: str
@@ -173,21 +174,21 @@ class FrameRecord:
 
     @property
     def placement(self) -> list[Placement]:
-        """Placement in the world, a pinocchio.SE3 for each sample."""
+        """Return the placement in the world, a pinocchio.SE3 for each sample."""
         import pinocchio as pin
 
         return [pin.SE3(R, p) for R, p in zip(self.rotation, self.translation, strict=True)]
 
 
 def angles(pairs: Array, v: Array, t: Array) -> Array:
-    """Angles of (cos, sin) pairs, counted on over whole turns, (nt,).
+    """Return continuous angles of (cos, sin) pairs over full turns, (nt,).
 
-    Between two samples the angle changes by the whole turns that bring it nearest to the mean of both
-    velocities times the time between.
+    The number of full turns between two samples is chosen so that the change is nearest to the mean of both
+    rates times the time difference.
 
     Args:
-        pairs: (nt, 2).
-        v: rate of the angle [rad/s], (nt,).
+        pairs: cosines and sines, (nt, 2).
+        v: rates of the angle [rad/s], (nt,).
         t: times [s], (nt,).
     """
     principal = np.arctan2(pairs[:, 1], pairs[:, 0])

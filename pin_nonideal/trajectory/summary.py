@@ -1,4 +1,4 @@
-"""A run in a few lines: its length, counters, energies and events, as `print` shows it."""
+"""Summary of a run, as `print` shows it: duration, counters, energies and events."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
-# Terms of the energy that are all shown; of more those that are not zero.
-FEW = 20
+# If there are more energy terms than this, only nonzero terms are shown.
+MAX_TERMS = 20
 
 
 def summary(run: Any) -> str:
-    """The lines.
+    """Return the summary of a run, a line for each kind of data.
 
     Args:
-        run: the Trajectory.
+        run: trajectory of the run.
     """
     s = run.stats
     span = f"{run.t[0]:g} to {run.t[-1]:g} s" if len(run.t) else "empty"
@@ -29,9 +29,9 @@ def summary(run: Any) -> str:
             f"  limited by rounding: {s.limited_by_rounding} of {s.steps} steps; accelerations are known "
             f"to {s.rounding:.0e} of the largest"
         )
-    if run.energy is not None and len(run.t):
+    if run.energy and len(run.t):
         at_end = {k: x[-1] for k, x in run.energy.items() if k != "balance"}
-        shown = ", ".join(f"{k} {x:.6g}" for k, x in at_end.items() if x != 0.0 or len(at_end) <= FEW)
+        shown = ", ".join(f"{k} {x:.6g}" for k, x in at_end.items() if x != 0.0 or len(at_end) <= MAX_TERMS)
         lines.append(f"  energy [J]: {shown}; balance {np.abs(run.energy['balance']).max():.1e}")
     if run.events:
         kinds = sorted({e.kind for e in run.events})

@@ -1,10 +1,11 @@
-"""Trajectory: what a run leaves behind, as arrays on one time line."""
+"""Trajectory: results of a run, as arrays on one time axis."""
 
 from __future__ import annotations
 
 import copy
 import dataclasses
 import os
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,69 +14,76 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pin_nonideal.errors import InputError
-from pin_nonideal.lazy_fields import MadeLater
+from pin_nonideal.errors import InputError, short_repr
+from pin_nonideal.html_tables import table
 from pin_nonideal.scene.scene import Scene
 from pin_nonideal.states.joint_layout import JointPlace
 from pin_nonideal.types import Array, Table
 from pin_nonideal.validation import array
+from pin_nonideal.validation import count as whole_number
 
 from .by_name import force_of, frame_record, joint_record, law_record, reaction_of
-from .columns import columns
+from .columns import columns, units
 from .dense_output import DenseOutput
+from .groups import RECORD_OF, GroupField
+from .lazy_fields import MadeLater
 from .records import Event, FrameRecord, JointRecord, LawRecord, Sample, Stats, UserEventRecord
 from .summary import summary
+
+# A line of the summary: its heading, with a unit or not, and the rest from ": " or the first digit on.
+SUMMARY_LINE = re.compile(r"([a-z]+(?: [a-z]+)*(?: \[J\])?)(?:: +| +(?=\d))(.*)")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Trajectory(MadeLater):
-    """Samples of a run; what was not recorded is None.
+    """Samples of a run; fields that were not recorded are None or empty tables.
 
     Attributes:
         t: times [s], (nt,).
         q: configurations, (nt, nq).
         v: velocities, (nt, nv).
-        violation: largest |residual| over all rows [m or rad], (nt,).
-        violation_rate: largest |rate| over all rows [m/s or rad/s], (nt,).
+        violation: maximum |residual| over all rows [m or rad], (nt,).
+        violation_rate: maximum |rate| over all rows [m/s or rad/s], (nt,).
         a: accelerations, (nt, nv); record "a".
         tau: torques of the actuation [N m or N], (nt, nv); record "tau" or "forces".
         F_ideal: ideal part of the force of constraint, (nt, nv), Eq. (39); record "forces".
-        F_nonideal: nonideal part, (nt, nv), Eq. (39); record "forces".  What sticks is part of it.
+        F_nonideal: nonideal part of the force of constraint, including the forces of sticking elements, (nt,
+            nv), Eq. (39); record "forces".
         lam: multipliers of all rows in M a = F + C + A^T lam, (nt, m); record "forces".
-        lam_ideal: multipliers of the ideal part alone, (nt, m); record "forces".
-        energy: ledger by column [J]: "kinetic", "potential", "total", then the work done since the start by
-            "actuation", "forces", "constraints", each law, and "projection"; "balance" is what is left and
-            must be zero.  Record "energy".
+        lam_ideal: multipliers of the ideal part, (nt, m); record "forces".
+        energy: energy ledger by column [J]: "kinetic", "potential", "total", then the work since the start by
+            "actuation", "forces", "constraints", each law, and "projection". "balance" is the difference of
+            the total energy and the work, and must be zero. Record "energy".
         power: power by column [W]: "actuation", "forces", "constraints", each law.  Record "power".
-        z: states of laws, (nt, nz), or None without any.
-        modes: mode of each frictional element, +1 or -1 for slip, 0 for stick, 2 where its contact is open,
-            (nt, ne).
+        z: states of laws, (nt, nz), or None if no law has states.
+        modes: mode of each frictional element, +1 or -1 for slip, 0 for stick, 2 for an open contact, (nt,
+            ne).
         closed: whether each contact is closed, in the order of the scene's `contact_names`, (nt, n).
-        limits: of each frictional element in its mode [N or N m], (nt, ne); record "laws" or "forces".
+        limits: limit of each frictional element in its mode [N or N m], (nt, ne); record "laws" or "forces".
         law_forces: part of C of each law by name, on the degrees of freedom `law_dofs`; record "laws" or
-            "forces".  See `law`.
-        reactions: by name of joint, anchor and contact [N; N m], (nt, 12): [force; moment] in its own axes,
-            then in world axes; record "reactions".  See `reaction`.
-        contact_forces: by name, force of each contact on the body of its frame, normal and friction, in world
-            axes [N], (nt, 3); record "forces".
-        grid: which samples lie on the grid that `output_dt` asks for, both ends among them, (nt,); all where
-            every step is a sample.
+            "forces". See `law`.
+        reactions: wrench by name of joint, anchor and contact [N; N m], (nt, 12): [force; moment] in its own
+            axes, then in world axes; record "reactions". See `reaction`.
+        contact_forces: force of each contact by name, on the body of the contact's frame, normal and
+            friction, in world axes [N], (nt, 3); record "forces".
+        grid: whether each sample lies on the grid of `output_dt`, which includes both ends, (nt,); all True
+            if every step is a sample.
         dense: interpolants of the steps, see `at`; record "dense".
-        user_events: of each function in `simulate(events=[...])`, when it was zero and the states there.
+        user_events: zeros of each function in `simulate(events=[...])`, with times and states.
         events: events in order of time.
-        stats: counters.
-        scene: the scene that ran; None in another process where it cannot be pickled, and after `load` where
-            no `load` of a robot had made it.
+        stats: counters of the run.
+        scene: scene of the run. It is None in another process if the scene cannot be pickled, and after
+            `load` if the scene was not created by the function `load`.
         element_names: names of the columns of `modes`.
-        element_laws: which law each of them belongs to.
+        element_laws: index of the law of each element.
         law_names: names of the laws.
-        law_dofs: degrees of freedom that each law acts on.
-        joints: where the values of each joint stand in `q` and `v`.
-        rows: by name of each constraint and contact, its first row in `lam`, the end of its rows, and
-            whether it is a contact.
-        name: of the scene.
-        notes: what to know of the run, such as an initial state that had to be moved onto the constraints.
-        failure: what stopped the run before its end, the message of its error; None when nothing did.
+        law_dofs: degrees of freedom on which each law acts.
+        joints: indices of each joint in `q` and `v`.
+        rows: first row in `lam`, end of the rows, and whether it is a contact, by name of each constraint and
+            contact.
+        name: name of the scene.
+        notes: notes on the run, such as a projection of the initial state onto the constraints.
+        failure: message of the error that stopped the run before its end, or None.
     """
 
     t: Array
@@ -115,7 +123,7 @@ class Trajectory(MadeLater):
     failure: str | None = None
 
     def __getstate__(self) -> Table:
-        # With its scene, where that can travel.
+        # The scene is included if it can be pickled.
         try:
             if self.scene is not None:
                 self.scene.__reduce__()
@@ -137,22 +145,29 @@ class Trajectory(MadeLater):
     def __str__(self) -> str:
         return summary(self)
 
-    def columns(self) -> dict[str, Array]:
-        """All that was recorded as named columns, (nt,) each: "t", "crank.q", "crank.v", "loop.lam.0", ...
+    def _repr_html_(self) -> str:
+        first, *lines = summary(self).split("\n")
+        parts = [SUMMARY_LINE.fullmatch(line.strip()) for line in lines]
+        rows = [found.groups() if found else (line,) for found, line in zip(parts, lines, strict=True)]
+        return table(f"Trajectory {first}", rows)
 
-        The names are those of joints, constraints, laws and ledgers, then of the field, then the number
-        within it; what belongs to no joint goes by its field alone.
+    def columns(self) -> dict[str, Array]:
+        """Return all recorded values as named columns, (nt,) each: "t", "crank.q", "loop.lam.0", ...
+
+        A name consists of the name of a joint, constraint, law or ledger, the field, and the number within
+        the field. Columns that belong to no joint have the name of their field only. A
+        space in a name becomes "_". The suffixes "_2", "_3", ... distinguish names that become equal.
         """
         return columns(self)
 
     def joint(self, name: str) -> JointRecord:
-        """What one joint did.
+        """Return the record of one joint.
 
         Args:
-            name: of a joint; "base" is the only floating one.
+            name: name of a joint; "base" is the only floating joint.
 
         Returns:
-            Its record; what was not recorded is None.
+            Record of the joint; fields that were not recorded are None.
 
         Raises:
             UnknownNameError: there is no such joint.
@@ -160,42 +175,43 @@ class Trajectory(MadeLater):
         return joint_record(self, name)
 
     def frame(self, name: str) -> FrameRecord:
-        """How one frame moved: its placement and velocity in the world, from the kinematics of the tree.
+        """Return the placement and velocity of one frame in the world, from the kinematics of the tree.
 
         Args:
-            name: of a frame or joint of the model.
+            name: name of a frame or joint of the model.
 
         Raises:
-            InputError: the run does not know its scene, which has the model.
+            InputError: the run has no scene, and therefore no model.
             UnknownNameError: there is no such frame.
         """
         return frame_record(self, name)
 
     def force(self, name: str) -> Array:
-        """What one constraint or contact exerts.
+        """Return the force of one constraint or contact.
 
         Args:
-            name: of a constraint or contact of the scene.
+            name: name of a constraint or contact of the scene.
 
         Returns:
-            Multipliers of a constraint's rows in M a = F + C + A^T lam, (nt, rows), those of an anchor the
-            force on the body of frame1 in the axes of frame2 [N; N m]; record "forces".  Of a contact the
-            force on the body of its frame in world axes [N], friction included, (nt, 3); record "reactions".
+            For a constraint, the multipliers of its rows in M a = F + C + A^T lam, (nt, rows); those of an
+            anchor are the force on the body of frame1 in the axes of frame2 [N; N m]; record "forces". For a
+            contact, the force on the body of its frame in world axes, with friction [N], (nt, 3); record
+            "reactions".
 
         Raises:
-            InputError: it was not recorded.
+            InputError: the force was not recorded.
             UnknownNameError: there is no such constraint or contact.
         """
         return force_of(self, name)
 
     def law(self, name: str) -> LawRecord:
-        """What one law did.
+        """Return the record of one law.
 
         Args:
-            name: of a law of the scene, or of a contact that rubs.
+            name: name of a law of the scene, or of a contact with friction.
 
         Returns:
-            Its record; what was not recorded is None.
+            Record of the law; fields that were not recorded are None.
 
         Raises:
             UnknownNameError: there is no such law.
@@ -203,24 +219,36 @@ class Trajectory(MadeLater):
         return law_record(self, name)
 
     def reaction(self, name: str, axes: str = "own") -> Array:
-        """What a joint, an anchor or a contact carries, all forces in it included: [force; moment], (nt, 6).
+        """Return the total wrench of a joint, an anchor or a contact: [force; moment] [N; N m], (nt, 6).
 
-        A joint's is exerted on the body that it moves, about its origin; it contains the drive and the
-        friction of the joint.  That of an anchor or contact is exerted on the body of frame1, about the
-        origin of frame1; it contains the friction of its laws.
+        The wrench of a joint acts on the body that the joint moves, about the joint's origin, and includes
+        the drive and the friction of the joint. The wrench of an anchor or contact acts on the body of
+        frame1, about the origin of frame1, and includes the friction of its laws.
+
+        The wrench through a fixed joint, or through a link, is exerted on the part beyond it, about its
+        origin: the rate of momentum of that part minus its weight and minus all other forces on it.  It is
+        computed from the inertias that Pinocchio keeps in the frames of fixed joints.  A fixed joint whose
+        link has no inertia there is massless.  The name of a link stands for the joint that carries it.
 
         Args:
-            name: of a joint of the model, or of an anchor or contact, which goes before a joint of its name.
-            axes: "own", the joint frame's or those of frame2, or "world".
+            name: name of a joint of the model, also of a fixed joint or a link, or of an anchor or contact,
+                which takes precedence over a joint of that name.
+            axes: "own" for the axes of the joint frame or of frame2, or "world".
 
         Raises:
-            InputError: the run did not record "reactions", or `axes` is neither.
-            UnknownNameError: nothing of that name carries a wrench.
+            InputError: the run did not record "reactions", or `axes` is invalid; for a fixed joint or link
+                also: the model has no inertia beyond it, the scene does not show on which side of it a joint,
+                constraint, contact or force acts, or the masses of the run differ from those of its scene.
+            UnknownNameError: no joint, link, anchor or contact has that name.
         """
         return reaction_of(self, name, axes)
 
     def to_dataframe(self) -> Any:
-        """The `columns` as a pandas.DataFrame, one row a sample, with the time as its index.
+        """Return the `columns` as a pandas.DataFrame, with a row for each sample and the time as index.
+
+        Returns:
+            The frame; `frame.attrs["units"]` has the unit of each column and of the index, such as "rad/s".
+            A unit is "1" for numbers without one, as in quaternions, and empty if the run does not know it.
 
         Raises:
             InputError: pandas is not installed.
@@ -232,24 +260,40 @@ class Trajectory(MadeLater):
                 f"to_dataframe needs pandas, which cannot be imported ({error}); pip install pandas, or take "
                 "run.columns()"
             ) from None
-        return pandas.DataFrame(self.columns()).set_index("t")
+        frame = pandas.DataFrame(self.columns()).set_index("t")
+        frame.attrs["units"] = units(self)
+        return frame
 
     def first(self, count: int) -> Trajectory:
-        """The first samples of a run.
+        """Return the first samples of a run, with the events up to the last of them.
 
         Args:
-            count: how many.
+            count: number of samples, at most all.
+
+        Raises:
+            InputError: `count` is not a number of samples.
         """
+        count = whole_number("first: count", count, most=len(self.t))
         last = float(self.t[count - 1]) if count else -np.inf
         events = [e for e in self.events if e.time <= last]
         return dataclasses.replace(self.samples(slice(count)), events=events)
 
     def samples(self, chosen: Any) -> Trajectory:
-        """Some of the samples, with all events.
+        """Return some of the samples, with all events.
 
         Args:
             chosen: mask (nt,), indices or slice of samples.
+
+        Raises:
+            InputError: `chosen` is none of these, or an index lies outside.
         """
+        try:
+            np.arange(len(self.t))[chosen]
+        except (IndexError, TypeError, ValueError):
+            raise InputError(
+                f"samples: chosen must be a mask, indices or a slice of {len(self.t)} samples"
+                f"; got {short_repr(chosen)}"
+            ) from None
 
         def cut(value: Any, key: str) -> Any:
             if isinstance(value, dict) and key != "rows":
@@ -259,21 +303,21 @@ class Trajectory(MadeLater):
         return Trajectory(**{key: cut(value, key) for key, value in self.__dict__.items()})
 
     def at(self, t: ArrayLike) -> Any:
-        """The run at any times, from the interpolants of its steps, with all that it recorded.
+        """Return the run at any times, from the interpolants of its steps, with all recorded fields.
 
-        Samples are put on the constraints, and forces evaluated there under the modes of the step; at an
-        event the step that follows it is taken.  The interpolant of dop853 is of degree 7: its local error is
-        of order 8 in the step, as the global one of the steps is; those of dopri5 and rk4 are of degree 4 and
-        3.
+        Samples are projected onto the constraints, and forces are evaluated there under the modes of the
+        step. At an event the step after the event is used. The interpolant of dop853 has degree 7, so that
+        its local error has order 8 in the step size, as the global error of the steps has. The interpolants
+        of dopri5 and rk4 have degrees 4 and 3.
 
         Args:
-            t: a time [s], or times, (k,).
+            t: time [s], or times, (k,).
 
         Returns:
-            A Sample with the fields of this class at one time, or a Trajectory at several.
+            A Sample with the fields of this class for one time, or a Trajectory for several times.
 
         Raises:
-            InputError: the run did not record "dense", does not know its scene, or a time lies outside.
+            InputError: the run did not record "dense", has no scene, or a time is outside of the run.
         """
         if self.dense is None:
             raise InputError('at(t) needs a run with record="dense"')
@@ -281,22 +325,22 @@ class Trajectory(MadeLater):
             raise InputError("at(t) needs the scene of the run, which this one has lost")
         times = array("at: t", t, (None,) if np.ndim(t) else ())
         run = Trajectory(**self.dense.at(self.scene, times.reshape(-1)))
-        if len(run) and run.energy is not None and self.energy is not None:
-            # The ledger balances from the start of the run on.
+        if len(run) and run.energy and self.energy:
+            # The balance is relative to the start of the run.
             run.energy["balance"] += run.energy["total"][0] - self.energy["total"][0]
         return run if np.ndim(t) else Sample(**run.samples(0).__dict__)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Writes all arrays to one .npz file; an existing file is replaced whole or not at all.
+        """Write all arrays to one .npz file; an existing file is replaced completely or not at all.
 
         Args:
-            path: file name; ".npz" is appended when it is missing.
+            path: file name; ".npz" is appended if it is missing.
 
         Returns:
-            The path written.
+            Path of the written file.
 
         Raises:
-            InputError: `path` is no name of a file.
+            InputError: `path` is not the name of a file.
             OutputError: the file cannot be written.
         """
         from .file import write
@@ -305,23 +349,23 @@ class Trajectory(MadeLater):
 
     @classmethod
     def load(cls, path: str | os.PathLike[str], scene: Scene | str | None = "source") -> Trajectory:
-        """Reads a file written by `save`; nothing in it is executed.
+        """Read a file written by `save`; no content of the file is executed.
 
         Args:
             path: file name.
-            scene: the scene of the run; "source" loads the robot again by the name and parameters that `load`
-                was given then, where there are some; None for none.
+            scene: scene of the run; "source" reloads the robot by the name and parameters of the original
+                `load`, if the file has them; None for no scene.
 
         Returns:
-            The trajectory.
+            Trajectory in the file.
 
         Raises:
-            InputError: `path` is no name of a file, or the scene is not the one of the run.
-            LoadingError: the file is missing, truncated, or no trajectory.
+            InputError: `path` is not the name of a file, or the scene is not the scene of the run.
+            LoadingError: the file is missing, truncated, or not a trajectory.
         """
         from .file import read
 
-        return restored(*read(path), path, scene)
+        return restore_trajectory(*read(path), path, scene)
 
 
 _DEFAULTS: Table = {}
@@ -329,36 +373,44 @@ _MAKERS: dict[str, Callable[[], Any]] = {}
 for _field in dataclasses.fields(Trajectory):
     if _field.default is not dataclasses.MISSING:
         _DEFAULTS[_field.name] = _field.default
-        delattr(Trajectory, _field.name)  # what `later` makes is not to be hidden by attributes of the class
+        # attributes of the class would hide the fields that `later` computes
+        delattr(Trajectory, _field.name)
     elif _field.default_factory is not dataclasses.MISSING and _field.name != "stats":
         _MAKERS[_field.name] = _field.default_factory
 
+for _name in RECORD_OF:
+    setattr(Trajectory, _name, GroupField(_name))
+
 
 def with_defaults(fields: Table) -> Table:
-    """All fields of a Trajectory but its counters: those given, and of all others the defaults."""
+    """Return all fields of a Trajectory except its counters: given fields, and defaults for the others."""
     made = {name: make() for name, make in _MAKERS.items() if name not in fields}
     return {**_DEFAULTS, **made, **fields}
 
 
-def restored(fields: Table, origin: Any, path: Any, scene: Scene | str | None) -> Trajectory:
-    """Trajectory of the content of a file, with its scene.
+def restore_trajectory(fields: Table, origin: Any, path: Any, scene: Scene | str | None) -> Trajectory:
+    """Return a Trajectory from the content of a file, with its scene.
 
     Args:
-        fields: of the trajectory.
+        fields: fields of the trajectory.
         origin: name and parameters for `load`, or None.
-        path: of the file, for messages.
-        scene: as for `Trajectory.load`.
+        path: path of the file, for messages.
+        scene: scene of the run, as in `Trajectory.load`.
 
     Raises:
-        InputError: the scene is not the one of the run.
-        LoadingError: the scene cannot be loaded again.
+        InputError: the scene is not the scene of the run.
+        LoadingError: the scene cannot be reloaded.
     """
-    from .file import fits, scene_again
+    from .file import described, matches_scene, reload_scene
 
     run = Trajectory(**fields)
     if scene == "source":
-        return dataclasses.replace(run, scene=scene_again(origin, run.joints, run.rows, run.notes))
-    if scene is not None and not (isinstance(scene, Scene) and fits(scene, run.joints, run.rows)):
-        name = scene.name if isinstance(scene, Scene) else scene
-        raise InputError(f'Trajectory.load: the scene "{name}" is not the one of the run in "{path}"')
+        return dataclasses.replace(run, scene=reload_scene(origin, run.joints, run.rows, run.notes))
+    if not (scene is None or isinstance(scene, Scene)):
+        raise InputError(f'Trajectory.load: scene must be a Scene, "source" or None; got {short_repr(scene)}')
+    if scene is not None and not matches_scene(scene, run.joints, run.rows):
+        raise InputError(
+            f'Trajectory.load: the scene "{scene.name}" is not the one of the run in "{path}", which has '
+            f"{described(run.joints, run.rows)}; pass the scene that was simulated, or scene=None"
+        )
     return dataclasses.replace(run, scene=scene)

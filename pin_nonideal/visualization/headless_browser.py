@@ -1,4 +1,4 @@
-"""A replay page in a browser without a window, asked through the browser's debugging door."""
+"""Replay page in a headless browser, controlled through the browser's debugging interface."""
 
 from __future__ import annotations
 
@@ -29,20 +29,20 @@ FLAGS = (
     "--enable-unsafe-swiftshader",
     "--remote-debugging-port=0",
 )
-READY = 60.0  # until the browser listens, the page is drawn, and it answers [s]
+TIMEOUT = 60.0  # time limit for the browser to start, to draw the page, and to answer [s]
 
 
 @asynccontextmanager
-async def opened(folder: Path, address: str, size: list[int]) -> AsyncIterator[Any]:
-    """A page in a browser without a window, as a function that evaluates expressions there.
+async def open_page(folder: Path, address: str, size: list[int]) -> AsyncIterator[Any]:
+    """Open a page in a headless browser, and yield a function that evaluates expressions in it.
 
     Args:
-        folder: for the browser's files, gone after it.
-        address: of the page.
+        folder: folder for the browser's temporary files.
+        address: address of the page.
         size: width and height of the window [pixels].
 
     Raises:
-        OutputError: there is no browser, or the page cannot be shown.
+        OutputError: no browser is found, or the page cannot be displayed.
     """
     from tornado.websocket import websocket_connect
 
@@ -60,7 +60,7 @@ async def opened(folder: Path, address: str, size: list[int]) -> AsyncIterator[A
     ]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
-        port, door = await _listening(profile / "DevToolsActivePort", process)
+        port, door = await _wait_for_port(profile / "DevToolsActivePort", process)
         socket = await websocket_connect(f"ws://127.0.0.1:{port}{door}", max_message_size=1 << 28)
         numbers = itertools.count(1)
 
@@ -69,7 +69,7 @@ async def opened(folder: Path, address: str, size: list[int]) -> AsyncIterator[A
             message = {"id": number, "method": method, "params": values}
             await socket.write_message(json.dumps(message | ({"sessionId": session} if session else {})))
             while True:
-                answer = await asyncio.wait_for(socket.read_message(), READY)
+                answer = await asyncio.wait_for(socket.read_message(), TIMEOUT)
                 if answer is None:
                     raise OutputError("render: the browser closed its connection")
                 heard = json.loads(answer)
@@ -89,7 +89,7 @@ async def opened(folder: Path, address: str, size: list[int]) -> AsyncIterator[A
                 raise OutputError(f"render: {answer['exceptionDetails'].get('text')}: {expression[:60]}")
             return answer.get("result", {}).get("value")
 
-        for _ in range(int(READY / 0.1)):
+        for _ in range(int(TIMEOUT / 0.1)):
             if await ask("Boolean(window.replayDone || window.replayError)"):
                 break
             await asyncio.sleep(0.1)
@@ -106,9 +106,9 @@ async def opened(folder: Path, address: str, size: list[int]) -> AsyncIterator[A
             process.wait()
 
 
-async def _listening(file: Path, process: subprocess.Popen[bytes]) -> tuple[int, str]:
-    """Port and path at which a browser that just started listens."""
-    for _ in range(int(READY / 0.05)):
+async def _wait_for_port(file: Path, process: subprocess.Popen[bytes]) -> tuple[int, str]:
+    """Return the port and path at which a starting browser listens."""
+    for _ in range(int(TIMEOUT / 0.05)):
         if file.is_file():
             lines = file.read_text(encoding="utf-8").split()
             if len(lines) == 2:

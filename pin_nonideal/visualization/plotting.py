@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pin_nonideal.atomic_files import file_path, whole_file
-from pin_nonideal.errors import InputError, OutputError
+from pin_nonideal.atomic_files import check_writable, file_path, whole_file
+from pin_nonideal.errors import InputError, OutputError, short_repr
 from pin_nonideal.visualization.page.figure_styles import Style
-from pin_nonideal.visualization.page.mode_timeline import bands_of, opens
-from pin_nonideal.visualization.page.signals import Plot, plots_of, several, wanted
+from pin_nonideal.visualization.page.mode_timeline import bands_of, has_open_contact
+from pin_nonideal.visualization.page.signals import Plot, parse_plots, plots_of, runs_and_names
 from pin_nonideal.visualization.page.style import MODES, UNKNOWN_MODE
 from pin_nonideal.visualization.page.xy_plots import Relation, friction_joints, is_relation, relations_of
 
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
 
 EVENT_STYLES = ((0, ()), (0, (4, 2)), (0, (1, 2)), (0, (4, 2, 1, 2)))
-# More events than this are drawn so thin that the curves stay visible; beyond the next, as their density.
-CROWD, CLOUD = 40, 400
-HATCHES = {1: "////", -1: "\\\\\\\\", 0: "", 2: "....", 3: "xxxx"}  # of modes in print
+# Number of events above which their lines become thin, and above which they are drawn as a density.
+MAX_THICK_EVENTS, MAX_EVENT_LINES = 40, 400
+HATCHES = {1: "////", -1: "\\\\\\\\", 0: "", 2: "....", 3: "xxxx"}  # hatches of modes in print
 
 
 def plot(
@@ -42,39 +42,47 @@ def plot(
     style: str | Mapping[str, Any] | None = None,
     names: Sequence[str] | None = None,
 ) -> Figure:
-    """Draws a run, or several in the same axes, one plot below the other, with the events marked.
+    """Draw a run, or several in the same axes, one plot below the other, with the events marked.
 
     Args:
-        run: what `simulate` returned, or a list of several.
-        path: file to write, in the format that its ending names (.png, .pdf, .svg); None writes none.
-        what: over time "q", "v", "a", "tau", "energy", "work", "power", "violation", "reactions", "contacts",
-            "gaps" (of contacts that open), "modes", names of joints, or pairs of a title "what [unit]" and
-            curves by label, (nt,) each; of one over another "phase", "phase JOINT" (velocity over position),
-            "friction", "friction LAW" (over slip velocity, with its limit) and "load", "load LAW" (friction
-            over what the bearing carries).  None: what suits the scene, as far as the run has it.
-        ax: matplotlib axes to draw one plot into, in place of a figure of its own.
+        run: trajectory of `simulate`, or a list of several.
+        path: file to write, in the format of its suffix (.png, .pdf, .svg); None writes no file.
+        what: names of plots. Over time: "q", "v", "a", "tau", "F_nonideal", "energy", "work", "power",
+            "violation", "reactions", "contacts", "gaps" (of unilateral contacts), "modes", names of joints,
+            or pairs of a title "name [unit]" and curves by label, (nt,) each. Quantities over each other:
+            "phase", "phase JOINT" (velocity over position), "friction", "friction LAW" (over slip velocity,
+            with its limit), "load", "load LAW" (friction over the load of the bearing). None selects plots by
+            the scene and the recorded fields.
+        ax: matplotlib axes for one plot, instead of a new figure.
         columns: 1 or 2 columns of a printed page, 85 or 176 mm wide; None for a screen.
-        title: heading; None for the scene's name on a screen and none in print, "" for none.
-        style: "screen", "paper" (dashes and markers that survive gray, text that stays text in .svg and .pdf)
-            or matplotlib settings by name; None: "paper" with `columns`, else "screen".
-        names: names of several runs; their numbers when None.
+        title: heading; None for the name of the scene on a screen and no heading in print, "" for no heading.
+        style: "screen", "paper" (dashes and markers for grayscale print, editable text in .svg and .pdf) or
+            matplotlib settings by name. None selects "paper" if `columns` is given, else "screen".
+        names: names of several runs; None for their numbers.
 
     Returns:
-        The matplotlib figure, to be changed, shown or saved.
+        Matplotlib figure, which can be changed, shown or saved. A notebook displays it as the result of
+            a cell.
 
     Raises:
-        InputError: something asked for was not recorded, `what` is empty or no list of plots, `ax` is given
-            for several plots, or `columns`, `style`, `title` or `names` are none of the above.
-        UnknownNameError: a name in `what` is none of the above.
-        OutputError: the file cannot be written, or matplotlib has no such format.
+        InputError: a requested field was not recorded, `what` is empty or not a list of plots, `ax` is given
+            for several plots, or `columns`, `style`, `title` or `names` are invalid.
+        UnknownNameError: a name in `what` is unknown.
+        OutputError: the file cannot be written, or matplotlib does not support its format.
     """
     import matplotlib as mpl
 
-    runs, labels = several(run, names, "a figure")
+    runs, labels = runs_and_names(run, names, "a figure")
+    target = None if path is None else file_path("plot: path", path)
+    if target is not None:
+        picture_format(target)
+        check_writable(target, "the figure")
     look = Style(columns, style)
     if title is not None and not isinstance(title, str):
-        raise InputError(f"plot: title must be a string or None; got {title!r}")
-    drawn = _asked(runs, usual(runs) if what is None else what)
+        raise InputError(f"plot: title must be a string or None; got {short_repr(title)}")
+    if ax is not None and not (hasattr(ax, "plot") and hasattr(ax, "figure")):
+        raise InputError(f"plot: ax must be axes of matplotlib; got {short_repr(ax)}")
+    drawn = _requested_plots(runs, default_plots(runs) if what is None else what)
     if ax is not None and len(drawn) != 1:
         raise InputError(f"plot: ax takes one plot; what asks for {len(drawn)}")
     settings: Any = look.settings
@@ -85,22 +93,22 @@ def plot(
             ax.set_title(heading)
         elif heading:
             figure.suptitle(heading, fontsize=12, fontweight="bold", x=0.01, ha="left")
-        if path is not None:
-            _save(figure, file_path("plot: path", path))
+        if target is not None:
+            _save(figure, target)
     return figure
 
 
-def usual(runs: Sequence[Trajectory]) -> list[str]:
-    """What suits a scene, as far as its runs have it.
+def default_plots(runs: Sequence[Trajectory]) -> list[str]:
+    """Return the default plots of a scene for which its runs have recorded fields.
 
     Args:
-        runs: of one scene.
+        runs: runs of one scene.
     """
     first = runs[0]
     found = ["q", "v", *(["energy"] if first.energy else [])]
     if first.scene.contacts and first.lam is not None:
         found.append("contacts")
-    if opens(first):
+    if has_open_contact(first):
         found.append("gaps")
     if first.scene.constraint_slices:
         found.append("violation")
@@ -112,9 +120,9 @@ def usual(runs: Sequence[Trajectory]) -> list[str]:
 Drawn = tuple[str, list[Any]]
 
 
-def _asked(runs: Sequence[Trajectory], what: Any) -> list[Drawn]:
-    """Each plot as its kind and what each run gives to it."""
-    items = wanted("plot: what", what)
+def _requested_plots(runs: Sequence[Trajectory], what: Any) -> list[Drawn]:
+    """Return each plot as its kind and its data of each run."""
+    items = parse_plots("plot: what", what)
     if not items:
         raise InputError("plot: what must name at least one plot; got none")
     found: list[Drawn] = []
@@ -136,14 +144,15 @@ def _asked(runs: Sequence[Trajectory], what: Any) -> list[Drawn]:
 def _figure(
     runs: Sequence[Trajectory], labels: Sequence[str], drawn: list[Drawn], look: Style, ax: Axes | None
 ) -> Figure:
-    """All plots, those over time with one axis of time."""
-    from matplotlib.figure import Figure  # no pyplot: a program that draws to files needs no window system
+    """Return the figure with all plots; plots over time share the time axis."""
+    # No pyplot, because drawing to files needs no window system.
+    from .notebook_figure import NotebookFigure
 
     if ax is not None:
         figure, axes = ax.figure, [ax]
     else:
         heights = [_height(kind, parts, look) for kind, parts in drawn]
-        figure = Figure(figsize=(look.width, sum(heights) + 0.7), layout="constrained")
+        figure = NotebookFigure(figsize=(look.width, sum(heights) + 0.7), layout="constrained")
         axes = list(figure.subplots(len(drawn), 1, squeeze=False, height_ratios=heights)[:, 0])
     timed = [place for place, (kind, _) in zip(axes, drawn, strict=True) if kind != "relation"]
     for place in timed[1:]:
@@ -168,20 +177,20 @@ def _figure(
 
 
 def _height(kind: str, parts: list[Any], look: Style) -> float:
-    """Height of a plot [inch]."""
+    """Return the height of a plot [inch]."""
     if kind == "modes":
         return 0.4 + 0.22 * len(bands_of(parts[0]))
     return look.height if kind == "time" else min(1.4 * look.height, 0.75 * look.width)
 
 
 def _limits(runs: Sequence[Trajectory]) -> tuple[float, float]:
-    """First and last time [s], apart also for a run of one sample."""
+    """Return the limits of the time axis [s], distinct also for a run of one sample."""
     first, last = min(float(run.t[0]) for run in runs), max(float(run.t[-1]) for run in runs)
     return (first, last) if last > first else (first - 0.5, first + 0.5)
 
 
 def _draw_plot(axes: Axes, parts: Sequence[Plot], labels: Sequence[str], look: Style) -> None:
-    """Curves over time, of all runs."""
+    """Draw curves over time, of all runs."""
     for number, item in enumerate(parts):
         for index, (label, values) in enumerate(item.curves.items()):
             shown = np.where(values > 0.0, values, np.nan) if item.log else values
@@ -195,7 +204,7 @@ def _draw_plot(axes: Axes, parts: Sequence[Plot], labels: Sequence[str], look: S
 
 
 def _draw_relation(axes: Axes, parts: Sequence[Relation], labels: Sequence[str], look: Style) -> None:
-    """One quantity over another, of all runs, and what the law allows as points."""
+    """Draw one quantity over another, of all runs, and the limits of the law as points."""
     for number, item in enumerate(parts):
         for index, (label, (x, y)) in enumerate(item.curves.items()):
             name = label if len(parts) == 1 else f"{label}, {labels[number]}"
@@ -222,19 +231,19 @@ def _finish(axes: Axes, look: Style) -> None:
 
 
 def _mark_events(axes: Axes, run: Trajectory, look: Style, legend: bool) -> None:
-    """A vertical line at each event, its style by the kind of event; of a cloud of them the density."""
+    """Mark each event by a vertical line whose style shows its kind, or many events by their density."""
     kinds = list(dict.fromkeys(str(event.kind) for event in run.events))
-    if len(run.events) > CLOUD:
+    if len(run.events) > MAX_EVENT_LINES:
         counts, edges = np.histogram([float(event.time) for event in run.events], bins=200)
         shade = counts / counts.max()
         colors = [(0.58, 0.64, 0.72, 0.6 * s) for s in shade]
-        low = axes.get_xaxis_transform()  # at the foot of the plot
+        low = axes.get_xaxis_transform()  # at the bottom of the plot
         axes.vlines((edges[1:] + edges[:-1]) / 2.0, 0.0, 0.06, colors, transform=low, lw=1.5)
         if legend:
             axes.plot([], [], color="#94a3b8", lw=3.0, label=f"{len(run.events)} events, by density")
             axes.legend(**look.legend())
         return
-    width = 0.8 if len(run.events) <= CROWD else 0.3
+    width = 0.8 if len(run.events) <= MAX_THICK_EVENTS else 0.3
     for event in run.events:
         style = EVENT_STYLES[kinds.index(str(event.kind)) % len(EVENT_STYLES)]
         axes.axvline(float(event.time), color="#cbd5e1", lw=width, ls=style, zorder=0.5)
@@ -246,7 +255,7 @@ def _mark_events(axes: Axes, run: Trajectory, look: Style, legend: bool) -> None
 
 
 def _draw_modes(axes: Axes, run: Trajectory, look: Style) -> None:
-    """A band for each element, colored by its mode."""
+    """Draw a band for each element, colored by its mode."""
     names, bands = [list(column) for column in zip(*bands_of(run), strict=True)]
     present = [mode for mode in MODES if any(piece[2] == mode for pieces in bands for piece in pieces)]
     for row, pieces in enumerate(bands):
@@ -272,13 +281,13 @@ def _print_mode(mode: int) -> dict[str, Any]:
 
 
 def picture_format(path: Path) -> str:
-    """The format that the ending of a file names.
+    """Return the format of a file by its suffix.
 
     Args:
-        path: the file.
+        path: path of the file.
 
     Raises:
-        OutputError: matplotlib writes no such format.
+        OutputError: matplotlib does not support the format.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
@@ -291,7 +300,7 @@ def picture_format(path: Path) -> str:
 
 
 def _save(figure: Figure, path: Path) -> None:
-    """The figure as a file, whole or not at all."""
+    """Write the figure to a file, completely or not at all."""
     picture = io.BytesIO()
     figure.savefig(picture, format=picture_format(path), dpi=160)
     with whole_file(path, "the figure") as stream:

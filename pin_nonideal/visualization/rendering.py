@@ -1,4 +1,4 @@
-"""Pictures and videos of a replay from the command line: its page in a browser without a window."""
+"""Pictures and videos of a replay from the command line, drawn by a headless browser."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from pin_nonideal.atomic_files import file_path, whole_file
+from pin_nonideal.atomic_files import check_writable, file_path, whole_file
 from pin_nonideal.errors import InputError, OutputError
 from pin_nonideal.trajectory.trajectory import Trajectory
 from pin_nonideal.validation import count, number, positive
 
-from .headless_browser import opened
+from .headless_browser import open_page
 from .replay import ReplayPage, replay
 
 ENDINGS = (".png", ".gif", ".webm", ".mp4")
@@ -26,14 +26,15 @@ CODECS = {
     ".mp4": ["-c:v", "libx264", "-preset", "veryfast", "-movflags", "+faststart"],
     ".webm": ["-c:v", "libvpx-vp9", "-deadline", "realtime", "-cpu-used", "6", "-crf", "30", "-b:v", "0"],
 }
-# Colors as players take them where a file says nothing: those of BT.709, of which black is 16 and white 235.
+# Color space that players assume for files without one: BT.709, with black at 16 and white at 235.
 COLORS = ["-vf", "scale=out_range=tv:out_color_matrix=bt709", "-pix_fmt", "yuv420p", "-color_range", "tv"]
 COLORS += ["-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709"]
-LARGEST, MOST_PICTURES = 16384, 100_000  # pixels of a side that browsers draw; an hour at 25 a second
-LEAST_FPS = 0.01  # a GIF knows no longer picture
-AT_ONCE = 8_000_000  # pixels of the pictures that the browser is asked for at once
-# Leaves the view alone on the page, as large as the window.
-ALONE = """(() => {
+# maximum side in browsers [pixels]; one hour at 25 pictures per second
+MAX_SIDE, MAX_PICTURES = 16384, 100_000
+MIN_FPS = 0.01  # limit of the GIF format
+MAX_PIXELS_AT_ONCE = 8_000_000  # maximum number of pixels of the pictures in one request to the browser
+# Hides everything on the page except the view, which fills the window.
+HIDE_CONTROLS = """(() => {
   const style = document.createElement("style");
   style.textContent = "#dock, #tools, #forces, #heading { display: none !important }"
     + "#stage { min-height: 0 }";
@@ -52,24 +53,24 @@ def render(
     time: float | None = None,
     forces: bool = True,
 ) -> Path:
-    """Renders the replay of a run to a picture or a video, with a Chromium or Chrome of the machine.
+    """Render the replay of a run to a picture or a video, with an installed Chromium or Chrome.
 
     Args:
-        run: what `simulate` returned.
+        run: trajectory of `simulate`.
         path: file to write: .png, .gif, .webm or .mp4, the last two by ffmpeg.
-        width: of the picture [pixels].
-        height: of the picture [pixels].
-        seconds: length of a video, in which the whole run is played [s].
-        fps: pictures a second of a video.
-        time: of a single picture [s]; a quarter of the run when None.
-        forces: False for a view without arrows.
+        width: width of the picture [pixels].
+        height: height of the picture [pixels].
+        seconds: duration of a video, which shows the whole run [s].
+        fps: pictures per second of a video.
+        time: time of a single picture [s]; None for a quarter of the run.
+        forces: whether force arrows are shown.
 
     Returns:
-        The path written.
+        Path of the written file.
 
     Raises:
-        InputError: the size, the length or the rate is not positive, or the run cannot be replayed.
-        OutputError: the ending is none of these, no browser or no ffmpeg is found, or the file cannot be
+        InputError: the size, the duration or the rate is not positive, or the run cannot be replayed.
+        OutputError: the suffix is not supported, no browser or no ffmpeg is found, or the file cannot be
             written.
     """
     if not isinstance(run, Trajectory):
@@ -78,28 +79,35 @@ def render(
     ending = target.suffix.lower()
     if ending not in ENDINGS:
         raise OutputError(f'render: "{target}" must end in one of {", ".join(ENDINGS)}')
+    check_writable(target, "the picture")
     size = [
-        count(f"render: {what}", x, least=1, most=LARGEST)
+        count(f"render: {what}", x, least=1, most=MAX_SIDE)
         for what, x in (("width", width), ("height", height))
     ]
     seconds, fps = positive("render: seconds", seconds), positive("render: fps", fps)
     encoder = _ffmpeg(ending) if ending in CODECS else ""
+    if not len(run):
+        raise InputError("render: run must have samples; got an empty one")
     start, length = float(run.t[0]), float(run.t[-1] - run.t[0])
-    if fps < LEAST_FPS:
-        raise InputError(f"render: fps must be at least {LEAST_FPS}; got {fps:g}")
-    if seconds * fps > MOST_PICTURES:
+    if time is not None and not start <= number("render: time", time) <= start + length:
         raise InputError(
-            f"render: seconds times fps must be at most {MOST_PICTURES} pictures; got {seconds * fps:g}"
+            f"render: time must lie in the run, from {start:g} to {start + length:g} s; got {time:g}"
+        )
+    if fps < MIN_FPS:
+        raise InputError(f"render: fps must be at least {MIN_FPS}; got {fps:g}")
+    if seconds * fps > MAX_PICTURES:
+        raise InputError(
+            f"render: seconds times fps must be at most {MAX_PICTURES} pictures; got {seconds * fps:g}"
         )
     frames = max(2, round(seconds * fps))
     times = [start + length * k / (frames - 1) for k in range(frames)]
     if ending == ".png":
-        times = [start + 0.25 * length if time is None else number("render: time", time)]
+        times = [start + 0.25 * length if time is None else float(time)]
     if ending in CODECS:
-        size = [x + x % 2 for x in size]  # both codecs halve the colors
+        size = [x + x % 2 for x in size]  # both codecs halve the color resolution
     page: ReplayPage = replay(run, forces=forces)
     kind = "image/png" if ending in (".png", ".gif") else "image/jpeg"
-    with ThreadPoolExecutor(max_workers=1) as thread:  # a notebook has a loop of its own running in this one
+    with ThreadPoolExecutor(max_workers=1) as thread:  # a notebook runs an event loop in this thread
         pictures = thread.submit(asyncio.run, _pictures(page.text, size, times, kind)).result()
     if ending in CODECS:
         content = _video(pictures, ending, fps, encoder)
@@ -111,14 +119,14 @@ def render(
 
 
 async def _pictures(text: str, size: list[int], times: list[float], kind: str) -> list[bytes]:
-    """The view of a page at some times, as files of that kind."""
+    """Return pictures of the view of a page at some times, as files of the given kind."""
     with tempfile.TemporaryDirectory() as folder:
         page = Path(folder) / "replay.html"
         page.write_text(text, encoding="utf-8")
-        async with opened(Path(folder), page.as_uri() + "#paused", size) as ask:
-            await ask(ALONE)
+        async with open_page(Path(folder), page.as_uri() + "#paused", size) as ask:
+            await ask(HIDE_CONTROLS)
             await ask("new Promise((done) => setTimeout(done, 200))")
-            await ask("(replay.showForces(true), replay.resetView())")  # small pages begin without arrows
+            await ask("(replay.showForces(true), replay.resetView())")  # small pages start without arrows
             return [
                 base64.b64decode(one)
                 for part in _parts(times, size)
@@ -127,13 +135,13 @@ async def _pictures(text: str, size: list[int], times: list[float], kind: str) -
 
 
 def _parts(times: list[float], size: list[int]) -> list[list[float]]:
-    """Times of the pictures that are asked for together: the page shows nothing between them."""
-    together = max(1, AT_ONCE // (size[0] * size[1]))
+    """Return groups of times whose pictures are requested together, because the page is blocked meanwhile."""
+    together = max(1, MAX_PIXELS_AT_ONCE // (size[0] * size[1]))
     return [times[k : k + together] for k in range(0, len(times), together)]
 
 
 def _gif(pictures: list[bytes], fps: float) -> bytes:
-    """Pictures as one that moves."""
+    """Return pictures as an animated GIF."""
     from PIL import Image
 
     frames = [Image.open(io.BytesIO(one)).convert("P", palette=Image.Palette.ADAPTIVE) for one in pictures]
@@ -145,7 +153,7 @@ def _gif(pictures: list[bytes], fps: float) -> bytes:
 
 
 def _ffmpeg(ending: str) -> str:
-    """The ffmpeg on the path, or else that of imageio-ffmpeg."""
+    """Return the path of ffmpeg, or of the executable in imageio-ffmpeg."""
     found = shutil.which("ffmpeg")
     if found is None:
         try:
@@ -161,7 +169,7 @@ def _ffmpeg(ending: str) -> str:
 
 
 def _video(pictures: list[bytes], ending: str, fps: float, encoder: str) -> bytes:
-    """Pictures as a video that ffmpeg encodes."""
+    """Return pictures as a video, encoded by ffmpeg."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"video{ending}"
         read = ["-y", "-loglevel", "error", "-f", "image2pipe", "-framerate", f"{fps:g}", "-i", "-"]

@@ -52,7 +52,7 @@ class TestRun:
         run = pn.Trajectory.load(path)
         assert run.a is not None
         assert run.F_ideal is not None
-        assert run.energy is None
+        assert not run.energy
 
     def test_fixed_step_method(self, tmp_path: Path) -> None:
         path = tmp_path / "run.npz"
@@ -71,7 +71,7 @@ class TestRun:
         assert plot.read_bytes().startswith(b"\x89PNG")
         run = pn.Trajectory.load(save)
         assert run.F_ideal is not None
-        assert run.energy is not None
+        assert run.energy
         out = capsys.readouterr().out
         assert [f"wrote {path}" in out for path in (html, plot, save)] == [True, True, True]
 
@@ -229,10 +229,25 @@ class TestInterrupt:
 
 
 class TestListInfoBench:
-    def test_list_names_the_robots(self, capsys: pytest.CaptureFixture[str]) -> None:
+    def test_list_names_the_robots_and_the_examples(self, capsys: pytest.CaptureFixture[str]) -> None:
         assert main(["list"]) == 0
-        names = [line.split()[0] for line in capsys.readouterr().out.splitlines()]
-        assert {"four_bar", "slider_crank", "five_bar", "andrews_squeezer"} <= set(names)
+        robots, found = capsys.readouterr().out.split("examples: pin-nonideal example NAME\n")
+        assert robots.startswith("robots: pin-nonideal run NAME\n")
+        names = [[line.split()[0] for line in text.splitlines()] for text in (robots, found)]
+        assert {"four_bar", "slider_crank", "five_bar", "andrews_squeezer"} <= set(names[0])
+        assert {"paper_a_particle", "paper_b_ring", "paper_c_incline", "gripper"} <= set(names[1])
+
+    def test_an_example_writes_its_figure(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        monkeypatch.chdir(tmp_path)
+        assert main(["example", "friction_loaded_joint"]) == 0
+        assert capsys.readouterr().out.endswith("wrote friction_loaded_joint.png\n")
+        assert (tmp_path / "friction_loaded_joint.png").stat().st_size > 1000
+
+    def test_an_unknown_example_is_an_error(self, capsys: pytest.CaptureFixture[str]) -> None:
+        assert main(["example", "griper"]) == EXIT_ERROR
+        assert error_line(capsys) == 'pin-nonideal: error: no example "griper"; nearest: "gripper"'
 
     def test_info(self, capsys: pytest.CaptureFixture[str]) -> None:
         assert main(["info", "four_bar"]) == 0

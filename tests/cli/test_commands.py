@@ -25,7 +25,7 @@ def fails(capsys, words):
 def test_states_by_name(tmp_path, capsys):
     path = folder(tmp_path, "model: {free_flyer: true}", robot(link("base"), *ARM[1:5]))
     out = tmp_path / "run.npz"
-    states = ["--q0", "elbow=0.5", "--q0", "base.xyz=0,0,1", "--q0", "base.rpy=0,0,1", "--v0", "shoulder=2"]
+    states = ["--q", "elbow=0.5", "--q", "base.xyz=0,0,1", "--q", "base.rpy=0,0,1", "--v", "shoulder=2"]
     assert main(["run", str(path), *ONE, *states, "--save", str(out), "--quiet"]) == 0
     assert capsys.readouterr().out == ""
     run = pn.Trajectory.load(out)
@@ -33,9 +33,9 @@ def test_states_by_name(tmp_path, capsys):
     expected = pn.simulate(pn.load(path), 0.1, q=q, v={"shoulder": 2.0})
     np.testing.assert_array_equal(run.q, expected.q)
     words = ["run", str(path), *ONE]
-    assert '--q0 elbow=0.5 or --q0 base.xyz=0,0,1; got "elbow"' in fails(capsys, [*words, "--q0", "elbow"])
-    assert 'no joint "elbw"; nearest: "elbow"' in fails(capsys, [*words, "--q0", "elbw=1"])
-    assert 'got "elbow=up"' in fails(capsys, [*words, "--v0", "elbow=up"])
+    assert '--q elbow=0.5 or --q base.xyz=0,0,1; got "elbow"' in fails(capsys, [*words, "--q", "elbow"])
+    assert 'no joint "elbw"; nearest: "elbow"' in fails(capsys, [*words, "--q", "elbw=1"])
+    assert 'got "elbow=up"' in fails(capsys, [*words, "--v", "elbow=up"])
 
 
 def test_events_are_printed(capsys):
@@ -153,13 +153,14 @@ def test_samples_from_a_file(tmp_path, capsys):
 def test_completion(shell, capsys):
     assert main(["completion", shell]) == 0
     script = capsys.readouterr().out
-    for word in ("equilibrium", "four_bar", "checkpoint", "output-dt"):
+    for word in ("equilibrium", "four_bar", "checkpoint", "output-dt", "example", "gripper"):
         assert word in script
     if shell == "bash" and shutil.which("bash"):
-        asked = (
-            'COMP_WORDS=(pin-nonideal equilibrium four); COMP_CWORD=2; _pin_nonideal; echo "${COMPREPLY[@]}"'
-        )
-        told = subprocess.run(
-            ["bash", "-c", f"{script}\n{asked}"], capture_output=True, text=True, check=True
-        )
-        assert "four_bar" in told.stdout.split()
+        for words, name in (("equilibrium four", "four_bar"), ("example grip", "gripper")):
+            asked = (
+                f'COMP_WORDS=(pin-nonideal {words}); COMP_CWORD=2; _pin_nonideal; echo "${{COMPREPLY[@]}}"'
+            )
+            told = subprocess.run(
+                ["bash", "-c", f"{script}\n{asked}"], capture_output=True, text=True, check=True
+            )
+            assert name in told.stdout.split()

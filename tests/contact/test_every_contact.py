@@ -17,7 +17,7 @@ import pytest
 
 import pin_nonideal as pn
 from pin_nonideal.description import contacts
-from pin_nonideal.visualization.page.contact_points import touches_of, touching_marks
+from pin_nonideal.visualization.page.contact_points import contact_point_marks, contact_points
 from pin_nonideal.visualization.page.force_arrows import arrows_of
 from pin_nonideal.visualization.page.frames import sample
 from pin_nonideal.visualization.page.friction_glyphs import elements_of
@@ -216,7 +216,7 @@ def test_checkpoints_go_on_with_it_bit_by_bit(case: Case, run: Any, kept: Any, t
 def test_arrows_act_where_it_touches(case: Case, run: Any) -> None:
     motion = sample(run)
     arrows = [
-        arrow for arrow in arrows_of(run, motion, touches_of(run, motion)) if arrow.name.startswith("it")
+        arrow for arrow in arrows_of(run, motion, contact_points(run, motion)) if arrow.name.startswith("it")
     ]
     assert arrows
     if case.place is None:  # generalized force
@@ -233,8 +233,8 @@ def test_marks_and_modes_are_where_it_touches(case: Case, run: Any) -> None:
     if case.place is None:
         return
     motion, scene_marks = sample(run), marks_of(run.scene)
-    touches = touches_of(run, motion)
-    (mark,) = [*scene_marks, *touching_marks(touches, motion, scene_marks)]
+    touches = contact_points(run, motion)
+    (mark,) = [*scene_marks, *contact_point_marks(touches, motion, scene_marks)]
     (element,) = elements_of(run, motion, scene_marks, touches)
     body = run.scene.model.getJointId("z")
     assert (mark.name, mark.kind, mark.joint1, element.joint) == ("it", "contact", body, body)
@@ -269,7 +269,7 @@ def test_kept_contacts_and_stops_without_names_are_told_apart() -> None:
         run = pn.simulate(both, 0.3, record="forces")
         motion = sample(run)
         arrows = {
-            arrow.name: arrow.values[-1, 2] for arrow in arrows_of(run, motion, touches_of(run, motion))
+            arrow.name: arrow.values[-1, 2] for arrow in arrows_of(run, motion, contact_points(run, motion))
         }
         carries = "kept" if group is groups[0] else "it"
         assert list(arrows) == [carries]

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import pin_nonideal as pn
-from pin_nonideal.geometry.cylinder import FACE_CIRCLE, LEAST_ROUNDING, PASSED_ON
+from pin_nonideal.geometry.cylinder import DEFAULT_ROUNDING, FACE_CIRCLE_RATIO, SIDE_INSET
 
 from ..geometry.test_geometry_pairs import EXACT, by_coal, pair, placements, shape
 from ..geometry.test_revolved_pairs import (
@@ -175,7 +175,7 @@ def lying(x=0.0, y=0.0):
     return pin.SE3(pin.rpy.rpyToMatrix(0.5 * np.pi, 0.0, 0.0), np.array([x, y, 0.0]))
 
 
-BACK = 2.0 * PASSED_ON * LEAST_ROUNDING * 0.1  # inset of both sides at their crossing [m]
+BACK = 2.0 * SIDE_INSET * DEFAULT_ROUNDING * 0.1  # inset of both sides at their crossing [m]
 # Shape, fixed shape, placement, and minimum number of contact points.
 AT_REST = {
     "can on can": (CAN, coal.Cylinder(0.1, 0.4), HERE, [0.0, 0.0, 0.35, *LEVEL], 8),
@@ -240,7 +240,7 @@ def test_a_stack_of_three():
 def test_a_can_over_the_rim_of_another(part, falls):
     """The can stands while its weight acts inside chords of both faces, and falls beyond the rim."""
     turn = np.pi / 8.0  # rotates the chords across the direction to the rim
-    reach = 0.1 if falls else FACE_CIRCLE * 0.1 * np.cos(turn)
+    reach = 0.1 if falls else FACE_CIRCLE_RATIO * 0.1 * np.cos(turn)
     below = pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, turn), np.zeros(3))
     run = resting(CAN, [(CAN, below)], [[part * reach, 0.0, 0.3, *turned(z=turn)]])
     if falls:
@@ -265,14 +265,14 @@ def test_a_can_stands_on_the_rim_of_another(lean):
     rows = scene._compiled.program.runner().rows(run.q[-1], np.zeros(1), 0.0)[0].reshape(-1, 1)
     assert run.lam[-1, carried[0]] * rows[carried[0], 0] == pytest.approx(GRAVITY, abs=1e-9)
     exact = distance(CAN, pin.SE3(np.eye(3), np.array([0.0, 0.0, run.q[-1, 0]])), CAN, below)
-    assert abs(exact) < ROUNDED_OFF * LEAST_ROUNDING * 0.1
+    assert abs(exact) < ROUNDED_OFF * DEFAULT_ROUNDING * 0.1
 
 
 @pytest.mark.parametrize("order", [1, -1])
 def test_a_can_rolls_over_a_can_that_lies_crosswise(order):
     """Rolling without slip; the reference is a separate integration of a block on a cylinder."""
     size, thick, inertia = 0.4, 0.1, 0.03
-    by = PASSED_ON * LEAST_ROUNDING * thick  # inset of the sides
+    by = SIDE_INSET * DEFAULT_ROUNDING * thick  # inset of the sides
     radius, half = size - by, thick - by
 
     def rate(_, y):

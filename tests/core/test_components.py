@@ -79,7 +79,7 @@ def test_what_is_recorded_moves_nothing() -> None:
 def test_rollout_gives_the_bits_of_simulate() -> None:
     scene, q = pendulums([0, 1, 2, 3], LOADED)
     starts = q + np.linspace(0.0, 0.3, 5)[:, None]
-    runs = pn.rollout(scene, starts, np.zeros_like(starts), 0.7, threads=2)
+    runs = pn.rollout(scene, starts, np.zeros_like(starts), 0.7, jobs=2)
     for start, run in zip(starts, runs, strict=True):
         alone = pn.simulate(scene, 0.7, q=start)
         assert (run.t == alone.t).all()

@@ -109,9 +109,7 @@ def test_arrays_are_the_samples_of_simulate(scene: pn.Scene, method: str, thread
     starts_v = v + np.linspace(0.0, 0.2, 7)[:, None] * (v != 0.0)
     starts_q = np.tile(q, (7, 1))
     steps = {"dt": 1e-3} if method == "rk4" else {}
-    runs = pn.rollout(
-        scene, starts_q, starts_v, 0.02, method=method, threads=threads, as_arrays=True, **steps
-    )
+    runs = pn.rollout(scene, starts_q, starts_v, 0.02, method=method, jobs=threads, as_arrays=True, **steps)
     assert len(runs) == 7
     assert not runs.failures
     for i in range(7):

@@ -129,7 +129,7 @@ MISFITS = {
     "gain of a ball joint": (
         {"actuation": pn.HoldPosition(np.ones(12), 1.0)},
         'HoldPosition: kp must be zero on joint "j2", whose configuration is no vector; '
-        "drive it by a function",
+        "drive it by a function or by a TrackTrajectory",
     ),
     "held configuration": (
         {"actuation": pn.HoldPosition(1.0, 1.0, q=scaled(2, 4, 2.0))},

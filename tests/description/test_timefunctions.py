@@ -93,7 +93,7 @@ REFUSED = {
     "constant of nan": (lambda: constant(math.nan), "Constant: value must be finite; got nan"),
     "sinusoid of infinity": (
         lambda: sinusoid(1.0, math.inf),
-        "Sinusoid: frequency must be finite; got inf",
+        "Sinusoid: omega must be finite; got inf",
     ),
     "polynomial of a number": (
         lambda: polynomial(3),

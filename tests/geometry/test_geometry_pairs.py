@@ -11,7 +11,7 @@ import pytest
 
 import pin_nonideal as pn
 from pin_nonideal.description.contacts.convex_hull import shrunk
-from pin_nonideal.geometry.manifold import LEAST_ROUNDING
+from pin_nonideal.geometry.manifold import DEFAULT_ROUNDING
 
 from ..support.mechanisms import body, empty, frame
 
@@ -65,7 +65,7 @@ def as_modelled(kind, other, edge):
     Rims of a cylinder or cone are inset behind its faces; pairs of solids with flat faces are rounded.
     """
     if kind in ("cylinder", "cone") and other == "half-space":
-        back = LEAST_ROUNDING * RADIUS
+        back = DEFAULT_ROUNDING * RADIUS
         up = 0.0 if kind == "cylinder" else 0.5 * back
         make = coal.Cylinder if kind == "cylinder" else coal.Cone
         return make(RADIUS, 2.0 * HALF - (2.0 * back if kind == "cylinder" else back)), up, 0.0

@@ -11,7 +11,7 @@ from scipy.optimize import minimize_scalar
 
 import pin_nonideal as pn
 from pin_nonideal.description.contacts.convex_hull import shrunk
-from pin_nonideal.geometry.cylinder import FACE_CIRCLE, FACE_POINTS, LEAST_ROUNDING, PASSED_ON
+from pin_nonideal.geometry.cylinder import DEFAULT_ROUNDING, FACE_CIRCLE_RATIO, FACE_POINTS, SIDE_INSET
 
 from ..support.mechanisms import GRAVITY, body, empty
 from ..support.same_run import assert_same_run
@@ -46,7 +46,7 @@ def shape(kind):
 def octagons(kind):
     """Return octagons of the face points, as pyramids with an apex close behind the face."""
     turns = 2.0 * np.pi / FACE_POINTS * np.arange(FACE_POINTS)
-    ring = FACE_CIRCLE * RADIUS * np.column_stack([np.cos(turns), np.sin(turns), np.zeros(FACE_POINTS)])
+    ring = FACE_CIRCLE_RATIO * RADIUS * np.column_stack([np.cos(turns), np.sin(turns), np.zeros(FACE_POINTS)])
     ends = [-HALF] if kind == "cone" else [-HALF, HALF]
     ways = np.array([[0.0, 0.0, end] for end in ends])
     return [convex(np.vstack([ring + way, (1.0 - BEHIND / HALF) * way])) for way in ways]
@@ -130,7 +130,7 @@ class Modelled:
     """
 
     def __init__(self, other, kind, edge, back):
-        side = stood_back(kind, back, PASSED_ON * (edge or back))
+        side = stood_back(kind, back, SIDE_INSET * (edge or back))
         plates, whole = [(plate, HERE) for plate in octagons(kind)], (shape(kind), HERE)
         self.slices = []
         if other == "capsule":
@@ -165,7 +165,7 @@ class Modelled:
 def modelled_as(scene, other, kind, rounding=None):
     """Return the modeled shapes of the contacts of a scene."""
     edge = max((c.radius2 for c in scene.contacts if isinstance(c, pn.RimContact)), default=0.0)
-    return Modelled(other, kind, edge, LEAST_ROUNDING * RADIUS if rounding is None else rounding)
+    return Modelled(other, kind, edge, DEFAULT_ROUNDING * RADIUS if rounding is None else rounding)
 
 
 @pytest.mark.parametrize("other", OTHERS)
@@ -226,7 +226,7 @@ AT_REST = {
     "capsule across can": (coal.Capsule(0.05, 0.3), coal.Cylinder(0.1, 0.4), 0.25, LYING),
     "lying can": (CAN, TABLES[0], 0.3, LYING),
     "lying can on mesh": (CAN, TABLES[1], 0.3, LYING),
-    "lying can across box": (CAN, coal.Box(1.0, 0.1, 0.4), 0.3 - PASSED_ON * LEAST_ROUNDING * 0.1, LYING),
+    "lying can across box": (CAN, coal.Box(1.0, 0.1, 0.4), 0.3 - SIDE_INSET * DEFAULT_ROUNDING * 0.1, LYING),
     "can half on box": (coal.Cylinder(0.1, 0.3), coal.Box(0.23, 0.9, 0.4), 0.35, LEVEL),
 }
 
@@ -275,7 +275,7 @@ def test_a_can_rolls_down_a_face(fixed):
 def test_a_plank_rocks_on_a_lying_cylinder():
     """Without slipping: the motion of a block on a cylinder, by an integration of its own."""
     size, thick, inertia = 0.4, 0.1, 0.03
-    radius = size - PASSED_ON * LEAST_ROUNDING * thick  # effective radius of the side for edges
+    radius = size - SIDE_INSET * DEFAULT_ROUNDING * thick  # effective radius of the side for edges
 
     def rate(_, y):
         angle, spin = y
@@ -317,7 +317,7 @@ def test_a_can_falls_on_two_rails(mu, turn):
     scene = pn.Scene(model, contacts=contacts, collision_model=geometry)
     q = [0.0, 0.1, 0.1, *pin.Quaternion(pin.rpy.rpyToMatrix(0.0, 0.0, turn)).coeffs()]
     run = pn.simulate(scene, 1.0, q=q, record=("energy", "forces"))
-    edge = LEAST_ROUNDING * 0.2
+    edge = DEFAULT_ROUNDING * 0.2
     height = np.sqrt((0.1 + edge) ** 2 - (0.06 + edge) ** 2) - edge
     assert run.q[-1, [0, 2]] == pytest.approx([0.0, height], abs=1e-9)
     assert run.lam[-1].min() >= 0.0
@@ -374,7 +374,7 @@ def test_a_file_with_a_tube_that_falls_on_its_base(tmp_path):
     run = pn.simulate(scene, 1.5, record="forces")
     (angle,) = run.q[-1]
     # The rim's lowest point, at 0.5 along the arm and 0.05 beside it, is at the height of the face.
-    reach = 0.5 - LEAST_ROUNDING * 0.05
+    reach = 0.5 - DEFAULT_ROUNDING * 0.05
     assert reach * np.sin(angle) + 0.05 * np.cos(angle) == pytest.approx(0.3, abs=1e-9)
     assert run.v[-1] == 0.0
     run.save(tmp_path / "run.npz")

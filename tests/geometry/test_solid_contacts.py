@@ -9,7 +9,7 @@ import pytest
 
 import pin_nonideal as pn
 from pin_nonideal.description.contacts.convex_hull import convex_hull, shrunk
-from pin_nonideal.geometry.manifold import LEAST_ROUNDING
+from pin_nonideal.geometry.manifold import DEFAULT_ROUNDING
 
 from ..support.mechanisms import GRAVITY, body, empty, frame
 from ..support.same_run import assert_same_run
@@ -176,8 +176,8 @@ THROWN = {
     "capsule at mesh": (coal.Capsule(0.04, 0.3), convex(MESH), 0.0),
     "sphere at cylinder": (coal.Sphere(0.05), coal.Cylinder(0.15, 0.3), 0.0),
     "sphere at cone": (coal.Sphere(0.05), coal.Cone(0.2, 0.4), 0.0),
-    "box at mesh": (BRICK, MESH, LEAST_ROUNDING * least_edge(BRICK, MESH)),
-    "mesh at mesh": (STONE, MESH, LEAST_ROUNDING * least_edge(STONE, MESH)),
+    "box at mesh": (BRICK, MESH, DEFAULT_ROUNDING * least_edge(BRICK, MESH)),
+    "mesh at mesh": (STONE, MESH, DEFAULT_ROUNDING * least_edge(STONE, MESH)),
 }
 
 

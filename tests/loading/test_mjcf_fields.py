@@ -11,7 +11,7 @@ from oracles import mujoco_motion
 from pin_nonideal.errors import LoadingError
 from pin_nonideal.loading.mjcf import fields
 from pin_nonideal.loading.mjcf.reader import translate
-from pin_nonideal.loading.mjcf.unsupported import ALLOWED, Told
+from pin_nonideal.loading.mjcf.unsupported import ALLOWED, UnsupportedFeatures
 from pin_nonideal.loading.yaml.assembly import scene_arguments
 
 from ..support.refusals import refuses
@@ -57,14 +57,14 @@ def fields_of(thing):
 
 def test_every_field_of_the_model_is_on_a_list():
     model = mujoco.MjModel.from_xml_string(RICH)
-    assert [name for name in fields_of(model) if not fields.known(name)] == []
-    listed = " ".join((fields.CARRIED, fields.TOLD, fields.DERIVED)).split()
+    assert [name for name in fields_of(model) if not fields.is_listed(name)] == []
+    listed = " ".join((fields.CONVERTED, fields.REPORTED, fields.DERIVED)).split()
     assert [name for name in set(listed) if listed.count(name) > 1] == []
     assert [name for name in listed if not hasattr(model, name)] == []
 
 
 def test_every_option_and_flag_is_on_a_list():
-    options = " ".join((fields.CARRIED_OPTIONS, fields.TOLD_OPTIONS, fields.IDLE_OPTIONS)).split()
+    options = " ".join((fields.CONVERTED_OPTIONS, fields.REPORTED_OPTIONS, fields.IGNORED_OPTIONS)).split()
     assert sorted(options) == sorted(fields_of(mujoco.MjOption()))
     heeded = "CONSTRAINT EQUALITY FRICTIONLOSS LIMIT CONTACT SPRING DAMPER GRAVITY CLAMPCTRL ACTUATION"
     numerics = "WARMSTART FILTERPARENT REFSAFE SENSOR MIDPHASE EULERDAMP AUTORESET NATIVECCD ISLAND MULTICCD"
@@ -75,14 +75,14 @@ def test_every_option_and_flag_is_on_a_list():
 def numbers_of(text):
     """Names of the carried fields of floats that a file of this text fills."""
     model = mujoco.MjModel.from_xml_string(text)
-    names = fields.CARRIED.split()
+    names = fields.CONVERTED.split()
     arrays = {name: np.asarray(getattr(model, name)) for name in names if name != "opt"}
     return [name for name, a in arrays.items() if a.dtype.kind == "f" and a.size and a.ndim]
 
 
 def accelerations(model):
-    told = Told("", ALLOWED, [])
-    robot, _ = translate(mujoco, model, "rich", told)
+    unsupported = UnsupportedFeatures("", ALLOWED, [])
+    robot, _ = translate(mujoco, model, "rich", unsupported)
     robot.q0 = None
     scene = pn.Scene(**scene_arguments(robot, {}, "rich", merge=False))
     rng = np.random.default_rng(4)

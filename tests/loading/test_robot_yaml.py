@@ -92,7 +92,7 @@ notes: [built for a test]
 gravity: [0, 0, -1.62]
 constraints:
   - PointAnchor: {frame1: hand, frame2: wall, axes: xz, name: loop}
-  - PrescribedMotion: {joint: shoulder, function: {sinusoid: {amplitude: 1e-1, frequency: 2.0}}}
+  - PrescribedMotion: {joint: shoulder, function: {sinusoid: {amplitude: 1e-1, omega: 2.0}}}
   - Distance: {frame1: hand, frame2: wall, length: {polynomial: {coefficients: [1.0, 0.5]}}, name: rope}
 laws:
   - JointFriction: {joint: elbow, mu: 0.1, radius: 0.02}
@@ -139,6 +139,27 @@ def test_gains_go_to_the_motors(tmp_path):
 def test_torques_by_joint_name(tmp_path):
     scene = pn.load(folder(tmp_path, "actuation:\n  torques: {elbow: -0.5}\n"))
     np.testing.assert_array_equal(scene.actuation, [0.0, -0.5])
+
+
+def test_a_list_of_drives_by_joint_name(tmp_path):
+    drives = """
+actuation:
+  - torques: {elbow: -0.5}
+  - Table: {times: [0.0, 1.0], values: {shoulder: [1.0, 2.0]}, interpolation: hold}
+"""
+    torques, table = pn.load(folder(tmp_path, drives)).actuation
+    assert torques == {"elbow": -0.5}
+    assert table.interpolation == "hold"
+    np.testing.assert_array_equal(table.values["shoulder"], [1.0, 2.0])
+    held = """
+actuation:
+  - torques: {elbow: 1.0}
+  - HoldPosition: {kp: {shoulder: 5.0}, kd: {shoulder: 0.5}}
+"""
+    assert pn.load(folder(tmp_path, held)).actuation[1].kp == {"shoulder": 5.0}
+    both = "actuation:\n  - torques: {elbow: 1.0}\n  - HoldPosition: {kp: 5.0, kd: 0.5}\n"
+    with pytest.raises(pn.PinNonidealError, match=r'"elbow" is commanded by drive 0 \(constant torques\)'):
+        pn.load(folder(tmp_path, both))
 
 
 def test_angles_of_continuous_joints_and_quaternions(tmp_path):

@@ -330,7 +330,7 @@ def test_the_page_and_the_readme_are_those_of_the_recorded_results() -> None:
     assert not any(record["quick"] for record in records.values())
     assert report.DOCUMENT.read_text(encoding="utf-8") == report.document(records)
     shown = report.README.read_text(encoding="utf-8").split(report.BEGIN)[1].split(report.END)[0]
-    assert shown == report.readme_table(records)
+    assert shown == report.readme_sentences(records)
 
 
 def test_the_report_keeps_full_runs_only(

@@ -17,7 +17,12 @@ import pytest
 from pin_nonideal.loading.load import load, robots
 
 ROOT = Path(__file__).resolve().parents[2]
-DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+DOCUMENTS = [
+    ROOT / "README.md",
+    ROOT / "CONTRIBUTING.md",
+    ROOT / "CHANGELOG.md",
+    *sorted((ROOT / "docs").rglob("*.md")),
+]
 BLOCK = re.compile(
     r"^(?:<!-- (?P<mark>[a-z:._ ]+) -->\n)?```(?P<language>\w+)\n(?P<text>.*?)^```$", re.MULTILINE | re.DOTALL
 )
@@ -123,3 +128,32 @@ def test_contributing_has_five_commands() -> None:
     commands = [b for b in blocks() if b.document == "CONTRIBUTING.md" and b.language == "sh"]
     assert len(commands) == 5
     assert all(len(block.text.splitlines()) == 1 for block in commands)
+
+
+def test_the_readme_is_short_and_its_blocks_have_ten_lines() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= 120
+    runnable = [block for block in RUNNABLE if block.document == "README.md"]
+    assert len(runnable) == 5
+    assert [block.line for block in runnable if len(block.text.splitlines()) > 10] == []
+
+
+def test_the_readme_and_the_first_page_have_the_same_answers() -> None:
+    pages = [(ROOT / page).read_text(encoding="utf-8") for page in ("README.md", "docs/index.md")]
+    readme, index = (
+        page.split("<!-- answers: begin -->")[1].split("<!-- answers: end -->")[0] for page in pages
+    )
+    assert readme.replace("](docs/", "](") == index
+
+
+def test_the_changelog_has_one_line_an_entry() -> None:
+    lines = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8").splitlines()
+    released = lines[lines.index("## [Unreleased]") :]
+    entries = [line for line in released if line.startswith("- ")]
+    assert len(entries) > 50
+    assert [line for line in released if line.startswith(" ")] == []
+    plain = [re.sub(r"\]\([^)]*\)", "]", line) for line in entries]
+    assert [line for line in plain if len(line.split()) > 21] == []  # 20 words and the dash
+    assert [line for line in entries if not re.match(r"- [A-Z][\w ]*: ", line)] == []
+    sections = [line.removeprefix("### ") for line in released if line.startswith("### ")]
+    assert set(sections) <= {"Added", "Changed", "Deprecated", "Removed", "Fixed", "Security"}

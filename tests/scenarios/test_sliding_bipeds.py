@@ -61,5 +61,5 @@ def test_slides_on(mu, v0):
 
 def test_legs_that_are_straight_end_in_a_named_error():
     """There the rows of the feet lose their rank, and the loads beside it are as large as one likes."""
-    with pytest.raises(pn.FrictionConvergenceError, match="was not found at t ="):
+    with pytest.raises(pn.FrictionConvergenceError, match="it was not found at t ="):
         pn.simulate(biped(0.1, (1.0, 0.5, 0.0), 0.0), 1.0)

@@ -128,9 +128,9 @@ ROLLOUTS = {
         {"q": np.tile(Q, (2, 1))},
         "rollout: q and v must have as many rows; got 2 and 1",
     ),
-    "threads": ({"threads": 0}, "rollout: threads must be at least 1; got 0"),
-    "threads many": ({"threads": 2**31}, "rollout: threads must be at most 1000000000; got 2147483648"),
-    "threads float": ({"threads": 1.5}, "rollout: threads must be an integer; got 1.5"),
+    "jobs": ({"jobs": 0}, "rollout: jobs must not be zero"),
+    "jobs many": ({"jobs": 2**31}, "rollout: jobs must be at most 1000000000; got 2147483648"),
+    "jobs float": ({"jobs": 1.5}, "rollout: jobs must be an integer; got 1.5"),
     "method array": (
         {"method": np.zeros(0)},
         f"simulate: method must be one of {METHODS}; got array([], dtype=float64)",

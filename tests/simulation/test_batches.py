@@ -66,9 +66,7 @@ FIELDS = {
 
 @pytest.mark.parametrize("name", FIELDS)
 def test_fields_of_laws_and_forces(name):
-    runs = pn.rollout(
-        scene_of(), None, None, 0.1, parameters={name: FIELDS[name]}, threads=2, record="energy"
-    )
+    runs = pn.rollout(scene_of(), None, None, 0.1, parameters={name: FIELDS[name]}, jobs=2, record="energy")
     for k, run in enumerate(runs):
         laws = with_fields(LAWS, name, FIELDS[name], k) if name in LAWS else LAWS
         forces = with_fields(FORCES, name, FIELDS[name], k) if name in FORCES else FORCES
@@ -126,7 +124,7 @@ def ball(mu=0.3, restitution=0.5, torsional=0.01):
 
 def test_friction_and_restitution_of_contacts():
     given = {"mu": [0.1, 0.3, 0.9], "restitution": [0.0, 0.5, 0.9], "torsional": [0.01, 0.02, 0.05]}
-    runs = pn.rollout(ball(), None, None, 0.5, parameters={"floor": given}, threads=2)
+    runs = pn.rollout(ball(), None, None, 0.5, parameters={"floor": given}, jobs=2)
     for k, run in enumerate(runs):
         assert_same_run(run, pn.simulate(ball(*(given[key][k] for key in given)), 0.5))
 
@@ -157,7 +155,7 @@ def fast(t, q, v):
 def test_a_failure_leaves_the_other_runs():
     scene = scene_of(actuation=fast)
     v = np.array([[0.0] * 3, [9.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
-    kept = pn.rollout(scene, None, v, 0.05, failures="keep", threads=2)
+    kept = pn.rollout(scene, None, v, 0.05, failures="keep", jobs=2)
     assert isinstance(kept[1], pn.UserFunctionError)
     assert kept[1].index == 1
     for k in (0, 2):

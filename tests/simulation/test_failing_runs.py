@@ -106,7 +106,8 @@ def test_drives_that_ask_for_two_velocities():
 
 def test_drives_that_ask_for_two_accelerations():
     scene = drives(pn.polynomial([0.0, 0.0, 1.0]), pn.constant(0.0))
-    message = 'constraints "two" and "one" contradict each other: residual 2.0e+00 m/s^2 at t = 0.00 s'
+    message = 'constraints "two" and "one" contradict each other: residual 2.0e+00 m/s^2 at t = 0.00 s; '
+    message += "leave one of them out, or let both ask for the same motion"
     for call in (scene.solve, scene.acceleration):
         with refuses(message, InconsistentConstraintsError):
             call(np.zeros(3), np.zeros(3))
@@ -189,7 +190,8 @@ def test_an_acceleration_that_is_not_finite():
     message = "acceleration is not finite at t = 0 s"
     with refuses(message, NonFiniteError):
         scene.solve(np.zeros(3), np.zeros(3))
-    with refuses(f"{message}; the trajectory up to there is in error.trajectory", NonFiniteError):
+    hint = "; look at the last samples for a force, stiffness or function that grows without bound"
+    with refuses(f"{message}{hint}; the trajectory up to there is in error.trajectory", NonFiniteError):
         pn.simulate(scene, 1.0)
 
 

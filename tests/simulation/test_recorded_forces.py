@@ -269,9 +269,9 @@ def closed_at_coupler(lengths, ground):
 def test_nothing_is_recorded_that_was_not_asked_for():
     scene = SCENES["loop"]()
     plain = pn.simulate(scene, 0.1)
-    assert plain.law_forces is None
+    assert not plain.law_forces
     assert plain.limits is None
-    assert plain.reactions is None
+    assert not plain.reactions
     law = plain.law(scene.law_names[0])
     assert law.force is None
     assert law.power is None
@@ -297,7 +297,7 @@ def test_unknown_names():
     run = pn.simulate(SCENES["arm"](), 0.01, record="reactions")
     with refuses('no law "elbov" in this run; nearest: "elbow"', UnknownNameError):
         run.law("elbov")
-    with refuses('no joint, anchor or contact "asside"; nearest: "aside"', UnknownNameError):
+    with refuses('no joint, frame, anchor or contact "asside"; nearest: "aside"', UnknownNameError):
         run.reaction("asside")
     with refuses("reaction: axes must be one of 'own', 'world'; got 'local'", InputError):
         run.reaction("aside", axes="local")
@@ -312,7 +312,7 @@ def test_files_and_batches_keep_them(tmp_path):
     np.testing.assert_array_equal(run.law(contact).force, loaded.law(contact).force)
     np.testing.assert_array_equal(run.reaction(contact), loaded.reaction(contact))
     start = scene.initial_state()
-    batch = pn.rollout(scene, np.array([start[0]] * 2), np.array([start[1]] * 2), 0.5, threads=2, **options)
+    batch = pn.rollout(scene, np.array([start[0]] * 2), np.array([start[1]] * 2), 0.5, jobs=2, **options)
     assert_same_run(run, batch[1])
     swept = pn.sweep(sledge, [{}], 0.5, jobs=1, **options)
     assert_same_run(run, swept[0])

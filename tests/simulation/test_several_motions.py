@@ -100,8 +100,8 @@ class TestDrawer:
         small, large = drawer.limits()
         words = (
             f'friction of "guide" has several solutions at t = 0 s: limits of {small:.4g} and {large:.4g} '
-            "(N m or N), det(I - d lam'/d lam) = -0.18; reduce mu, go on with the nearer one by "
-            'several="continue", or use reaction="ideal"'
+            "(N m or N), det(I - d lam'/d lam) = -0.18; go on with the nearer one by "
+            'several="continue", reduce mu, or use reaction="ideal"'
         )
         with pytest.raises(pn.FrictionParadoxError, match=re.escape(words)) as caught:
             drawer.scene().solve([0.0], [1.0])
@@ -192,6 +192,6 @@ class TestLostOnTheWay:
         scene = rising_load()
         single = pn.simulate(scene, 3.0, several="continue")
         q, v = scene.initial_state()
-        for run in pn.rollout(scene, [q, q], [v, v], 3.0, several="continue", threads=2):
+        for run in pn.rollout(scene, [q, q], [v, v], 3.0, several="continue", jobs=2):
             assert run.events == single.events
             np.testing.assert_array_equal(run.q, single.q)

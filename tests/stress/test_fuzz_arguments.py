@@ -25,6 +25,7 @@ DESCRIPTIONS = [
     pn.KnifeEdge, pn.LuGre, pn.PointAnchor, pn.PointContact, pn.PrescribedMotion, pn.RevolvedContact,
     pn.RimContact, pn.Rolling,
     pn.SampledControl, pn.SigmoidFriction, pn.SphereContact, pn.SpringDamper, pn.Table,
+    pn.TrackTrajectory,
     pn.UserConstraint, pn.UserContact, pn.UserForce, pn.UserFriction, pn.UserLaw, pn.Wrench,
     pn.box_contacts,
 ]  # fmt: skip
@@ -77,10 +78,14 @@ def shapes(model):
 GOOD = {
     "joint": ["crank_joint"], "joint1": ["crank_joint"], "joint2": ["rocker_joint"], "frame": ["coupler_tip"],
     "frame1": ["coupler_tip"], "frame2": ["rocker_tip"], "axes": ["xz"], "axis": ["y"],
-    "actuation": [np.ones(3), pn.SampledControl(lambda *_: np.ones(3), 0.01)],
+    "actuation": [
+        np.ones(3), pn.SampledControl(lambda *_: np.ones(3), 0.01),
+        [{"crank_joint": 1.0}, pn.HoldPosition({"rocker_joint": 1.0}, {"rocker_joint": 0.1})],
+    ],
     "effort": [0.1], "ratio": [2.0], "size": [1, 2], "value": [np.ones(6)],
     "function": [pn.constant(0.1), lambda *_: np.zeros(3), lambda *_: (np.zeros((1, 3)), [0.0])],
     "radius": [0.1], "coulomb": [0.1], "coefficient": [1.0], "exponent": [1.0], "stiffness": [10.0],
+    "interpolation": ["hold"], "feedforward": ["none", "gravity", "rnea", "constrained"],
     "period": [0.01], "kp": [1.0], "kd": [0.1], "times": [[0.0, 1.0]], "values": [np.zeros((2, 3))],
     "direction": [lambda t, q: [1.0, 0.0, 0.0]], "limit": [lambda t, q, v, r: 0.1], "length": [0.5],
     "damping": [0.1], "phi1": [0.2], "phi2": [5.0],
@@ -88,6 +93,7 @@ GOOD = {
     "segment1": [((0.0, 0.0, 0.0), (0.0, 0.0, 0.1))], "segment2": [((0.0, 0.0, 0.0), (0.1, 0.0, 0.1))],
     "geometry1": ["ball"], "geometry2": ["ground"], "mu": [0.3], "restitution": [0.5], "lower": [-50.0],
     "semiaxes": [(0.1, 0.1, 0.0)], "points": [np.vstack([np.zeros(3), 0.01 * np.eye(3)])], "below": [0.1],
+    "delay": [0.015], "delay_samples": [2], "initial": [np.ones(3)],
     "rim": [0.01], "solid1": [(0.01, 0.01, 0.01)], "solid2": [(0.0, 0.02, 0.02)],
 }  # fmt: skip
 ROW = {"function": [lambda *_: (np.zeros((1, 3)), [0.0])], "size": [1]}
@@ -97,8 +103,12 @@ GAP = {
 }  # fmt: skip
 BOX = {"size": [[0.01, 0.02, 0.03]], "frame2": ["universe"]}
 CAN = {"length": [0.01], "below": [0.01], "frame2": ["universe"], "xyz": [(0.0, 0.0, -9.0)]}
+TRACK = {
+    "q": [{"crank_joint": [1.0, 1.1]}, np.zeros((2, 3))], "v": [{"crank_joint": [0.0, 0.1]}, None],
+    "joints": [["crank_joint"], None],
+}  # fmt: skip
 GOOD_TIMES = {
-    "value": [0.1], "coefficients": [[1.0, 2.0]], "amplitude": [0.1], "frequency": [2.0],
+    "value": [0.1], "coefficients": [[1.0, 2.0]], "amplitude": [0.1], "omega": [2.0],
     "times": [[0.0, 1.0, 2.0]], "values": [[0.0, 1.0, 0.5]],
 }  # fmt: skip
 
@@ -109,6 +119,7 @@ def test_descriptions(kind, scene, examples):
     """A description is refused when it is made, or by the scene, or by the run."""
     own = {pn.UserConstraint: ROW, pn.UserContact: GAP, pn.box_contacts: BOX, pn.BoxContact: BOX}
     own[pn.CylinderContact] = CAN
+    own[pn.TrackTrajectory] = TRACK
     good = GOOD | own.get(kind, {})
 
     def check(data):
@@ -173,7 +184,7 @@ def test_rollout(scene, examples):
     q, v = scene.initial_state()
     good = {
         "scene": [scene], "q": [np.array([q, q])], "v": [np.array([v, v])], "method": ["dop853", "dopri5"],
-        "threads": [1, 2], "parameters": [{"crank_joint": {"mass": [1.0, 2.0]}}],
+        "jobs": [1, 2, -1], "parameters": [{"crank_joint": {"mass": [1.0, 2.0]}}],
     }  # fmt: skip
 
     def check(data):
@@ -300,8 +311,8 @@ STATICS = [pn.equilibrium, pn.inverse_dynamics, pn.rest]
 def test_statics(function, scene, examples):
     q, v = scene.initial_state()
     good = {
-        "scene": [scene], "q": [q, None], "v": [v], "a": [scene.acceleration(q, v)],
-        "q0": [q, {"crank_joint": 1.0}], "tau": [np.ones(3), {"crank_joint": 0.1}], "t": [0.0], "starts": [1],
+        "scene": [scene], "q": [q, None, {"crank_joint": 1.0}], "v": [v], "a": [scene.acceleration(q, v)],
+        "tau": [np.ones(3), {"crank_joint": 0.1}], "t": [0.0], "starts": [1],
         "actuated": [["crank_joint"]], "bounds": [(-10.0, 10.0)],
     }  # fmt: skip
     if function is pn.inverse_dynamics:
@@ -409,6 +420,7 @@ def test_the_public_names_are_all_drawn():
         "Equilibrium",
         "Event",
         "FrameRecord",
+        "HoldingTorque",
         "InverseDynamics",
         "JointRecord",
     }

@@ -66,7 +66,7 @@ def test_threads_give_the_bits_of_single_runs(robot, threads):
     states = [scene.project(q, v * (1.0 + 0.1 * generator.standard_normal())) for _ in range(9)]
     options = {"rtol": 1e-6, "record": ("a", "forces", "energy"), "output_dt": 0.02}
     starts_q, starts_v = np.array([s[0] for s in states]), np.array([s[1] for s in states])
-    together = pn.rollout(scene, starts_q, starts_v, 0.2, threads=threads, **options)
+    together = pn.rollout(scene, starts_q, starts_v, 0.2, jobs=threads, **options)
     for run, (q0, v0) in zip(together, states, strict=True):
         alone = pn.simulate(scene, 0.2, q=q0, v=v0, **options)
         assert_same_run(run, alone)

@@ -242,17 +242,17 @@ def of_run(case: Case, method: str, **more: Any) -> Answer:
     strongest = max((np.abs(e[3]).max() for e in events if e[3] is not None), default=0.0)
     events = [e for e in events if e[3] is None or np.abs(e[3]).max() > LEAST_STRIKE * strongest]
     values["events"] = ("events", events)
-    if all(run.energy is not None for run in runs):
+    if all(run.energy for run in runs):
         columns = [c for c in runs[0].energy if c not in ("kinetic", "potential", "total", "balance")]
         values["works"] = ("energies", {c: sum(r.energy[c][-1] for r in runs) for c in columns})
-    if len(runs) == 1 and runs[0].energy is not None and method in ("dop853", "dopri5"):
+    if len(runs) == 1 and runs[0].energy and method in ("dop853", "dopri5"):
         size = (
             np.ptp(runs[0].energy["kinetic"]),
             np.ptp(runs[0].energy["potential"]),
             1e-3 * case.units.energy,
         )
         values["balance"] = ("balance", float(np.abs(runs[0].energy["balance"]).max() / max(size)))
-    energies = [run.energy["kinetic"] for run in runs if run.energy is not None]
+    energies = [run.energy["kinetic"] for run in runs if run.energy]
     largest = max((float(np.max(e)) for e in energies), default=0.0)
     return Answer(values, OF_RUNS, method == "semi_implicit_euler", largest)
 

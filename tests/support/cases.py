@@ -230,7 +230,7 @@ def carried_function(f: Any, maps: Maps, unit: float) -> Any:
     if isinstance(f, Constant):
         return Constant(unit * f.value)
     if isinstance(f, Sinusoid):
-        w = f.frequency / T
+        w = f.omega / T
         return Sinusoid(unit * f.amplitude, w, f.phase - w * later, unit * f.offset)
     if isinstance(f, Polynomial):
         line = np.polynomial.Polynomial([-later / T, 1.0 / T])
@@ -391,7 +391,11 @@ class Carrier:
             return replace(given, actuation=replace_case(self, inner).actuation(model), effort=effort)
         if isinstance(given, SampledControl):
             return replace(
-                given, function=self.function(given, "function"), period=maps.units.T * given.period
+                given,
+                function=self.function(given, "function"),
+                period=maps.units.T * given.period,
+                delay=maps.units.T * given.delay,
+                initial=None if given.initial is None else maps.force(np.asarray(given.initial)),
             )
         if isinstance(given, Table):
             return replace(

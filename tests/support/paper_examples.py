@@ -1,4 +1,4 @@
-"""Import of the scripts examples/paper_*.py, which contain the formulas of the paper."""
+"""Import of the scripts oracles/paper_*.py, which contain the formulas of the paper."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from pathlib import Path
 
 
 def example(name):
-    """Import the script examples/`name`.py once."""
-    key = f"examples_{name}"
+    """Import the script oracles/`name`.py once."""
+    key = f"oracles_{name}"
     if key not in sys.modules:
-        path = Path(__file__).parents[2] / "examples" / f"{name}.py"
+        path = Path(__file__).parents[2] / "oracles" / f"{name}.py"
         spec = importlib.util.spec_from_file_location(key, path)
         sys.modules[key] = module = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(module)

@@ -14,9 +14,25 @@ from pin_nonideal.compilation.contacts import lower_contacts
 from pin_nonideal.compilation.resolver import Resolution
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.constraints import PointAnchor
+from pin_nonideal.states.joint_layout import joint_places
+from pin_nonideal.trajectory.by_name import joint_record, law_record
+from pin_nonideal.trajectory.columns import columns
 from pin_nonideal.trajectory.trajectory import Stats
 
 STEP = 1e-6  # step of central differences for rates, with an error near 1e-9
+
+
+class KnownRun(SimpleNamespace):
+    """A run without simulation, with the records by name that a Trajectory has."""
+
+    def joint(self, name: str) -> Any:
+        return joint_record(self, name)
+
+    def law(self, name: str) -> Any:
+        return law_record(self, name)
+
+    def columns(self) -> Any:
+        return columns(self)
 
 
 def run_of(model: pin.Model, t: Any, q: Callable[[float], Any], **fields: Any) -> Any:
@@ -59,7 +75,10 @@ def run_of(model: pin.Model, t: Any, q: Callable[[float], Any], **fields: Any) -
     }
     values |= dict.fromkeys(("tau", "limits", "law_forces", "reactions"))
     values |= dict.fromkeys(("a", "F_ideal", "F_nonideal", "lam", "lam_ideal", "energy", "power", "z"))
-    return SimpleNamespace(**values | fields)
+    values["contact_forces"] = None
+    values["joints"] = joint_places(model)
+    values["rows"] = {name: (s.start, s.stop, False) for name, s in scene.constraint_slices.items()}
+    return KnownRun(**values | fields)
 
 
 def _program(scene: Any, names: list[str]) -> Any:

@@ -56,7 +56,7 @@ def test_rollouts_are_bitwise_their_single_runs(robot, threads):
     n = 6
     starts_v = np.array([v * (1.0 + 0.1 * generator.standard_normal()) for _ in range(n)])
     starts_q = np.tile(q, (n, 1))
-    runs = pn.rollout(scene, starts_q, starts_v, 0.3, threads=threads, record=("energy",))
+    runs = pn.rollout(scene, starts_q, starts_v, 0.3, jobs=threads, record=("energy",))
     assert len(runs) == n
     for k, run in enumerate(runs):
         alone = pn.simulate(scene, 0.3, q=starts_q[k], v=starts_v[k], record=("energy",))
@@ -67,7 +67,7 @@ def test_python_functions_run_in_rollout_threads_as_well():
     model = pn.load("panda_friction").model
     scene = pn.Scene(model, actuation=lambda t, q, v: -2.0 * v)
     v = np.linspace(-1.0, 1.0, 4)[:, None] * np.ones(model.nv)
-    runs = pn.rollout(scene, np.tile(scene.q0, (4, 1)), v, 0.05, threads=3)
+    runs = pn.rollout(scene, np.tile(scene.q0, (4, 1)), v, 0.05, jobs=3)
     for k, run in enumerate(runs):
         assert_same_run(run, pn.simulate(scene, 0.05, v=v[k], q=scene.q0))
 
@@ -103,7 +103,7 @@ def test_an_interrupt_ends_all_runs(threads):
     scene = pn.Scene(model, actuation=interrupting)
     v = 0.1 * np.arange(40)[:, None] * np.ones(model.nv)
     with pytest.raises(pn.RunInterrupted) as caught:
-        pn.rollout(scene, np.tile(scene.q0, (40, 1)), v, 5.0, threads=threads)
+        pn.rollout(scene, np.tile(scene.q0, (40, 1)), v, 5.0, jobs=threads)
     assert 0.0 < caught.value.trajectory.t[-1] < 5.0
     assert caught.value.trajectory.v[0, 0] == v[caught.value.index, 0]
     assert len(set(begun)) <= threads + 1  # another thread may have ended a run before
@@ -114,7 +114,7 @@ def rollout_of_two(torque, duration):
     model = pn.load("panda_friction").model
     scene = pn.Scene(model, actuation=lambda t, q, v: torque(t, in_main_thread()) * v)
     v = np.ones((2, model.nv)) * [[0.1], [0.2]]
-    return pn.rollout(scene, np.tile(scene.q0, (2, 1)), v, duration, threads=2)
+    return pn.rollout(scene, np.tile(scene.q0, (2, 1)), v, duration, jobs=2)
 
 
 def in_main_thread():
@@ -156,5 +156,5 @@ def test_an_interrupt_in_another_thread_ends_the_run_of_the_calling_one():
 def test_threads_beyond_the_states_are_not_started():
     scene = pn.load("four_bar")
     q, v = scene.initial_state()
-    (run,) = pn.rollout(scene, q[None], v[None], 0.01, threads=1_000_000_000)
+    (run,) = pn.rollout(scene, q[None], v[None], 0.01, jobs=1_000_000_000)
     assert_same_run(run, pn.simulate(scene, 0.01))

@@ -20,7 +20,7 @@ import pytest
 
 import pin_nonideal as pn
 from pin_nonideal.sweeps import sweep as sweeping
-from pin_nonideal.sweeps.pack import runs_in
+from pin_nonideal.sweeps.pack import read_records
 
 from ..support.refusals import refuses
 from ..support.same_run import assert_same_run
@@ -133,7 +133,7 @@ def test_a_kill_loses_nothing_that_was_done(tmp_path, jobs):
     assert kept.missing == []
     after = packs(store)
     assert {path: after[path] for path in begun} == begun
-    assert sum(len(list(runs_in(path, 0))) for path in after) == 200  # none of them twice
+    assert sum(len(list(read_records(path, 0))) for path in after) == 200  # none of them twice
     for k in (0, 4, 199):
         assert_same_run(kept[k], pn.simulate(pendulum(**parameters[k]), 20.0))
 
@@ -157,7 +157,7 @@ def test_a_store_of_another_form_is_refused(tmp_path):
     pn.sweep(pendulum, GRID[:1], 0.1, jobs=1, store=tmp_path)
     index = tmp_path / "index.jsonl"
     index.write_text(index.read_text().replace('"format": 2', '"format": 1'))
-    with refuses("holds no sweep: ValueError: format 1 instead of 2", pn.LoadingError):
+    with refuses("holds no sweep of this version: its format is 1 instead of 2", pn.LoadingError):
         pn.sweep(pendulum, GRID[:1], 0.1, jobs=1, store=tmp_path)
 
 
@@ -197,7 +197,7 @@ def test_what_a_store_refuses(tmp_path):
     (tmp_path / "full" / "thesis.tex").write_text("")
     with refuses("must be empty or hold this sweep; it holds other files", pn.InputError):
         pn.sweep(pendulum, GRID[:1], 0.1, jobs=1, store=tmp_path / "full")
-    with refuses(f'"{tmp_path}" holds no sweep: FileNotFoundError', pn.LoadingError):
+    with refuses(f'"{tmp_path}" holds no sweep: there is no index.jsonl in it', pn.LoadingError):
         pn.Sweep(tmp_path)
     with refuses("sweep: failures must be one of 'raise', 'keep'; got 'ignore'", pn.InputError):
         pn.sweep(pendulum, GRID, 0.1, failures="ignore")
@@ -245,7 +245,7 @@ def test_a_full_disk_is_named(tmp_path, monkeypatch):
     whole = pn.sweep(pendulum, GRID, 0.1, jobs=1, store=tmp_path / "whole")
     size = max(len(content) for content in packs(whole.folder).values())
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-    monkeypatch.setattr(sweeping, "SHARES", 1)  # several runs in one file
+    monkeypatch.setattr(sweeping, "TASKS_PER_WORKER", 1)  # several runs in one file
     resource.setrlimit(resource.RLIMIT_FSIZE, (int(2.5 * size), limits[1]))
     try:
         with refuses("cannot write the run to", pn.OutputError):

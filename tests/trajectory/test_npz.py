@@ -23,10 +23,10 @@ ARRAYS = {
 }
 
 
-@pytest.mark.parametrize("most", [npz.MOST_BYTES, 0])
+@pytest.mark.parametrize("most", [npz.MAX_BYTES, 0])
 def test_numpy_and_zip_read_what_is_made(monkeypatch, most):
     """Whether it is put together here, or by NumPy as archives of gigabytes are."""
-    monkeypatch.setattr(npz, "MOST_BYTES", most)
+    monkeypatch.setattr(npz, "MAX_BYTES", most)
     content = npz.npz_bytes(ARRAYS)
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
         assert archive.testzip() is None

@@ -110,7 +110,7 @@ def test_a_batch_is_its_runs_and_has_a_replay(tmp_path):
     rng = np.random.default_rng(7)
     states = [consistent(scene, rng, 0.0, 0.1) for _ in range(3)]
     q, v = (np.array(part) for part in zip(*states, strict=True))
-    batch = pn.rollout(scene, q, v, 0.02, threads=2)
+    batch = pn.rollout(scene, q, v, 0.02, jobs=2)
     for k, run in enumerate(batch):
         assert_same_run(run, pn.simulate(scene, 0.02, q=q[k], v=v[k]))
     assert pn.replay(batch[0], tmp_path / "run.html")

@@ -46,7 +46,7 @@ def test_shapes(run):
 
 def test_fields_that_were_not_asked_for_are_none():
     plain = pn.simulate(pn.load("four_bar"), 0.05)
-    for key in ("a", "F_ideal", "F_nonideal", "lam", "lam_ideal", "energy", "power", "z"):
+    for key in ("a", "F_ideal", "F_nonideal", "lam", "lam_ideal", "z"):
         assert getattr(plain, key) is None, key
 
 
@@ -219,16 +219,18 @@ def cannot_read(path, reason):
     return refuses(f'cannot read a trajectory from "{path}": {reason}', LoadingError)
 
 
-def cannot_read_because(path, kinds):
-    """The whole message, with an error of these kinds, whose own words are Python's, as the reason."""
-    advice = re.escape("; it must be an .npz file written by Trajectory.save")
-    start = re.escape(f'cannot read a trajectory from "{path}": ')
-    return pytest.raises(LoadingError, match=f"^{start}({kinds}): .+{advice}$")
+def cannot_read_because(path):
+    """The whole message on a file whose content cannot be read, in words of this package."""
+    advice = "; it must be an .npz file written by Trajectory.save"
+    reason = "its content is damaged or of another kind"
+    return pytest.raises(
+        LoadingError, match="^" + re.escape(f'cannot read a trajectory from "{path}": {reason}{advice}') + "$"
+    )
 
 
 def test_a_missing_file(tmp_path):
     path = tmp_path / "no.npz"
-    with cannot_read(path, f"FileNotFoundError: [Errno 2] No such file or directory: '{path}'; it must be"):
+    with cannot_read(path, "there is no such file; it must be"):
         pn.Trajectory.load(path)
 
 
@@ -237,7 +239,7 @@ def test_a_truncated_file(run, tmp_path, part):
     path = run.save(tmp_path / "run.npz")
     whole = path.read_bytes()
     path.write_bytes(whole[: int(part * len(whole))])
-    with cannot_read_because(path, "BadZipFile|EOFError"):
+    with cannot_read_because(path):
         pn.Trajectory.load(path)
 
 
@@ -246,7 +248,7 @@ def test_a_damaged_file(run, tmp_path):
     data = bytearray(path.read_bytes())
     data[len(data) // 3 : len(data) // 3 + 40] = bytes(40)
     path.write_bytes(bytes(data))
-    with cannot_read_because(path, "BadZipFile|error"):
+    with cannot_read_because(path):
         pn.Trajectory.load(path)
 
 
@@ -264,7 +266,7 @@ def test_a_file_that_tries_to_run_code(tmp_path, monkeypatch):
     hidden = tmp_path / "hidden.npz"
     np.savez(hidden, header=np.array([Command()], dtype=object), t=np.zeros(1))
     for path in (plain, hidden):
-        with cannot_read(path, "ValueError: "):
+        with cannot_read(path, "its content is damaged or of another kind"):
             pn.Trajectory.load(path)
     assert not (tmp_path / "came_true").exists()
 
@@ -302,10 +304,10 @@ def test_other_archives(tmp_path):
     path = tmp_path / "other.npz"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("readme.txt", "hello")
-    with cannot_read(path, "KeyError: "):
+    with cannot_read(path, "its content is damaged or of another kind"):
         pn.Trajectory.load(path)
     buffer = io.BytesIO()
     np.save(buffer, np.zeros(3))
     path.write_bytes(buffer.getvalue())
-    with cannot_read_because(path, "TypeError|AttributeError"):
+    with cannot_read_because(path):
         pn.Trajectory.load(path)

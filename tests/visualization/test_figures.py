@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 import pin_nonideal as pn
 from pin_nonideal.errors import InputError, UnknownNameError
-from pin_nonideal.visualization.plotting import CLOUD, plot
+from pin_nonideal.visualization.plotting import MAX_EVENT_LINES, plot
 
 from ..support.replay_runs import add_frame, four_bar, jointed, panda
 
@@ -148,13 +148,15 @@ def test_several_runs_share_their_axes_and_are_told_apart() -> None:
 
 def test_a_cloud_of_events_is_drawn_by_its_density() -> None:
     run = panda()
-    times = np.linspace(0.0, 0.25, CLOUD + 1)
+    times = np.linspace(0.0, 0.25, MAX_EVENT_LINES + 1)
     run.events = [SimpleNamespace(time=t, kind="slip", element="e") for t in times]
     axes = plot(run, what="energy").axes[0]
     assert not [line for line in axes.lines if list(line.get_ydata()) == [0, 1]]
     (marks,) = axes.collections
     assert len(marks.get_segments()) == 200
-    assert f"{CLOUD + 1} events, by density" in [text.get_text() for text in axes.get_legend().get_texts()]
+    assert f"{MAX_EVENT_LINES + 1} events, by density" in [
+        text.get_text() for text in axes.get_legend().get_texts()
+    ]
 
 
 def test_modes_in_print_are_hatched(belt: Any) -> None:

@@ -16,7 +16,7 @@ import pytest
 
 import pin_nonideal as pn
 from pin_nonideal.errors import InputError, OutputError, UnknownNameError
-from pin_nonideal.visualization.plotting import CROWD, plot
+from pin_nonideal.visualization.plotting import MAX_THICK_EVENTS, plot
 
 from ..support.replay_runs import four_bar, jointed, panda, run_of
 
@@ -77,7 +77,7 @@ def test_many_events_are_drawn_thin() -> None:
         lines = plot(run, what=["energy"]).axes[0].lines
         return {line.get_linewidth() for line in lines if list(line.get_ydata()) == [0, 1]}
 
-    assert max(widths(CROWD + 1)) < min(widths(CROWD))
+    assert max(widths(MAX_THICK_EVENTS + 1)) < min(widths(MAX_THICK_EVENTS))
 
 
 def test_modes_are_bands_named_by_their_elements() -> None:

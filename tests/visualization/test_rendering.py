@@ -42,7 +42,19 @@ def test_a_picture_shows_the_robot_at_its_time(run: Any, tmp_path: Path) -> None
 @needs_browser
 def test_a_saved_run_becomes_a_moving_picture(run: Any, tmp_path: Path, capsys: Any) -> None:
     saved, out = run.save(tmp_path / "run.npz"), tmp_path / "out.gif"
-    words = ["render", str(saved), str(out), "--size", "160x100", "--seconds", "0.5", "--fps", "8"]
+    words = [
+        "render",
+        str(saved),
+        str(out),
+        "--width",
+        "160",
+        "--height",
+        "100",
+        "--seconds",
+        "0.5",
+        "--fps",
+        "8",
+    ]
     assert cli.main(words) == 0
     assert f"wrote {out}" in capsys.readouterr().out
     with Image.open(out) as moving:

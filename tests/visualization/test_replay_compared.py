@@ -111,3 +111,9 @@ def test_names_must_fit_the_runs() -> None:
         pn.replay([four_bar(), four_bar()], names=["one"])
     with pytest.raises(InputError, match=r"^a replay shows at least one run; got none$"):
         pn.replay([])
+
+
+def test_runs_that_recorded_different_things_are_compared(tmp_path: Path) -> None:
+    scene = pn.load("solo12_standing")
+    driven = pn.simulate(scene, 0.02, record=("forces", "energy"))
+    assert pn.replay([driven, pn.simulate(scene, 0.02)], tmp_path / "both.html").stat().st_size > 0

@@ -11,7 +11,7 @@ import pytest
 
 import pin_nonideal as pn
 from pin_nonideal.validation import unit_axis
-from pin_nonideal.visualization.page.contact_points import touches_of
+from pin_nonideal.visualization.page.contact_points import contact_points
 from pin_nonideal.visualization.page.force_arrows import arrows_of
 from pin_nonideal.visualization.page.frames import sample
 from pin_nonideal.visualization.page.friction_glyphs import elements_of
@@ -37,7 +37,7 @@ def sliding() -> Any:
 
 def parts(run: Any) -> tuple[Any, Any, Any]:
     motion, marks = sample(run), marks_of(run.scene)
-    touches = touches_of(run, motion)
+    touches = contact_points(run, motion)
     return motion, elements_of(run, motion, marks, touches), arrows_of(run, motion, touches)
 
 

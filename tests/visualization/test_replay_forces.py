@@ -20,7 +20,7 @@ from pin_nonideal.description.constraints import (
 from pin_nonideal.description.contacts import PointContact
 from pin_nonideal.description.forces import SpringDamper
 from pin_nonideal.description.time_functions import constant
-from pin_nonideal.visualization.page.contact_points import touches_of
+from pin_nonideal.visualization.page.contact_points import contact_points
 from pin_nonideal.visualization.page.force_arrows import arrows_of
 from pin_nonideal.visualization.page.frames import sample
 from pin_nonideal.visualization.page.markers import marks_of
@@ -34,7 +34,7 @@ CLOSURE = 1e-12
 
 def arrows(run: object) -> list:
     motion = sample(run, 20.0)
-    return arrows_of(run, motion, touches_of(run, motion))
+    return arrows_of(run, motion, contact_points(run, motion))
 
 
 def frames(run: object, name: str) -> list[pin.SE3]:

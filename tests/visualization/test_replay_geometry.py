@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pin_nonideal.visualization.page.stick_figure import sticks
+from pin_nonideal.visualization.page.stick_figure import link_bars
 from pin_nonideal.visualization.page.visuals import collada_parts, joint_axis, shape_of, visuals_of
 
 from ..support.replay_runs import add_frame, four_bar, jointed, panda
@@ -139,7 +139,7 @@ def test_a_collada_file_that_cannot_be_read_has_no_parts(text: str, tmp_path: Pa
 def test_a_model_without_geometry_is_drawn_from_joint_to_joint() -> None:
     model = four_bar().scene.model
     tips = [(2, model.frames[model.getFrameId("coupler_tip")].placement.translation)]
-    drawn = {visual.name: visual for visual in sticks(model, tips, 1.0)}
+    drawn = {visual.name: visual for visual in link_bars(model, tips, 1.0)}
     bar = drawn["crank bar 0"]
     assert bar.joint == 1
     ends = [bar.placement.act(np.array([0.0, 0.0, side * bar.shape.size[1] / 2.0])) for side in (-1.0, 1.0)]
@@ -152,21 +152,21 @@ def test_a_model_without_geometry_is_drawn_from_joint_to_joint() -> None:
 
 def test_a_last_link_ends_at_twice_its_center_of_mass_or_at_its_frame() -> None:
     model = jointed(pin.JointModelRZ(), lever=0.15)
-    (bar,) = [visual for visual in sticks(model, [], 1.0) if "bar" in visual.name]
+    (bar,) = [visual for visual in link_bars(model, [], 1.0) if "bar" in visual.name]
     assert bar.shape.size[1] == pytest.approx(0.3)
     add_frame(model, "tool", 1, [0.0, 0.5, 0.0])
-    (bar,) = [visual for visual in sticks(model, [], 1.0) if "bar" in visual.name]
+    (bar,) = [visual for visual in link_bars(model, [], 1.0) if "bar" in visual.name]
     assert bar.shape.size[1] == pytest.approx(0.5)
 
 
 def test_a_point_mass_is_a_ball_and_a_slider_a_block() -> None:
     model = jointed(pin.JointModelPX(), lever=0.0)
-    (ball,) = sticks(model, [], 1.0)
+    (ball,) = link_bars(model, [], 1.0)
     assert (ball.name, ball.shape.kind) == ("j0 mass", "ellipsoid")
-    shapes = {visual.name: visual.shape.kind for visual in sticks(jointed(pin.JointModelPX()), [], 1.0)}
+    shapes = {visual.name: visual.shape.kind for visual in link_bars(jointed(pin.JointModelPX()), [], 1.0)}
     assert shapes == {"j0 bar 0": "capsule", "j0 joint": "box"}
     shapes = {
-        visual.name: visual.shape.kind for visual in sticks(jointed(pin.JointModelFreeFlyer()), [], 1.0)
+        visual.name: visual.shape.kind for visual in link_bars(jointed(pin.JointModelFreeFlyer()), [], 1.0)
     }
     assert shapes == {"j0 bar 0": "capsule", "j0 joint": "ellipsoid"}
 

@@ -8,10 +8,10 @@ import pytest
 
 from pin_nonideal.description.contacts import PointContact
 from pin_nonideal.errors import InputError
-from pin_nonideal.visualization.page.camera import treads, view
-from pin_nonideal.visualization.page.frames import CLOSE, LEAST_FRAMES, MAX_FRAMES, sample
+from pin_nonideal.visualization.page.camera import pattern_spacings, view
+from pin_nonideal.visualization.page.frames import MAX_FRAMES, MIN_FRAMES, POSITION_TOLERANCE, sample
 from pin_nonideal.visualization.page.joint_tracks import Tracks, halfway
-from pin_nonideal.visualization.page.stick_figure import sticks
+from pin_nonideal.visualization.page.stick_figure import link_bars
 from pin_nonideal.visualization.page.visuals import Shape, Visual
 
 from ..support.replay_runs import add_frame, four_bar, jointed, panda, run_of
@@ -123,7 +123,7 @@ def test_a_run_that_cannot_be_sampled_is_refused() -> None:
 
 def seen(run: object) -> object:
     model = run.scene.model
-    return view(run.scene, sample(run, 30.0), sticks(model, [], 1.0), [], NOTHING)
+    return view(run.scene, sample(run, 30.0), link_bars(model, [], 1.0), [], NOTHING)
 
 
 def test_a_planar_mechanism_is_seen_across_its_plane() -> None:
@@ -155,9 +155,32 @@ def test_the_camera_follows_what_travels_far() -> None:
     assert not seen(run_of(model, np.linspace(0.0, 1.0, 9), lambda t: np.array([0.1 * t, t]))).follow
 
 
+def test_a_cart_is_followed_however_far_it_goes() -> None:
+    """A body is as large as it is drawn, not as its path."""
+    run = run_of(
+        jointed(pin.JointModelPX(), lever=0.0), np.linspace(0.0, 50.0, 9), lambda t: np.array([20.0 * t])
+    )
+    box = Visual("box", 1, pin.SE3.Identity(), Shape("box", (0.5, 0.3, 0.2)), (1.0,) * 4)
+    found = view(run.scene, sample(run, 30.0), [box], [], NOTHING)
+    assert found.follow
+    assert found.size == pytest.approx(np.linalg.norm([0.5, 0.3, 0.2]))
+    assert np.abs(found.outline).max() < 1.0
+
+
+def test_what_stands_still_leaves_half_of_the_view_to_what_moves() -> None:
+    run = four_bar()
+    motion, drawn = sample(run, 30.0), link_bars(run.scene.model, [], 1.0)
+    alone = view(run.scene, motion, drawn, [], NOTHING).outline
+    tile, white = Shape("box", (0.5, 0.5, 0.01)), (1.0,) * 4
+    places = [pin.SE3(np.eye(3), np.array([0.5 * k, 0.0, 0.0])) for k in range(20)]
+    plates = [Visual("plate", 0, place, tile, white) for place in places]
+    beside = view(run.scene, motion, [*drawn, *plates], [], NOTHING).outline
+    assert np.ptp(beside[:, 0]) <= 2.0 * np.linalg.norm(np.ptp(alone, axis=0))
+
+
 def test_a_large_floor_does_not_push_the_robot_away() -> None:
     run = four_bar()
-    motion, drawn = sample(run, 30.0), sticks(run.scene.model, [], 1.0)
+    motion, drawn = sample(run, 30.0), link_bars(run.scene.model, [], 1.0)
     here = pin.SE3.Identity()
     floor = Visual("floor", 0, here, Shape("box", (50.0, 50.0, 0.01)), (1.0, 1.0, 1.0, 1.0))
     stand = Visual("stand", 0, here, Shape("box", (0.2, 0.2, 1.6)), (1.0, 1.0, 1.0, 1.0))
@@ -186,7 +209,7 @@ def crank(turns: float, count: int, joint: object = None) -> object:
 
 def test_frames_are_close_where_the_motion_is_fast_and_never_few() -> None:
     slow = sample(run_of(jointed(pin.JointModelRZ()), [0.0, 0.03], lambda t: np.array([t])))
-    assert LEAST_FRAMES <= len(slow.times) <= 2 * LEAST_FRAMES + 1
+    assert MIN_FRAMES <= len(slow.times) <= 2 * MIN_FRAMES + 1
     fast = sample(crank(40.0, 2001))
     swing = np.abs(np.diff(fast.coordinates[:, 1]))
     assert swing.max() < 0.5
@@ -200,7 +223,7 @@ def test_what_the_page_blends_is_the_motion(turns: float) -> None:
     between = (motion.times[1:] + motion.times[:-1]) / 2.0
     w = 2.0 * np.pi * turns
     swing = halfway(motion.times, motion.coordinates)[:, 1]
-    np.testing.assert_allclose(swing, 0.8 * np.sin(w * between), atol=2.0 * CLOSE)
+    np.testing.assert_allclose(swing, 0.8 * np.sin(w * between), atol=2.0 * POSITION_TOLERANCE)
 
 
 def test_samples_too_far_apart_are_shown_one_by_one() -> None:
@@ -262,6 +285,6 @@ def test_a_belt_with_ribs_is_drawn_within_one_rib() -> None:
         return [Visual(f"rib {k}", 1, place, rib, (1.0,) * 4) for k, place in enumerate(places)]
 
     axes = {1: np.array([1.0, 0.0, 0.0])}
-    assert treads(motion, ribs(0.1, 8), axes) == pytest.approx(dict.fromkeys(range(8), 0.1))
-    assert treads(motion, ribs(30.0, 8), axes) == {}  # it does not travel farther than it reaches
-    assert treads(motion, ribs(0.1, 3), axes) == {}
+    assert pattern_spacings(motion, ribs(0.1, 8), axes) == pytest.approx(dict.fromkeys(range(8), 0.1))
+    assert pattern_spacings(motion, ribs(30.0, 8), axes) == {}  # it does not travel farther than it reaches
+    assert pattern_spacings(motion, ribs(0.1, 3), axes) == {}

@@ -10,7 +10,9 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal.visualization.page.signal_list import inertia_box, signals_of
+from pin_nonideal.visualization.page.body_overlays import inertia_box
+from pin_nonideal.visualization.page.signal_list import OTHERS, rounding_of, signals_of, without_rounding
+from pin_nonideal.visualization.page.signals import default_plot_names
 
 from ..support.replay_browser import Watched, changed, headless_browser
 from ..support.replay_runs import four_bar
@@ -101,13 +103,97 @@ def test_plots_are_composed_of_signals(loop: Watched) -> None:
     row(loop, "signals", "rocker, velocity").locator("input").check()
     assert page.locator(".plot").count() == before + 1  # one unit, one plot
     loop.run("() => replay.seek(0)")
-    reading = page.locator(".plot li", has_text="crank, velocity").locator("b").inner_text()
+    reading = page.locator('.plot li button[title^="crank, velocity"]').locator("b").inner_text()
     assert float(reading) == pytest.approx(four_bar().v[0, 0], rel=1e-3)
     row(loop, "signals", "crank, position").locator("input").check()
-    assert page.locator(".plot").count() == before + 2
+    assert page.locator(".plot").count() == before + 1  # it joins the plot of positions
+    position = page.locator(".plot", has_text="Position [rad]")
+    assert position.locator("li").count() == 4
     for name in ("crank, velocity", "rocker, velocity", "crank, position"):
         row(loop, "signals", name).locator("input").uncheck()
     assert page.locator(".plot").count() == before
+    assert position.locator("li").count() == 3
+
+
+def test_a_search_opens_the_sections_that_have_hits(loop: Watched) -> None:
+    """All words of a search must be in a row; without a search sections are as they were."""
+    page = loop.page
+    sections = page.locator("#panel details")
+    page.locator("#tree-signals details").first.evaluate("one => { one.open = false; }")
+    page.locator("#search").fill("friction crank")
+    shown = [item.inner_text() for item in page.locator("#tree-signals li:visible").all()]
+    assert shown == ["crank, friction, F_nonideal [N m]"]
+    page.locator("#search").fill("nothing at all")
+    assert page.locator("#panel li:visible").count() == 0
+    page.locator("#search").fill("")
+    assert not page.locator("#tree-signals details").first.evaluate("one => one.open")
+    for section in sections.all():
+        section.evaluate("one => { one.open = true; }")
+
+
+def test_curves_of_a_plot_are_eight_colors_and_then_dashed(loop: Watched) -> None:
+    page = loop.page
+    page.locator("#search").fill("N, N m")
+    boxes = page.locator("#tree-signals li").filter(has_text="[N, N m]").locator("input").all()
+    page.locator("#search").fill("")
+    for box in boxes:
+        box.check()
+    looks = max(loop.run("() => replay.looks"), key=len)
+    assert len(looks) == len(set(looks)) > 7
+    for box in boxes:
+        box.uncheck()
+
+
+def test_one_quantity_over_another_is_plotted_and_seeks(loop: Watched) -> None:
+    page = loop.page
+    before = page.locator(".plot").count()
+    row(loop, "relations", "phase rocker").locator("input").check()
+    assert page.locator(".plot").count() == before + 1
+    plot = page.locator(".plot").last
+    assert plot.locator("h2").inner_text() == "phase rocker velocity [rad/s] over position [rad]"
+    plot.locator("canvas").click(position={"x": 120, "y": 50})
+    assert loop.run("() => replay.time") > 0.0
+    row(loop, "relations", "phase rocker").locator("input").uncheck()
+    assert page.locator(".plot").count() == before
+
+
+SIZES = [(1400, 900), (900, 500), (420, 800)]
+
+
+@pytest.mark.parametrize("size", SIZES, ids=str)
+def test_panels_cover_no_control_and_curves_are_tall(loop: Watched, size: tuple[int, int]) -> None:
+    loop.page.set_viewport_size({"width": size[0], "height": size[1]})
+    loop.run("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    covered = loop.run("""() => [...document.querySelectorAll("#tools button, #transport button")]
+      .concat(document.getElementById("forces-toggle"))
+      .filter((item) => item.offsetParent).filter((item) => {
+        const { left, top, width, height } = item.getBoundingClientRect();
+        const hit = document.elementFromPoint(left + width / 2, top + height / 2);
+        return hit !== item && !item.contains(hit);
+      }).map((item) => item.id)""")
+    heights = loop.run("() => [...document.querySelectorAll('.plot canvas')].map((one) => one.clientHeight)")
+    list_height = loop.run("() => document.querySelector('#panel .scroll').clientHeight")
+    loop.page.set_viewport_size({"width": 1000, "height": 720})
+    assert covered == []
+    assert min(heights) >= 100
+    assert list_height > 60
+
+
+def test_the_splitter_gives_room_to_the_plots(loop: Watched) -> None:
+    height = "() => document.getElementById('dock').offsetHeight"
+    before, stage = loop.run(height), loop.page.locator("#stage").bounding_box()["height"]
+    handle = loop.page.locator("#splitter").bounding_box()
+    loop.page.mouse.move(300, handle["y"] + 3)
+    loop.page.mouse.down()
+    loop.page.mouse.move(300, handle["y"] - 77)
+    loop.page.mouse.up()
+    assert loop.run(height) == pytest.approx(before + 80, abs=4)
+    assert loop.page.locator("#stage").bounding_box()["height"] == pytest.approx(stage - 80, abs=4)
+    loop.page.locator("#splitter").focus()
+    loop.page.keyboard.press("ArrowDown")
+    assert loop.run(height) == pytest.approx(before + 56, abs=4)
+    loop.page.locator("#splitter").dblclick()
+    assert loop.run(height) == before
 
 
 def test_the_camera_follows_a_chosen_body(loop: Watched) -> None:
@@ -216,5 +302,35 @@ def test_signals_are_all_that_was_recorded_and_keep_their_peaks() -> None:
     run.v[1234, 1] = 77.0
     found = {signal.label: signal for signal in signals_of(run, run)}
     assert {"crank, position", "coupler, velocity", "loop, |lam|"} <= set(found)
+    assert {"loop, lam 2", "loop, lam_ideal 0", "rocker, friction, F_nonideal", "violation"} <= set(found)
     assert found["coupler, velocity"].values.max() == 77.0
     assert len(found["coupler, velocity"].t) < 2000
+
+
+@pytest.mark.parametrize("name", ["four_bar", "rough_four_bar", "solo12_standing"])
+def test_every_column_is_a_signal(name: str) -> None:
+    record = ("forces", "energy", "reactions", "power", "a")
+    run = pn.simulate(pn.load(name), 0.02, record=record)
+    signals = signals_of(run, run)
+    words = {word for signal in signals for word in (signal.label + " " + signal.words).split()}
+    text = [f" {signal.words} " for signal in signals]
+    for column in run.columns():
+        assert column == "t" or any(f"{column} " in words for words in text), column
+    assert {"torque", "tau", "load", "reaction", "power"} <= words
+    assert ("friction" in words) == (run.law_names != [])
+    assert signals[0].section == "Torques of the actuation"
+    others = {signal.label for signal in signals if signal.section == OTHERS}
+    assert others == {"violation", "violation rate"}
+
+
+def test_a_driven_robot_shows_torques_first() -> None:
+    driven = pn.simulate(pn.load("solo12_standing"), 0.02, record=("forces", "energy"))
+    assert default_plot_names(driven)[0] == "tau"
+    passive = pn.simulate(pn.load("rough_four_bar"), 0.02, record=("forces", "energy"))
+    assert default_plot_names(passive)[0] == "energy"
+
+
+def test_values_below_rounding_are_zero() -> None:
+    level = rounding_of([("N", np.array([3.0, -50.0, 1e-9])), ("rad", np.array([2.0, np.nan]))])
+    assert level == {"N": pytest.approx(5e-8), "rad": pytest.approx(2e-12)}
+    np.testing.assert_array_equal(without_rounding(np.array([3.0, -1e-9, np.nan]), 5e-8), [3.0, 0.0, np.nan])

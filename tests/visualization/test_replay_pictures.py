@@ -268,7 +268,7 @@ def test_a_hundred_thousand_samples_are_a_small_page_that_keeps_extremes(opened:
     q = np.column_stack([np.sin(t), np.cos(3.0 * t), 0.1 * t])
     v = np.column_stack([np.cos(t), -3.0 * np.sin(3.0 * t), np.full(len(t), 0.1)])
     v[43_210, 0] = 50.0
-    run = SimpleNamespace(**{**vars(run), "t": t, "q": q, "v": v, "violation": np.zeros(len(t))})
+    run = type(run)(**{**vars(run), "t": t, "q": q, "v": v, "violation": np.zeros(len(t))})
     page = opened(run, plots=["v"])
     assert pn.replay(run, tmp_path / "long.html", plots=["v"]).stat().st_size < 3_000_000
     page.run("t => replay.seek(t)", float(t[43_210]))

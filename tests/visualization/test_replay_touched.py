@@ -10,17 +10,17 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal.visualization.page.applied_forces import given_arrows
+from pin_nonideal.visualization.page.applied_forces import applied_force_arrows
 from pin_nonideal.visualization.page.camera import upward, view
-from pin_nonideal.visualization.page.contact_points import touches_of
-from pin_nonideal.visualization.page.contact_surfaces import planes_of, touched_of
+from pin_nonideal.visualization.page.contact_points import contact_points
+from pin_nonideal.visualization.page.contact_surfaces import contact_surfaces, planes_of
 from pin_nonideal.visualization.page.force_arrows import arrows_of
 from pin_nonideal.visualization.page.frames import sample
 from pin_nonideal.visualization.page.markers import marks_of
-from pin_nonideal.visualization.page.mode_timeline import bands_of, gaps_of, opens
-from pin_nonideal.visualization.page.resampling import between
+from pin_nonideal.visualization.page.mode_timeline import bands_of, gaps_of, has_open_contact
+from pin_nonideal.visualization.page.resampling import resample
 from pin_nonideal.visualization.page.signals import plots_of
-from pin_nonideal.visualization.page.stick_figure import sticks
+from pin_nonideal.visualization.page.stick_figure import link_bars
 from pin_nonideal.visualization.page.style import CLOSED, OPEN
 
 from ..support.replay_browser import Watched, headless_browser
@@ -42,7 +42,7 @@ def ball(**contact: Any) -> Any:
 def test_curves_of_few_samples_follow_the_motion_between_them() -> None:
     run = ball()
     assert len(run.t) < 60
-    finer, motion = between(run, sample(run))
+    finer, motion = resample(run, sample(run))
     fall = np.sqrt(2.0 / G)
     (place,) = plots_of(finer, ["q"])
     early = place.t < 0.999 * fall
@@ -56,7 +56,7 @@ def test_curves_of_few_samples_follow_the_motion_between_them() -> None:
 def test_dense_output_gives_the_frames_and_all_that_was_recorded() -> None:
     scene = pn.load("four_bar")
     run = pn.simulate(scene, 0.5, record=("dense", "forces", "energy"))
-    finer, motion = between(run, sample(run))
+    finer, motion = resample(run, sample(run))
     assert len(finer.t) > len(run.t)
     inner = np.flatnonzero((sample(run).part > 0.0) & (sample(run).part < 1.0))
     exact = run.at(motion.times[inner])
@@ -69,14 +69,14 @@ def test_scenes_that_do_not_travel_are_shown_between_their_samples() -> None:
     model = jointed(pin.JointModelRY())
     scene = pn.Scene(model, actuation=lambda t, q, v: np.array([np.sin(t)]))
     run = pn.simulate(scene, 1.0)
-    finer, _ = between(run, sample(run))
+    finer, _ = resample(run, sample(run))
     assert len(finer.t) > len(run.t)
     assert finer.scene is scene
 
 
 def test_gaps_and_modes_of_contacts_without_friction_are_shown() -> None:
     run = ball(height=-0.5)
-    assert opens(run)
+    assert has_open_contact(run)
     _, gaps = gaps_of(run)
     np.testing.assert_allclose(gaps["PointContact(ball)"], run.q[:, 0] + 0.5, atol=ROUNDING)
     ((name, pieces),) = bands_of(pn.simulate(run.scene, 6.0))
@@ -102,21 +102,21 @@ def test_an_incline_is_a_patch_below_the_path_of_what_touches_it() -> None:
     run = pn.simulate(scene, 0.5)
     motion = sample(run)
     (plane,) = planes_of(scene)
-    (patch,) = touched_of(run, motion, [], upward(model))
+    (patch,) = contact_surfaces(run, motion, [], upward(model))
     np.testing.assert_allclose(patch.placement.rotation[:, 2], plane.normal, atol=ROUNDING)
     top = patch.placement.act(np.array([0.0, 0.0, patch.shape.size[2] / 2.0]))
     assert abs(top[2]) < ROUNDING
     local = (motion.point(2, np.array([0.0, 0.0, -0.1])) - top) @ patch.placement.rotation[:, :2]
     assert (np.abs(local) <= np.array(patch.shape.size[:2]) / 2.0).all()
     level = pn.Scene(jointed(pin.JointModelPZ(), lever=0.0), q0=[0.1])
-    assert touched_of(pn.simulate(level, 0.1), sample(pn.simulate(level, 0.1)), [], upward(model)) == []
+    assert contact_surfaces(pn.simulate(level, 0.1), sample(pn.simulate(level, 0.1)), [], upward(model)) == []
 
 
 def test_a_stop_that_was_struck_stands_where_the_body_points_at_it() -> None:
     model = jointed(pin.JointModelRY())
     limit = pn.JointLimit("j0", lower=-2.0, upper=0.7, restitution=0.5)
     run = pn.simulate(pn.Scene(model, contacts=[limit], q0=[0.0]), 1.0, record="forces")
-    (stop,) = touched_of(run, sample(run), [], upward(model))
+    (stop,) = contact_surfaces(run, sample(run), [], upward(model))
     assert stop.name == "JointLimit(j0) upper"
     way = stop.placement.translation / np.linalg.norm(stop.placement.translation)
     np.testing.assert_allclose(way, [np.cos(0.7), 0.0, -np.sin(0.7)], atol=ROUNDING)
@@ -134,7 +134,7 @@ def test_springs_wrenches_and_drag_are_arrows_of_what_they_do() -> None:
     scene = pn.Scene(model, forces=forces, laws=[pn.Drag("tip", 0.4, exponent=2.0, name="air")], v0=[1.0])
     run = pn.simulate(scene, 1.0, output_dt=0.01)
     motion, marks = sample(run), marks_of(scene)
-    arrows = {(arrow.name, arrow.unit): arrow for arrow in given_arrows(run, motion, marks)}
+    arrows = {(arrow.name, arrow.unit): arrow for arrow in applied_force_arrows(run, motion, marks)}
     q, v = motion.q[:, 0], motion.of(run.v)[:, 0]
     pull = 30.0 * (2.0 - q - 1.5) - 0.7 * v
     for key, kind, expected in (
@@ -157,11 +157,11 @@ def test_torques_that_are_rounding_of_the_weight_have_no_arrow() -> None:
 def test_points_of_contact_that_span_a_solid_are_its_corners() -> None:
     model = jointed(pin.JointModelFreeFlyer(), lever=0.0)
     corners = [np.array([x, y, z]) for x in (-0.1, 0.1) for y in (-0.2, 0.2) for z in (-0.3, 0.3)]
-    (solid,) = sticks(model, [(1, corner) for corner in corners], 0.5)
+    (solid,) = link_bars(model, [(1, corner) for corner in corners], 0.5)
     found = solid.shape.vertices[solid.shape.triangles]
     volume = np.sum(np.linalg.det(found)) / 6.0  # volume of a closed surface with outward triangles
     assert volume == pytest.approx(0.2 * 0.4 * 0.6, rel=1e-12)
-    flat = sticks(model, [(1, corner) for corner in corners if corner[2] < 0.0], 0.5)
+    flat = link_bars(model, [(1, corner) for corner in corners if corner[2] < 0.0], 0.5)
     assert len(flat) > 3
 
 
@@ -204,11 +204,11 @@ def test_forces_between_round_bodies_act_where_they_touch() -> None:
     height = float(np.sqrt(0.5**2 - 0.2**2))
     run = pn.simulate(pn.Scene(model, contacts=[beam], q0=[height]), 0.1, record="forces")
     motion = sample(run)
-    (arrow,) = arrows_of(run, motion, touches_of(run, motion), given_arrows(run, motion, []))
+    (arrow,) = arrows_of(run, motion, contact_points(run, motion), applied_force_arrows(run, motion, []))
     np.testing.assert_allclose(arrow.values[:, 2], G, atol=ROUNDING)
     touching = np.array([0.0, 0.2 * 0.3 / 0.5, height - 0.3 * height / 0.5])
     np.testing.assert_allclose(arrow.origin, np.tile(touching, (len(motion.times), 1)), atol=ROUNDING)
-    names = {visual.name for visual in touched_of(run, motion, [], upward(model))}
+    names = {visual.name for visual in contact_surfaces(run, motion, [], upward(model))}
     assert names == {"ball round", "beam round"}
 
 

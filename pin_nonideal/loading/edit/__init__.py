@@ -1,1 +1,1 @@
-"""Changes to a model: joints exchanged, locked or fixed, another base."""
+"""Edits of a model: other joint types, locked or fixed joints, another base placement."""

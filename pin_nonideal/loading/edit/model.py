@@ -1,8 +1,8 @@
-"""Joints exchanged in a model that is already built: ball, universal, screw and fixed joints.
+"""Other joint types in an existing model: ball, universal, screw and fixed joints.
 
-URDF has no ball joint and no screw.  CAD exporters write a ball joint as three revolute joints in a row with
-massless links between; such a chain locks when its first and last axis become parallel (gimbal lock), where
-M is singular.  One ball joint does not.
+URDF has no ball joint and no screw joint. CAD exporters write a ball joint as three consecutive revolute
+joints with massless links. Such a chain is singular if its first and last axis are parallel (gimbal lock),
+because M is singular there. A ball joint has no such singularity.
 """
 
 from __future__ import annotations
@@ -13,14 +13,16 @@ from itertools import takewhile
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from pin_nonideal.errors import LoadingError
 from pin_nonideal.types import Array, GeometryModel, JointModel, Model, Placement
 
-# Links between the axes of a ball joint carry at most this part of the mass behind them.
-MASSLESS = 1e-6
-# Axes meet and are perpendicular to this accuracy [m, and cosine]: exporters print about ten digits.
-ALIGNED = 1e-7
+# Maximum mass of the links between the axes of a ball joint, relative to the mass that the joint carries.
+MAX_LINK_MASS = 1e-6
+ROUNDING = 1e-9  # remaining mass of a body without its links that is rounding, relative to the body
+# Tolerance for intersecting [m] and perpendicular [cosine] axes; exporters print about ten digits.
+AXIS_TOLERANCE = 1e-7
 
 UNIVERSAL = {
     "CARDAN": "XY",
@@ -36,12 +38,12 @@ JOINT_TYPES = ("SPHERICAL", "FIXED", *UNIVERSAL)
 
 @dataclass(frozen=True)
 class BallChain:
-    """Three revolute joints that make one ball joint.
+    """Three revolute joints that form one ball joint.
 
     Attributes:
         joints: indices of the three joints, from the root outwards.
         name: name of the ball joint.
-        center: place of the ball in the frame of the last joint, shape (3,) [m].
+        center: center of the ball joint in the frame of the last joint [m], (3,).
     """
 
     joints: tuple[int, int, int]
@@ -50,17 +52,17 @@ class BallChain:
 
 
 def ball_chains(model: Model, keep: Collection[str] = ()) -> list[BallChain]:
-    """Finds the chains of three revolutes that are ball joints.
+    """Find the chains of three revolute joints that are ball joints.
 
-    Their axes meet in one point, consecutive ones at right angles; the two links in between carry no mass and
-    no other joint; and none has a range, armature or friction.
+    The axes intersect in one point, and consecutive axes are perpendicular. The two links in between carry no
+    mass and no other joint. The joints have no limits, armature or friction.
 
     Args:
         model: pinocchio.Model.
-        keep: names of joints, frames and links that must stay (something refers to them).
+        keep: names of joints, frames and links that other entries refer to; they are not merged.
 
     Returns:
-        Chains that do not overlap, in the order of the joints.
+        Chains without common joints, in the order of the joints.
     """
     children: dict[int, list[int]] = {}
     for j in range(1, model.njoints):
@@ -78,7 +80,7 @@ def ball_chains(model: Model, keep: Collection[str] = ()) -> list[BallChain]:
         if names_at[a] & set(keep) or names_at[b] & set(keep) or model.names[c] in keep:
             continue
         carried = sum(model.inertias[k].mass for k in model.subtrees[c])
-        if max(model.inertias[a].mass, model.inertias[b].mass) > MASSLESS * carried:
+        if max(model.inertias[a].mass, model.inertias[b].mass) > MAX_LINK_MASS * carried:
             continue
         center = _common_point(model, a, b, c)
         if center is not None:
@@ -93,7 +95,7 @@ def _only_child(children: Mapping[int, Sequence[int]], joint: int | None) -> int
 
 
 def revolute_axis(model: Model, joint: int) -> Array | None:
-    """Unit axis of a revolute joint in its own frame, shape (3,), or None for any other joint."""
+    """Return the unit axis of a revolute joint in its own frame, (3,), or None for other joints."""
     j = model.joints[joint]
     if (
         not j.shortname().startswith("JointModelR")
@@ -107,7 +109,7 @@ def revolute_axis(model: Model, joint: int) -> Array | None:
 
 
 def _plain_revolute(model: Model, joint: int) -> bool:
-    """Whether a joint is a revolute without range, armature or friction: nothing a ball joint would lose."""
+    """Check if a joint is revolute without limits, armature and friction, which a ball joint would lose."""
     if revolute_axis(model, joint) is None:
         return False
     i, k = model.idx_vs[joint], model.idx_qs[joint]
@@ -120,7 +122,7 @@ def _plain_revolute(model: Model, joint: int) -> bool:
 
 
 def _common_point(model: Model, a: int, b: int, c: int) -> Array | None:
-    """The point where three axes meet, in c's frame at zero angles; None when they make no ball joint."""
+    """Return the intersection of three axes in c's frame at zero angles, or None for other chains."""
     b_in_c = model.jointPlacements[c].inverse()
     a_in_c = b_in_c * model.jointPlacements[b].inverse()
     axes = np.array(
@@ -130,17 +132,17 @@ def _common_point(model: Model, a: int, b: int, c: int) -> Array | None:
             revolute_axis(model, c),
         ]
     )
-    if abs(axes[0] @ axes[1]) > ALIGNED or abs(axes[1] @ axes[2]) > ALIGNED:
+    if abs(axes[0] @ axes[1]) > AXIS_TOLERANCE or abs(axes[1] @ axes[2]) > AXIS_TOLERANCE:
         return None
     origins = np.array([a_in_c.translation, b_in_c.translation, np.zeros(3)])
     across = [np.eye(3) - np.outer(u, u) for u in axes]
     point = np.linalg.solve(sum(across), sum(p @ o for p, o in zip(across, origins, strict=True)))
     gap = max(float(np.linalg.norm(p @ (point - o))) for p, o in zip(across, origins, strict=True))
-    return point if gap <= ALIGNED else None
+    return point if gap <= AXIS_TOLERANCE else None
 
 
 def _ball_name(model: Model, joints: tuple[int, int, int]) -> str:
-    """What the three names share, or the last name when that is nothing or taken."""
+    """Return the common prefix of the three names, or the last name if the prefix is short or in use."""
     first, last = (f([model.names[j] for j in joints]) for f in (min, max))
     shared = "".join(a for a, _ in takewhile(lambda pair: pair[0] == pair[1], zip(first, last, strict=False)))
     shared = shared.rstrip("_- ").removesuffix("rev").rstrip("_- ")
@@ -154,21 +156,21 @@ def edit_joints(
     types: Mapping[str, str],
     pitches: Mapping[str, float] | None = None,
 ) -> tuple[Model, list[GeometryModel]]:
-    """Builds the model anew with other joints.
+    """Rebuild the model with other joints.
 
     Args:
         model: pinocchio.Model.
-        geometries: geometry models that belong to it.
-        chains: revolutes to merge into ball joints, from `ball_chains`.
-        types: joint name to one of `JOINT_TYPES`.  A universal joint named `j` becomes revolutes `j_X` and
-            `j` (axes as in the type), so that each has an angle.
-        pitches: revolute joints that become helical about their axis, with their rise per radian [m/rad].
+        geometries: geometry models of the model.
+        chains: revolute joints to merge into ball joints, from `ball_chains`.
+        types: joint name to one of `JOINT_TYPES`. A universal joint named `j` becomes revolute joints `j_X`
+            and `j` (axes as in the type), so that each has an angle.
+        pitches: rise per radian [m/rad] of revolute joints that become helical, by name.
 
     Returns:
-        The new model and the new geometry models, in the given order.
+        New model and new geometry models, in the given order.
 
     Raises:
-        LoadingError: the type of a joint is unknown, a joint does not exist, or a screw has no axis.
+        LoadingError: a joint type is unknown, a joint does not exist, or a screw joint has no axis.
     """
     screws = {name: _screw(model, name, pitch) for name, pitch in (pitches or {}).items()}
     for name, kind in types.items():
@@ -182,7 +184,7 @@ def edit_joints(
     dropped = {j for chain in chains for j in chain.joints[:2]}
     new = pin.Model()
     new.name, new.gravity = model.name, model.gravity
-    # For each old joint: its index in the new model and where its frame lies there (dropped: at zero angle).
+    # For each old joint: its index in the new model and its placement there (merged joints: at zero angle).
     place: dict[int, tuple[int, Placement]] = {0: (0, pin.SE3.Identity())}
     for j in range(1, model.njoints):
         parent, offset = place[model.parents[j]]
@@ -214,12 +216,47 @@ def edit_joints(
     copies = [_move_geometry(model, new, geometry, place) for geometry in geometries]
     fixed = [new.getJointId(n) for n, kind in types.items() if kind == "FIXED"]
     if fixed:
-        new, copies = pin.buildReducedModel(new, copies, fixed, pin.neutral(new))
+        new, copies = reduced_model(new, copies, fixed, pin.neutral(new))
+    return new, list(copies)
+
+
+def reduced_model(
+    model: Model, geometries: Sequence[GeometryModel], joints: Sequence[int], q: NDArray[np.float64]
+) -> tuple[Model, list[GeometryModel]]:
+    """Return a model and its geometries with some joints fixed, by `pinocchio.buildReducedModel`.
+
+    Pinocchio makes the frame of such a joint its own parent, and gives it the inertia of the whole body of
+    the joint. Here the frame keeps its parent and has the inertia of its own link, as in a URDF.
+
+    Args:
+        model: pinocchio.Model.
+        geometries: pinocchio.GeometryModels.
+        joints: indices of the joints to fix.
+        q: configuration at which they are fixed, (nq,).
+    """
+    new, copies = pin.buildReducedModel(model, list(geometries), list(joints), q)
+    joint_kind = pin.FrameType.JOINT
+    for j in joints:
+        name = str(model.names[j])
+        if not (model.existFrame(name, joint_kind) and new.existFrame(name, pin.FrameType.FIXED_JOINT)):
+            continue
+        parent = model.frames[model.frames[model.getFrameId(name, joint_kind)].parentFrame]
+        fixed = new.frames[new.getFrameId(name, pin.FrameType.FIXED_JOINT)]
+        kinds = (parent.type, pin.FrameType.FIXED_JOINT)  # the parent may have been fixed as well
+        found = [new.getFrameId(parent.name, kind) for kind in kinds if new.existFrame(parent.name, kind)]
+        if found:
+            fixed.parentFrame = found[0]
+        own = model.inertias[j].toDynamicParameters()
+        for frame in model.frames:
+            if frame.parentJoint == j and frame.inertia.mass > 0.0:
+                own = own - frame.placement.act(frame.inertia).toDynamicParameters()
+        massive = own[0] > ROUNDING * model.inertias[j].mass
+        fixed.inertia = pin.Inertia.FromDynamicParameters(own) if massive else pin.Inertia.Zero()
     return new, list(copies)
 
 
 def _screw(model: Model, name: str, pitch: float) -> JointModel:
-    """A helical joint about the axis of a revolute joint."""
+    """Return a helical joint about the axis of a revolute joint."""
     if not model.existJointName(name):
         raise LoadingError(f'model: helical: no joint "{name}" in the robot')
     axis = revolute_axis(model, model.getJointId(name))
@@ -236,7 +273,7 @@ def _revolute(axis: str) -> JointModel:
 
 
 def _copy_limits(model: Model, j: int, new: Model, index: int) -> None:
-    """Limits, armature and dissipation of a joint that keeps its size; a joint of another size keeps none."""
+    """Copy limits, armature and dissipation to a joint of equal dimension; other joints get none."""
     if model.nvs[j] != new.nvs[index] or model.nqs[j] != new.nqs[index]:
         return
     old_v, new_v = (slice(m.idx_vs[k], m.idx_vs[k] + m.nvs[k]) for m, k in ((model, j), (new, index)))
@@ -265,7 +302,7 @@ def _copy_frames(
     dropped: Collection[int],
     renamed: Mapping[str, str],
 ) -> None:
-    """All frames but those of links that are gone; a merged joint's frame takes the ball joint's name."""
+    """Copy all frames except those of removed links; a merged joint's frame gets the ball joint's name."""
     index = {0: 0}
     for i, frame in enumerate(model.frames):
         if i == 0:
@@ -284,7 +321,7 @@ def _copy_frames(
 def _move_geometry(
     model: Model, new: Model, geometry: GeometryModel, place: Mapping[int, tuple[int, Placement]]
 ) -> GeometryModel:
-    """The same shapes on the new joints."""
+    """Return the same shapes on the new joints."""
     result = pin.GeometryModel()
     for shape in geometry.geometryObjects:
         copy = shape.copy()

@@ -1,4 +1,4 @@
-"""What a robot.yaml table changes of the tree: other joints, another base, joints locked or fixed."""
+"""Edits of the tree by a robot.yaml table: other joint types, another base, locked or fixed joints."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from pin_nonideal.description.constraints import JointCoupling
-from pin_nonideal.errors import LoadingError
+from pin_nonideal.errors import LoadingError, short_repr
 from pin_nonideal.loading.urdf.geometry_sources import Shapes
 from pin_nonideal.loading.urdf.reader import RobotFile
 from pin_nonideal.loading.urdf.xml import listed
@@ -18,24 +18,24 @@ from pin_nonideal.loading.yaml.initial_state import joint_index, vector
 from pin_nonideal.loading.yaml.robot import check_keys, joint_types, names_in, pitches
 from pin_nonideal.types import GeometryModel, Model, Table
 
-from .model import ball_chains, edit_joints
+from .model import ball_chains, edit_joints, reduced_model
 
-# Beyond this a base loses a tenth of a micrometer to floating-point numbers [m or rad].
-FARTHEST = 1e9
+# Maximum coordinate of a base [m or rad]; beyond it, floating-point rounding exceeds a tenth of a micrometer.
+MAX_COORDINATE = 1e9
 
 
 def exchange_joints(robot: RobotFile, table: Table, where: str, notes: list[str], merge: bool) -> None:
-    """Exchanges joint types as the table asks, and merges revolutes that make a ball joint.
+    """Change joint types as the table states, and merge revolute joints that form a ball joint.
 
     Args:
-        robot: what the robot's file holds; changed.
+        robot: content of the robot's file; modified.
         table: content of robot.yaml.
-        where: names the table in messages.
-        notes: receives a note of the joints that were merged.
-        merge: merge three revolutes with massless links between into ball joints.
+        where: prefix of error messages that names the table.
+        notes: receives a note on merged joints.
+        merge: whether three revolute joints with massless links are merged into a ball joint.
 
     Raises:
-        LoadingError: a joint of the table does not exist, or cannot be exchanged.
+        LoadingError: a joint of the table does not exist, or its type cannot be changed.
     """
     types, screws = joint_types(table, where), pitches(table, where)
     coupled = {n for c in robot.constraints for n in vars(c).values() if isinstance(n, str)}
@@ -54,13 +54,13 @@ def exchange_joints(robot: RobotFile, table: Table, where: str, notes: list[str]
 
 
 def _exchange(robot: RobotFile, edit: Callable[[list[Any]], tuple[Any, Iterable[Any]]]) -> None:
-    """Puts an edited model and its geometries in the place of the robot's own."""
+    """Replace the model and the geometries of a robot by edited ones."""
     robot.model, _ = edit([])
     _edit_shapes(robot, lambda geometry: next(iter(edit([geometry])[1])))
 
 
 def _edit_shapes(robot: RobotFile, edit: Callable[[GeometryModel], GeometryModel]) -> None:
-    """Edits the robot's shapes, those that are not read yet when they are."""
+    """Edit the shapes of a robot; shapes that are not read yet are edited on reading."""
     for key in ("visual", "collision"):
         shapes = getattr(robot, key)
         if shapes is not None:
@@ -68,26 +68,28 @@ def _edit_shapes(robot: RobotFile, edit: Callable[[GeometryModel], GeometryModel
 
 
 def place_base(robot: RobotFile, table: Table, where: str) -> None:
-    """Mounts the robot where `model: {base: {xyz: ..., rpy: ...}}` says: on a wall, or from the ceiling.
+    """Place the base of a robot as `model: {base: {xyz: ..., rpy: ...}}` states, for example on a wall.
 
     Args:
-        robot: what the robot's file holds; changed.
+        robot: content of the robot's file; modified.
         table: content of robot.yaml.
-        where: names the table in messages.
+        where: prefix of error messages that names the table.
 
     Raises:
-        LoadingError: the entry is no placement.
+        LoadingError: the entry is not a placement.
     """
     entry = (table.get("model") or {}).get("base")
     if entry is None:
         return
     where = f"{where}: model: base"
     if not isinstance(entry, dict):
-        raise LoadingError(f"{where} must be a table with the keys xyz, rpy; got {entry!r}")
+        raise LoadingError(f"{where} must be a table with the keys xyz, rpy; got {short_repr(entry)}")
     check_keys(entry, ("xyz", "rpy"), where)
     xyz, rpy = (np.array(vector(entry.get(k, [0, 0, 0]), 3, f"{where}: {k}")) for k in ("xyz", "rpy"))
-    if np.abs([*xyz, *rpy]).max() > FARTHEST:
-        raise LoadingError(f"{where}: xyz and rpy must be at most {FARTHEST:g} (m, rad); got {entry!r}")
+    if np.abs([*xyz, *rpy]).max() > MAX_COORDINATE:
+        raise LoadingError(
+            f"{where}: xyz and rpy must be at most {MAX_COORDINATE:g} (m, rad); got {short_repr(entry)}"
+        )
     base, model = pin.SE3(pin.rpy.rpyToMatrix(rpy), xyz), robot.model
     for j in range(1, model.njoints):
         if model.parents[j] == 0:
@@ -108,48 +110,48 @@ def place_base(robot: RobotFile, table: Table, where: str) -> None:
 def lock(
     robot: RobotFile, table: Table, q0: NDArray[np.float64], v0: NDArray[np.float64], where: str
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Fixes the joints that `model: {locked: ...}` names where the initial configuration has them.
+    """Fix the joints of `model: {locked: ...}` at their positions in the initial configuration.
 
     Args:
-        robot: what the robot's file holds; changed.
+        robot: content of the robot's file; modified.
         table: content of robot.yaml.
         q0: initial configuration, (nq,).
         v0: initial velocity, (nv,).
-        where: names the table in messages.
+        where: prefix of error messages that names the table.
 
     Returns:
-        Configuration and velocity of the joints that are left.
+        Configuration and velocity of the remaining joints.
 
     Raises:
-        LoadingError: a joint does not exist, or the entry is no list.
+        LoadingError: a joint does not exist, or the entry is not a list.
     """
     entry = table.get("model") or {}
     locked = entry.get("locked") or []
     if not isinstance(locked, list):
-        raise LoadingError(f"{where}: model: locked must be a list of joint names; got {locked!r}")
+        raise LoadingError(f"{where}: model: locked must be a list of joint names; got {short_repr(locked)}")
     if not locked:
         return q0, v0
     indices = [joint_index(robot.model, n, f"{where}: model: locked") for n in locked]
     return _reduced(robot, indices, q0, v0)
 
 
-def fix_idle(
+def fix_massless(
     robot: RobotFile, named: set[str], q0: NDArray[np.float64], v0: NDArray[np.float64], notes: list[str]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Fixes the joints that move no inertia at all, where neither a loop nor another joint hangs on them.
+    """Fix the joints that move no inertia, unless a loop or another joint depends on them.
 
     Args:
-        robot: what the robot's file holds; changed.
-        named: what robot.yaml names.
+        robot: content of the robot's file; modified.
+        named: names in robot.yaml.
         q0: initial configuration, (nq,).
         v0: initial velocity, (nv,).
-        notes: receives a note of the joints that were fixed.
+        notes: receives a note on fixed joints.
 
     Returns:
-        Configuration and velocity of the joints that are left.
+        Configuration and velocity of the remaining joints.
     """
     model = robot.model
-    idle = [j for j in range(1, model.njoints) if _moves_nothing(model, j)]
+    idle = [j for j in range(1, model.njoints) if _moves_no_inertia(model, j)]
     idle = [j for j in idle if not names_on(model, j) & named]
     leaders = {c.joint2 for c in robot.constraints if isinstance(c, JointCoupling)}
     names = {model.names[j] for j in idle}
@@ -164,8 +166,8 @@ def fix_idle(
     return _reduced(robot, idle, q0, v0)
 
 
-def _moves_nothing(model: Model, joint: int) -> bool:
-    """Whether no link beyond a joint has mass or inertia, and no joint there a rotor's."""
+def _moves_no_inertia(model: Model, joint: int) -> bool:
+    """Check if no link beyond a joint has mass or inertia, and no joint there has armature."""
     beyond = list(model.subtrees[joint])
     dofs = [i for j in beyond for i in range(model.idx_vs[j], model.idx_vs[j] + model.nvs[j])]
     bare = all(model.inertias[j].mass == 0.0 and not model.inertias[j].inertia.any() for j in beyond)
@@ -173,11 +175,11 @@ def _moves_nothing(model: Model, joint: int) -> bool:
 
 
 def names_on(model: Model, joint: int) -> set[str]:
-    """Names of a joint and of all frames beyond it.
+    """Return the names of a joint and of all frames beyond it.
 
     Args:
         model: pinocchio.Model.
-        joint: index.
+        joint: index of the joint.
     """
     beyond = set(model.subtrees[joint])
     return {str(f.name) for f in model.frames if f.parentJoint in beyond} | {str(model.names[joint])}
@@ -186,23 +188,23 @@ def names_on(model: Model, joint: int) -> set[str]:
 def _reduced(
     robot: RobotFile, indices: list[int], q0: NDArray[np.float64], v0: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Fixes joints where they are at q0; returns the configuration and velocity of the others."""
+    """Fix joints at q0, and return the configuration and velocity of the others."""
     model = robot.model
     kept = [j for j in range(1, model.njoints) if j not in indices]
     none = [np.zeros(0)]
     q = np.concatenate([q0[model.idx_qs[j] : model.idx_qs[j] + model.nqs[j]] for j in kept] or none)
     v = np.concatenate([v0[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]] for j in kept] or none)
-    _exchange(robot, lambda geometries: pin.buildReducedModel(model, geometries, indices, q0))
+    _exchange(robot, lambda geometries: reduced_model(model, geometries, indices, q0))
     return q, v
 
 
-def still_moves(model: Model, constraint: Any, where: str) -> bool:
-    """Whether a constraint of the robot's file still has its joints; without them it is met already.
+def has_joints(model: Model, constraint: Any, where: str) -> bool:
+    """Check if the joints of a constraint in the robot's file still exist; without them it is satisfied.
 
     Args:
         model: pinocchio.Model.
-        constraint: of the robot's file.
-        where: names the table in messages.
+        constraint: constraint of the robot's file.
+        where: prefix of error messages that names the table.
 
     Raises:
         LoadingError: one of two coupled joints is locked and the other is not.

@@ -12,13 +12,13 @@ import numpy as np
 import pinocchio as pin
 
 from pin_nonideal.errors import LoadingError, UnknownNameError, nearest
-from pin_nonideal.loading.urdf.geometry_sources import Shapes, kept_models, kept_shapes, stamps
+from pin_nonideal.loading.urdf.geometry_sources import Shapes, cached_models, cached_shapes, file_stamps
 from pin_nonideal.loading.urdf.reader import RobotFile, read_mimics
 from pin_nonideal.types import Model
 
 
 def example_names() -> Sequence[str]:
-    """Names of example-robot-data, none where it is not installed."""
+    """Return the names of example-robot-data, or an empty tuple if it is not installed."""
     try:
         from example_robot_data import robots_loader
     except ImportError:
@@ -27,11 +27,11 @@ def example_names() -> Sequence[str]:
 
 
 def example_robot(name: str, others: list[str]) -> RobotFile:
-    """A robot of example-robot-data, with its reference posture.
+    """Return a robot of example-robot-data, with its reference posture.
 
     Raises:
-        UnknownNameError: neither this package nor example-robot-data has it.
-        LoadingError: example-robot-data has it but cannot load it.
+        UnknownNameError: neither this package nor example-robot-data has the robot.
+        LoadingError: example-robot-data has the robot but cannot load it.
     """
     try:
         from example_robot_data import robots_loader
@@ -43,8 +43,8 @@ def example_robot(name: str, others: list[str]) -> RobotFile:
     if name not in robots_loader.ROBOTS:
         raise UnknownNameError(f'no robot "{name}"{nearest(name, [*others, *robots_loader.ROBOTS])}')
     try:
-        robot, path = _drawn_later(robots_loader, name)
-    except Exception as error:  # the loaders raise whatever their parsers raise
+        robot, path = _load_lazily(robots_loader, name)
+    except Exception as error:  # any error of the loaders' parsers
         raise LoadingError(
             f'example-robot-data cannot load "{name}": {" ".join(str(error).split())}'
         ) from error
@@ -57,10 +57,10 @@ def example_robot(name: str, others: list[str]) -> RobotFile:
     return robot
 
 
-def _drawn_later(robots_loader: Any, name: str) -> tuple[RobotFile, Path]:
-    """What a loader of example-robot-data makes, without the meshes until something asks for them; its file.
+def _load_lazily(robots_loader: Any, name: str) -> tuple[RobotFile, Path]:
+    """Return a robot of example-robot-data, whose meshes are read on first use, and the path of its file.
 
-    A loader that edits what it read is left to its own ways, meshes and all.
+    If the class of the robot has its own `__init__`, it also loads the meshes.
     """
     kind = robots_loader.ROBOTS[name]
     if kind.__init__ is not robots_loader.RobotLoader.__init__ or not kind.urdf_filename:
@@ -71,9 +71,9 @@ def _drawn_later(robots_loader: Any, name: str) -> tuple[RobotFile, Path]:
     inside = os.path.join(kind.path, kind.urdf_subpath, kind.urdf_filename)
     base = kind.model_path or robots_loader.getModelPath(inside, False)
     file, root = os.path.join(base, inside), pin.JointModelFreeFlyer() if kind.free_flyer else None
-    content = (*stamps([file]), kind.free_flyer)
+    content = (*file_stamps([file]), kind.free_flyer)
     read = partial(pin.buildModelFromUrdf, file, *([root] if root else []))
-    model = kept_models(content, read).copy()
+    model = cached_models(content, read).copy()
     q0, srdf = pin.neutral(model), None
     if kind.srdf_filename:
         srdf = os.path.join(base, kind.path, kind.srdf_subpath, kind.srdf_filename)
@@ -81,15 +81,21 @@ def _drawn_later(robots_loader: Any, name: str) -> tuple[RobotFile, Path]:
     if kind.free_flyer:
         model.upperPositionLimit[:7], model.lowerPositionLimit[:7] = 1.0, -1.0
     read = partial(_example_shapes, model.copy(), file, os.path.join(base, "../.."), srdf)
-    shapes = partial(kept_shapes, (*content, *stamps([srdf] if srdf else [])), read)
+    shapes = partial(cached_shapes, (*content, *file_stamps([srdf] if srdf else [])), read)
     visual, collision = (Shapes(cache(lambda k=k: shapes()[k].copy())) for k in range(2))
     return RobotFile(model, visual, collision, q0=np.array(q0)), Path(file)
 
 
 def _example_shapes(model: Model, file: str, packages: str, srdf: str | None) -> tuple[Any, Any]:
-    """Drawn and colliding shapes of a robot of example-robot-data, with the pairs of its SRDF."""
+    """Return visual and collision shapes of a robot of example-robot-data, with the pairs of its SRDF."""
+    import coal
+
     kinds = (pin.GeometryType.VISUAL, pin.GeometryType.COLLISION)
-    visual, collision = (pin.buildGeomFromUrdf(model, file, kind, package_dirs=[packages]) for kind in kinds)
+    loader = coal.CachedMeshLoader()  # most robots collide with the meshes that are drawn
+    visual, collision = (
+        pin.buildGeomFromUrdf(model, file, kind, package_dirs=[packages], mesh_loader=loader)
+        for kind in kinds
+    )
     if srdf is not None:
         collision.addAllCollisionPairs()
         pin.removeCollisionPairs(model, collision, srdf, False)

@@ -1,4 +1,4 @@
-"""Robots that are built from parameters instead of read from a file."""
+"""Robots that are generated from parameters."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from pin_nonideal.loading.urdf.reader import RobotFile
 from pin_nonideal.types import GeometryModel, Model, Placement
 from pin_nonideal.validation import count, nonnegative, number, positive
 
-THICKNESS = 0.03  # of a drawn rod over its length
-MOST_WINDOWS = 10_000  # Pinocchio's own time to add so many joints is minutes
+THICKNESS = 0.03  # radius of a drawn rod, relative to its length
+MAX_WINDOWS = 10_000  # more joints would take Pinocchio minutes to add
 
 
 def n_four_bar(
     *, N: int = 2, m: float = 1.0, L: float = 1.0, g: float = 9.81, speed: float = 1.0
 ) -> RobotFile:
-    """N four-bar windows side by side: N + 1 cranks pinned to the ground and N couplers between their tips.
+    """N four-bar windows side by side: N + 1 cranks on the ground and N couplers between their tips.
 
-    All rods are uniform, with inertia m L^2 / 12 about the center.  The cranks start upright and their tips
-    move along +x. The spanning tree is shallow: each crank is a branch of its own from the ground and carries
-    the coupler to its right, whose far end is anchored on the next crank's tip.  The motion is in the x-z
-    plane, with gravity along -z.
+    All rods are uniform, with inertia m L^2 / 12 about the center. The cranks start upright and their tips
+    move along +x. Each crank is a separate branch of the spanning tree and carries the coupler to its right,
+    whose far end is anchored to the tip of the next crank. The motion is in the x-z plane, with gravity along
+    -z.
 
-    Joint "crank<i>" turns about y: the angle from the upward vertical towards +x.  Frames "crank<i>_tip",
-    "coupler<i>_tip".
+    Joint "crank<i>" rotates about y: its angle is measured from the upward vertical towards +x. Frames:
+    "crank<i>_tip", "coupler<i>_tip".
 
     Args:
         N: number of windows, from 1 to 10,000.
@@ -37,19 +37,19 @@ def n_four_bar(
         speed: initial speed of the crank tips [m/s].
 
     Raises:
-        InputError: a parameter out of range.
+        InputError: a parameter is out of range.
 
     Source:
         IFToMM benchmark A02; Bayo and Avello, Nonlinear Dynamics 5 (1994) 209-231.
     """
-    N = count("n_four_bar: N", N, least=1, most=MOST_WINDOWS)
+    N = count("n_four_bar: N", N, least=1, most=MAX_WINDOWS)
     m, L = positive("n_four_bar: m", m), positive("n_four_bar: L", L)
     g, speed = nonnegative("n_four_bar: g", g), number("n_four_bar: speed", speed)
     model, visual = pin.Model(), pin.GeometryModel()
     model.name = "n_four_bar"
     model.gravity = pin.Motion(np.array([0.0, 0.0, -g]), np.zeros(3))
     constraints = []
-    for i in range(N + 1):  # branch by branch, as Pinocchio's algorithms need the joints numbered
+    for i in range(N + 1):  # branch by branch, because Pinocchio's algorithms need this joint order
         crank = _rod(model, visual, 0, f"crank{i}", np.array([i * L, 0.0, 0.0]), "z", m, L)
         if i < N:
             _rod(model, visual, crank, f"coupler{i}", np.array([0.0, 0.0, L]), "x", m, L)
@@ -70,7 +70,7 @@ def _rod(
     m: float,
     L: float,
 ) -> int:
-    """Adds a uniform rod along its own x or z axis, hinged about y at `place`, and returns its joint."""
+    """Add a uniform rod along its own x or z axis, hinged about y at `place`, and return its joint."""
     import coal
 
     e = np.array([1.0, 0.0, 0.0]) if direction == "x" else np.array([0.0, 0.0, 1.0])

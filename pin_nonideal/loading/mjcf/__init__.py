@@ -1,1 +1,1 @@
-"""MJCF files: MuJoCo compiles them, and what it compiles becomes the arguments of a scene."""
+"""MJCF files: MuJoCo compiles them, and the compiled model becomes the arguments of a scene."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pin_nonideal.errors import InputError, UnknownNameError, nearest
+from pin_nonideal.errors import InputError, UnknownNameError, nearest, short_repr
 from pin_nonideal.types import Array
 from pin_nonideal.validation import array, number
 
@@ -16,9 +16,9 @@ from .motion import FixedTendon
 from .transmissions import BODY, TENDON, Geared, OnBall, OnSite, Transmission
 from .tree import Tree
 
-NO_DYNAMICS, INTEGRATOR, FILTER, FILTER_EXACT = range(4)  # of MuJoCo's mjtDyn
-FIXED, AFFINE = 0, 1  # of MuJoCo's mjtGain; of its mjtBias they are none and affine
-LEAST_TIME = 1e-15  # of a filter [s], MuJoCo's smallest number
+NO_DYNAMICS, INTEGRATOR, FILTER, FILTER_EXACT = range(4)  # MuJoCo's mjtDyn
+FIXED, AFFINE = 0, 1  # MuJoCo's mjtGain; in mjtBias the same values mean none and affine
+MIN_TIME_CONSTANT = 1e-15  # minimum time constant of a filter [s], MuJoCo's mjMINVAL
 
 Control = Array | Sequence[float] | Mapping[str, float] | Callable[..., object] | None
 
@@ -26,39 +26,40 @@ Control = Array | Sequence[float] | Mapping[str, float] | Callable[..., object] 
 class Actuators:
     """Torques of the actuators of an MJCF file, a function (t, q, v) -> tau.
 
-    The force of each is gain(length, rate) times its control, plus a bias that is affine in length and rate;
-    controls and forces are cut off at their ranges, as is the sum of the forces on a joint or a tendon.  An
-    actuator with an activation filters or integrates its control, from the given activation at t = 0 on.
+    The force of an actuator is gain(length, rate) times its control, plus a bias that is affine in length and
+    rate. Controls and forces are clamped to their ranges, as is the sum of the forces on a joint or a tendon.
+    An actuator with an activation filters or integrates its control, starting with a given activation at t =
+    0.
 
     Args:
-        tree: the compiled model and its tree.
-        carried: index and transmission of each actuator that acts.
-        compensation: generalized force of gravity compensation that joints receive through their drives,
-            (t, q, v) -> (nv,), or None.
-        clamp: whether controls are cut off at their ranges.
+        tree: compiled model and its tree.
+        supported: index and transmission of each supported actuator.
+        compensation: generalized force of gravity compensation that acts through the drives of joints, (t, q,
+            v) -> (nv,), or None.
+        clamp: whether controls are clamped to their ranges.
 
     Attributes:
-        names: of the controls.
-        ctrl: the controls, (nu,), or a function (t, q, v) -> (nu,).
+        names: names of the controls.
+        ctrl: controls, (nu,), or a function (t, q, v) -> (nu,).
         act: activations at t = 0, (na,).
     """
 
     def __init__(
         self,
         tree: Tree,
-        carried: list[tuple[int, Transmission]],
+        supported: list[tuple[int, Transmission]],
         compensation: Callable[[float, Array, Array], Array] | None,
         clamp: bool,
     ) -> None:
         m = self._m = tree.compiled
-        self._indices = np.array([i for i, _ in carried], dtype=int)
-        self._transmissions = [transmission for _, transmission in carried]
+        self._indices = np.array([i for i, _ in supported], dtype=int)
+        self._transmissions = [transmission for _, transmission in supported]
         self._compensation, self._clamp = compensation, clamp
         self.names = _control_names(m)
         self.ctrl: Array | Callable[..., object] = np.zeros(m.nu)
         self.act = np.zeros(m.na)
-        self._arms = np.zeros((len(carried), tree.model.nv))
-        self._lengths = np.zeros((len(carried), tree.model.nq))
+        self._arms = np.zeros((len(supported), tree.model.nv))
+        self._lengths = np.zeros((len(supported), tree.model.nq))
         self._curved = []
         for k, transmission in enumerate(self._transmissions):
             if isinstance(transmission, Geared) and isinstance(transmission.tendon, FixedTendon):
@@ -66,13 +67,13 @@ class Actuators:
                 self._lengths[k] = transmission.gear * transmission.tendon.coefficients
             else:
                 self._curved.append(k)
-        self._periods = [_period(m, i, t) for i, t in carried]
+        self._periods = [_period(m, i, t) for i, t in supported]
         joints = [j for j in range(m.njnt) if m.jnt_actfrclimited[j] and m.jnt_type[j] > 1]
         self._limited = np.array([m.jnt_dofadr[j] for j in joints], dtype=int)
         self._limits = np.array([m.jnt_actfrcrange[j] for j in joints]).reshape(-1, 2)
 
     def __call__(self, t: float, q: Array, v: Array) -> Array:
-        """Torques of all actuators, (nv,) [N m or N].
+        """Return the torques of all actuators, (nv,) [N m or N].
 
         Args:
             t: time [s].
@@ -92,19 +93,19 @@ class Actuators:
         return np.asarray(tau)
 
     def forces(self, t: float, q: Array, v: Array, lengths: Array, rates: Array) -> Array:
-        """Forces of the actuators that act, from the lengths and rates of their transmissions.
+        """Return the forces of the supported actuators from the lengths and rates of their transmissions.
 
         Args:
             t: time [s].
             q: configuration, (nq,).
             v: velocity, (nv,).
-            lengths: of the transmissions.
-            rates: of the transmissions.
+            lengths: lengths of the transmissions.
+            rates: rates of the transmissions.
         """
         m, i = self._m, self._indices
         inputs = self._inputs(t, q, v)
         for k, period in enumerate(self._periods):
-            if period:  # the representative of the set angle that is nearest
+            if period:  # the nearest equivalent of the set angle
                 inputs[k] -= period * round((inputs[k] - lengths[k]) / period)
         gain, bias = m.actuator_gainprm[i], m.actuator_biasprm[i]
         varying = m.actuator_gaintype[i] == AFFINE
@@ -116,7 +117,7 @@ class Actuators:
         return np.asarray(np.where(m.actuator_forcelimited[i], np.clip(force, low, high), force))
 
     def _inputs(self, t: float, q: Array, v: Array) -> Array:
-        """What enters each actuator: its control, or the activation that follows from it."""
+        """Return the input of each actuator: its control, or the resulting activation."""
         m = self._m
         ctrl = self.ctrl
         if callable(ctrl):
@@ -126,7 +127,7 @@ class Actuators:
             except (TypeError, ValueError):
                 ctrl = np.full(m.nu, np.nan)
             if not np.isfinite(ctrl).all():
-                raise InputError(f"ctrl must return {m.nu} finite numbers; got {given!r}")
+                raise InputError(f"ctrl must return {m.nu} finite numbers; got {short_repr(given)}")
         if self._clamp:
             low, high = m.actuator_ctrlrange.T
             ctrl = np.where(m.actuator_ctrllimited, np.clip(ctrl, low, high), ctrl)
@@ -136,14 +137,14 @@ class Actuators:
             if kind == INTEGRATOR:
                 inputs[k] = self.act[start] + inputs[k] * t
             elif kind in (FILTER, FILTER_EXACT):
-                decay = math.exp(-t / max(LEAST_TIME, m.actuator_dynprm[i, 0]))
+                decay = math.exp(-t / max(MIN_TIME_CONSTANT, m.actuator_dynprm[i, 0]))
                 inputs[k] += (self.act[start] - inputs[k]) * decay
             if kind != NO_DYNAMICS and m.actuator_actlimited[i]:
                 inputs[k] = np.clip(inputs[k], *m.actuator_actrange[i])
         return np.asarray(inputs)
 
     def _limit_tendons(self, force: Array) -> None:
-        """Scales the forces on a tendon where their sum leaves its range."""
+        """Scale the forces on a tendon if their sum exceeds its range."""
         m, i = self._m, self._indices
         on_tendon = m.actuator_trntype[i] == TENDON
         for tendon in np.flatnonzero(m.tendon_actfrclimited):
@@ -153,15 +154,15 @@ class Actuators:
                 force[mine] *= float(np.clip(total, *m.tendon_actfrcrange[tendon])) / total
 
     def set_control(self, ctrl: Control, act: Array | None = None) -> None:
-        """Sets the controls, and the activations at t = 0.
+        """Set the controls, and the activations at t = 0.
 
         Args:
-            ctrl: numbers (nu,), a table by actuator's name, a function (t, q, v) -> (nu,), or None for zeros.
-            act: activations, (na,); zeros when None.
+            ctrl: numbers (nu,), a table by actuator name, a function (t, q, v) -> (nu,), or None for zeros.
+            act: activations, (na,); None for zeros.
 
         Raises:
-            InputError: wrong sizes, or a function where an actuator has an activation.
-            UnknownNameError: no actuator of that name.
+            InputError: a size is wrong, or a function is given for an actuator with an activation.
+            UnknownNameError: no actuator has that name.
         """
         nu = len(self.names)
         self.act = np.zeros(self._m.na) if act is None else np.array(act)
@@ -185,7 +186,7 @@ class Actuators:
 
 
 def _control_names(m: Any) -> list[str]:
-    """A name for each control: its actuator's, numbered where it takes several."""
+    """Return the name of each control: its actuator's name, numbered if the actuator has several controls."""
     names = [""] * m.nu
     for a in range(m.nactuator):
         adr = m.name_actuatoradr[a]
@@ -196,7 +197,7 @@ def _control_names(m: Any) -> list[str]:
 
 
 def _period(m: Any, actuator: int, transmission: Transmission) -> float:
-    """Where a servo sets the angle of a ball joint or between sites: the length of a full turn, else 0."""
+    """Return the period of a servo's set angle for a ball joint or between sites, 0 for other actuators."""
     servo = (
         m.actuator_biastype[actuator] == AFFINE
         and m.actuator_gaintype[actuator] == FIXED
@@ -211,12 +212,12 @@ def _period(m: Any, actuator: int, transmission: Transmission) -> float:
     return 0.0
 
 
-def acts(m: Any, actuator: int) -> bool:
-    """Whether an actuator can give a force at all.
+def can_produce_force(m: Any, actuator: int) -> bool:
+    """Check if an actuator can produce a force.
 
     Args:
         m: mujoco.MjModel.
-        actuator: its index.
+        actuator: index of the actuator.
     """
     group = int(m.actuator_group[actuator])
     if 0 <= group <= 30 and m.opt.disableactuator & (1 << group):
@@ -226,12 +227,12 @@ def acts(m: Any, actuator: int) -> bool:
     return not plain or bool(gains.any() or biases.any())
 
 
-def carriable(m: Any, actuator: int) -> bool:
-    """Whether the force of an actuator follows from its control, its length and its rate.
+def is_supported(m: Any, actuator: int) -> bool:
+    """Check if the force of an actuator depends on its control, length and rate only.
 
     Args:
         m: mujoco.MjModel.
-        actuator: its index.
+        actuator: index of the actuator.
     """
     return bool(
         m.actuator_gaintype[actuator] <= AFFINE

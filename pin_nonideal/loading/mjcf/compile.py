@@ -1,4 +1,4 @@
-"""MJCF files compiled by MuJoCo itself, with meshes that carry no mass left for the replay to read."""
+"""Compilation of MJCF files by MuJoCo; meshes without mass are read later, for the replay."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ import numpy as np
 from pin_nonideal.errors import LoadingError
 from pin_nonideal.loading.urdf.xml import read_text
 
-from .fields import CARRIED, CARRIED_OPTIONS
+from .fields import CONVERTED, CONVERTED_OPTIONS
 
-OLDEST = 4  # version of MuJoCo whose compiled models are known field by field
-PLACEHOLDER = 1e-3  # radius of the sphere that stands for a shape that is not read [m]
+MIN_VERSION = 4  # oldest supported major version of MuJoCo, because the fields of compiled models differ
+PLACEHOLDER = 1e-3  # radius of the sphere that replaces a shape that is not read [m]
 
 
 class Compiled(NamedTuple):
-    """What MuJoCo makes of a file.
+    """Compiled MJCF file.
 
     Attributes:
         model: mujoco.MjModel.
-        absent: indices of geoms whose mesh or height field was not found; spheres stand for them.
-        unread: indices of geoms whose mesh or height field was left unread; spheres stand for them.
-        notes: what the user should know about the reading.
+        absent: indices of geoms whose mesh or height field is missing; they are replaced by spheres.
+        unread: indices of geoms whose mesh or height field was not read; they are replaced by spheres.
+        notes: notes on the reading for the user.
     """
 
     model: Any
@@ -38,10 +38,10 @@ class Compiled(NamedTuple):
 
 
 def mujoco_module(path: Path) -> Any:
-    """MuJoCo's Python package.
+    """Return MuJoCo's Python package.
 
     Raises:
-        LoadingError: it is not installed, or too old.
+        LoadingError: the package is not installed, or too old.
     """
     try:
         import mujoco
@@ -50,40 +50,40 @@ def mujoco_module(path: Path) -> Any:
             f'"{path}" is an MJCF file, which MuJoCo compiles, and mujoco cannot be imported ({error}); '
             "pip install 'pin-nonideal[mjcf]'"
         ) from None
-    if int(mujoco.__version__.split(".")[0]) < OLDEST:
+    if int(mujoco.__version__.split(".")[0]) < MIN_VERSION:
         raise LoadingError(
-            f'"{path}" needs mujoco {OLDEST} or newer; got {mujoco.__version__}; '
+            f'"{path}" needs mujoco {MIN_VERSION} or newer; got {mujoco.__version__}; '
             "pip install --upgrade 'pin-nonideal[mjcf]'"
         )
     return mujoco
 
 
 def compile_mjcf(path: Path, *, meshes: bool = False) -> Compiled:
-    """Compiles an MJCF file.
+    """Compile an MJCF file.
 
     Args:
-        path: the file.
-        meshes: whether to read the meshes that carry no mass too, which takes most of the time.
+        path: path of the file.
+        meshes: whether meshes without mass are read too, which takes most of the time.
 
     Raises:
-        LoadingError: the file is malformed, MuJoCo refuses it, or a mesh that carries mass is missing.
+        LoadingError: the file is malformed, MuJoCo rejects it, or a mesh with mass is missing.
     """
     mujoco = mujoco_module(path)
-    _require_root(path)
+    _check_root(path)
     try:
         compiled = _compile(mujoco, path, meshes, probe=False)
     except LoadingError:
         if not meshes:
             raise
         compiled = _compile(mujoco, path, meshes, probe=True)
-    _require_numbers(compiled.model, path)
+    _check_finite(compiled.model, path)
     return compiled
 
 
 def _compile(mujoco: Any, path: Path, meshes: bool, *, probe: bool) -> Compiled:
-    """Compiles a file; `probe` also leaves out the meshes without mass that MuJoCo cannot read."""
+    """Compile a file; with `probe`, also without the massless meshes that MuJoCo cannot read."""
     notes: list[str] = []
-    with warnings.catch_warnings(record=True) as caught, _heard(mujoco) as told:
+    with warnings.catch_warnings(record=True) as caught, _collected_warnings(mujoco) as messages:
         warnings.simplefilter("always")
         try:
             spec = mujoco.MjSpec.from_file(str(path))
@@ -94,35 +94,35 @@ def _compile(mujoco: Any, path: Path, meshes: bool, *, probe: bool) -> Compiled:
             model = spec.compile()
         except ValueError as error:
             raise LoadingError(f'"{path}" cannot be compiled by MuJoCo: {_one_line(error)}') from None
-    words = [" ".join(text.split()) for text in (*(str(one.message) for one in caught), *told)]
+    words = [" ".join(text.split()) for text in (*(str(one.message) for one in caught), *messages)]
     notes += [f"MuJoCo: {text}" for text in dict.fromkeys(words)]
     identities = [frozenset(int(g.id) for g in geoms) for geoms in (absent, unread)]
     return Compiled(model, identities[0], identities[1], notes)
 
 
 @contextmanager
-def _heard(mujoco: Any) -> Iterator[list[str]]:
-    """What MuJoCo warns of, which it prints and writes to a file in the working directory otherwise."""
-    told: list[str] = []
+def _collected_warnings(mujoco: Any) -> Iterator[list[str]]:
+    """Collect MuJoCo's warnings, which are otherwise printed and written to the working directory."""
+    messages: list[str] = []
     before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(told.append)
+    mujoco.set_mju_user_warning(messages.append)
     try:
-        yield told
+        yield messages
     finally:
         mujoco.set_mju_user_warning(before)
 
 
-def _require_numbers(model: Any, path: Path) -> None:
-    """MuJoCo only warns of NaN, and would take a range of it for none."""
-    fields = {f"option {name}": getattr(model.opt, name) for name in CARRIED_OPTIONS.split()}
-    fields |= {name: getattr(model, name) for name in CARRIED.split() if name != "opt"}
+def _check_finite(model: Any, path: Path) -> None:
+    """Check that a model contains no NaN, which MuJoCo accepts with a warning and treats as no range."""
+    fields = {f"option {name}": getattr(model.opt, name) for name in CONVERTED_OPTIONS.split()}
+    fields |= {name: getattr(model, name) for name in CONVERTED.split() if name != "opt"}
     bad = [name for name, values in fields.items() if np.isnan(np.asarray(values, dtype=float)).any()]
     if bad:
         raise LoadingError(f'"{path}" must hold finite numbers; MuJoCo finds NaN in {", ".join(bad)}')
 
 
-def _require_root(path: Path) -> None:
-    """Another XML file is said to be one; MuJoCo would read a URDF in its own way."""
+def _check_root(path: Path) -> None:
+    """Check that an XML file is MJCF, because MuJoCo also reads URDF by other rules."""
     text = re.sub(r"<!--.*?(-->|\Z)|<\?.*?\?>", "", read_text(path), flags=re.DOTALL)
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise LoadingError(f'"{path}" must not declare a DOCTYPE or entities; remove them')
@@ -146,13 +146,13 @@ def _one_line(error: Exception) -> str:
 def _assets(
     mujoco: Any, spec: Any, path: Path, meshes: bool, probe: bool, notes: list[str]
 ) -> tuple[list[Any], list[Any]]:
-    """Takes away textures, skins, and shapes that are missing or that only a replay needs.
+    """Remove textures, skins, and shapes that are missing or needed for a replay only.
 
     Returns:
-        Geoms whose shape is absent, and geoms whose shape was left unread.
+        Geoms whose shape is missing, and geoms whose shape was not read.
 
     Raises:
-        LoadingError: a shape that carries mass is missing.
+        LoadingError: a shape with mass is missing.
     """
     _strip(spec, notes)
     assets = [*spec.meshes, *spec.hfields]
@@ -162,13 +162,13 @@ def _assets(
     broken = {_shape(a) for a in assets if probe and not _is_readable(mujoco, a, places.get(_shape(a)))}
     files = {_shape(asset): asset.file for asset in assets}
     absent, unread = [], []
-    wrapping = _wrapping(mujoco, spec)
+    wrapping = _wrapped_geoms(mujoco, spec)
     for geom in spec.geoms:
         shape = geom.meshname or geom.hfieldname
         if not shape:
             continue
         if _carries_mass(mujoco, spec, geom) or geom.name in wrapping:
-            if shape in lost:  # one that is no asset, or that is broken, is for MuJoCo to refuse
+            if shape in lost:  # MuJoCo rejects undeclared assets and broken files itself
                 raise LoadingError(
                     f'"{path}": body "{geom.parent.name}" has its mass from mesh "{files[shape]}", which was '
                     "not found; put the mesh there or give the body an <inertial>"
@@ -189,7 +189,7 @@ def _assets(
 
 
 def _strip(spec: Any, notes: list[str]) -> None:
-    """Takes away what is only drawn or measured, and may name files that did not travel along."""
+    """Remove textures, skins and plugin sensors: they do not affect the motion, and files may be missing."""
     for material in spec.materials:
         material.textures = [""] * len(material.textures)
     for asset in (*spec.textures, *spec.skins):
@@ -205,12 +205,12 @@ def _shape(asset: Any) -> str:
 
 
 def _is_readable(mujoco: Any, asset: Any, place: Path | None) -> bool:
-    """Whether MuJoCo can compile a mesh or a height field by itself; what has no file is for it to refuse."""
+    """Check if MuJoCo can compile a mesh or a height field alone; True for an asset without a file."""
     if place is None:
         return True
     probe = mujoco.MjSpec()
     geom = probe.worldbody.add_geom()
-    if hasattr(asset, "nrow"):  # a height field
+    if hasattr(asset, "nrow"):  # height field
         probe.add_hfield(name="probe", file=str(place), size=asset.size)
         geom.type, geom.hfieldname = mujoco.mjtGeom.mjGEOM_HFIELD, "probe"
     else:
@@ -224,7 +224,7 @@ def _is_readable(mujoco: Any, asset: Any, place: Path | None) -> bool:
 
 
 def _place(spec: Any, asset: Any, homes: Sequence[Path]) -> Path | None:
-    """Where the file of a mesh or a height field lies, None where it is nowhere."""
+    """Return the path of the file of a mesh or a height field, or None if it is missing."""
     name = Path(asset.file).name if spec.strippath else asset.file
     folders = [asset.compiler.meshdir or "", spec.meshdir or "", ""]
     places = (home / folder / name for home in homes for folder in folders)
@@ -232,7 +232,7 @@ def _place(spec: Any, asset: Any, homes: Sequence[Path]) -> Path | None:
 
 
 def _homes(path: Path) -> list[Path]:
-    """Folders from which paths lead: of the file, and of the models that it or its includes attach."""
+    """Return the base folders of relative paths: folders of the file, its includes and attached models."""
     homes: dict[Path, None] = {}
     left, seen = [(path.resolve(), path.resolve().parent)], set()
     while left:
@@ -243,7 +243,7 @@ def _homes(path: Path) -> list[Path]:
         homes[home] = None
         try:
             text = file.read_text(encoding="utf-8", errors="ignore")
-        except OSError:  # which MuJoCo has refused, or does not need
+        except OSError:  # MuJoCo has rejected the file already, or does not need it
             continue
         for tag, name in re.findall(r"<(include|model)\b[^>]*?\bfile\s*=\s*[\"']([^\"']+)[\"']", text):
             named = (home / name).resolve()
@@ -251,15 +251,15 @@ def _homes(path: Path) -> list[Path]:
     return list(homes)
 
 
-def _wrapping(mujoco: Any, spec: Any) -> set[str]:
-    """Names of the geoms that tendons go around; a geom that is not there is for MuJoCo to refuse."""
+def _wrapped_geoms(mujoco: Any, spec: Any) -> set[str]:
+    """Return the names of the geoms that tendons wrap around; missing geoms are ignored."""
     around = (mujoco.mjtWrap.mjWRAP_SPHERE, mujoco.mjtWrap.mjWRAP_CYLINDER)
     wraps = [w for tendon in spec.tendons for w in tendon.path if w.type in around]
     return {w.target.name for w in wraps if w.target is not None}
 
 
 def _moves(body: Any) -> bool:
-    """Whether a joint moves a body."""
+    """Check if a joint moves a body."""
     while body is not None:
         if body.joints:
             return True
@@ -268,7 +268,7 @@ def _moves(body: Any) -> bool:
 
 
 def _carries_mass(mujoco: Any, spec: Any, geom: Any) -> bool:
-    """Whether MuJoCo takes the mass of a body that moves from this geom, or a share of the mass of all."""
+    """Check if MuJoCo computes the mass of a moving body, or a share of the total mass, from this geom."""
     compiler, body = geom.compiler, geom.parent
     if not _moves(body) and spec.compiler.settotalmass <= 0.0:
         return False
@@ -283,7 +283,7 @@ def _carries_mass(mujoco: Any, spec: Any, geom: Any) -> bool:
 
 
 def _drop_unused(spec: Any) -> None:
-    """Takes away the assets that no shape needs any more."""
+    """Remove the assets that no shape uses."""
     used = {name for geom in spec.geoms for name in (geom.meshname, geom.hfieldname)}
     used |= {getattr(site, "meshname", "") for site in spec.sites}
     for asset in (*spec.meshes, *spec.hfields):

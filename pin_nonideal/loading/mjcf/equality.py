@@ -21,12 +21,12 @@ from pin_nonideal.types import Array, Placement
 from .motion import FixedTendon, Tendon
 from .tree import Tree, placement, translation
 
-CONNECT, WELD, JOINT, TENDON = range(4)  # of MuJoCo's mjtEq; those after are of flexes
-SITE = 6  # of MuJoCo's mjtObj
+CONNECT, WELD, JOINT, TENDON = range(4)  # MuJoCo's mjtEq; later values are of flexes
+SITE = 6  # MuJoCo's mjtObj
 
 
 def equality_name(tree: Tree, index: int) -> str:
-    """Name of an equality, or its kind and number."""
+    """Return the name of an equality, or its kind and number."""
     m = tree.compiled
     adr = m.name_eqadr[index]
     kinds = ("connect", "weld", "joint", "tendon")
@@ -35,15 +35,15 @@ def equality_name(tree: Tree, index: int) -> str:
 
 
 def read_equality(tree: Tree, index: int, tendons: list[Tendon | None]) -> Constraint | None:
-    """One equality as a constraint.
+    """Return one equality as a constraint.
 
     Args:
-        tree: the compiled model and its tree, which receives frames.
-        index: of the equality.
-        tendons: from `read_tendons`.
+        tree: compiled model and its tree, which receives frames.
+        index: index of the equality.
+        tendons: tendons from `read_tendons`.
 
     Returns:
-        The constraint, or None for what cannot be carried: flexes, and tendons that wrap.
+        Constraint, or None for the unsupported equalities of flexes and wrapping tendons.
     """
     m, name = tree.compiled, equality_name(tree, index)
     one, two = int(m.eq_obj1id[index]), int(m.eq_obj2id[index])
@@ -60,7 +60,7 @@ def read_equality(tree: Tree, index: int, tendons: list[Tendon | None]) -> Const
 
 
 def _anchor(tree: Tree, kind: int, one: int, two: int, numbers: Array, sites: bool, name: str) -> Constraint:
-    """Points or frames held together: of sites, or given on both bodies."""
+    """Return an anchor of points or frames, from sites or from positions on both bodies."""
     m = tree.compiled
     sides: list[tuple[int, Placement]]
     if sites:
@@ -70,12 +70,12 @@ def _anchor(tree: Tree, kind: int, one: int, two: int, numbers: Array, sites: bo
     else:
         sides = [(one, placement(numbers[3:6], numbers[6:10])), (two, translation(numbers[:3]))]
     first, second = (tree.add_frame(f"{name}/{i + 1}", *side) for i, side in enumerate(sides))
-    whole = kind == WELD and numbers[10] != 0.0  # torquescale, zero where the weld holds places only
+    whole = kind == WELD and numbers[10] != 0.0  # torquescale, zero if the weld fixes the position only
     return (FrameAnchor if whole else PointAnchor)(first, second, name=name)
 
 
 def _coupling(tree: Tree, one: int, two: int, c: Array, name: str) -> Constraint:
-    """Y - y0 = c0 + c1 (x - x0) + ... + c4 (x - x0)^4, with x0 and y0 the reference positions."""
+    """Return Y - y0 = c0 + c1 (x - x0) + ... + c4 (x - x0)^4, with the reference positions x0 and y0."""
     m = tree.compiled
     y0 = float(m.qpos0[m.jnt_qposadr[one]])
     if two < 0 or not c[1:5].any():
@@ -94,13 +94,13 @@ def _coupling(tree: Tree, one: int, two: int, c: Array, name: str) -> Constraint
 
 @dataclass(frozen=True, eq=False)
 class Lengths:
-    """The row Y - y0 = c0 + c1 (X - x0) + ... of two lengths, or Y - y0 = c0 of one.
+    """Row Y - y0 = c0 + c1 (X - x0) + ... for two lengths, or Y - y0 = c0 for one.
 
     Attributes:
-        lengths: Y and X, or Y alone.
+        lengths: Y and X, or Y only.
         rests: y0 and x0.
-        c: the five coefficients.
-        needs_data: whether Pinocchio's kinematics are made for it.
+        c: five coefficients of the polynomial.
+        needs_data: whether the row needs Pinocchio's kinematics.
     """
 
     needs_data: ClassVar[bool] = False
@@ -109,16 +109,16 @@ class Lengths:
     c: Array
 
     def residual(self, t: float, q: Array) -> Array:
-        """What must vanish, (1,)."""
+        """Return the residual, (1,)."""
         away = self.lengths[0].length(q) - self.rests[0]
         return np.array([away - (self._derivatives(q)[0] if len(self.lengths) == 2 else self.c[0])])
 
     def rate(self, t: float, q: Array, v: Array) -> Array:
-        """Its rate, (1,)."""
+        """Return the rate of the residual, (1,)."""
         return np.array([self._row(q) @ v])
 
     def __call__(self, t: float, q: Array, v: Array, data: object) -> tuple[Array, Array]:
-        """The row and the acceleration along it, (1, nv) and (1,)."""
+        """Return the row and the right-hand side for the acceleration, (1, nv) and (1,)."""
         b = -self.lengths[0].drift(q, v)
         if len(self.lengths) == 2:
             _, slope, bend = self._derivatives(q)
@@ -127,7 +127,7 @@ class Lengths:
         return self._row(q)[None, :], np.array([b])
 
     def _derivatives(self, q: Array) -> tuple[float, float, float]:
-        """The polynomial of the second length with its first and second derivative."""
+        """Return the polynomial of the second length, with its first and second derivative."""
         x = self.lengths[1].length(q) - self.rests[1]
         a, b, c, d, e = self.c[:5].tolist()
         value = a + x * (b + x * (c + x * (d + x * e)))

@@ -1,11 +1,12 @@
-"""Every field of MuJoCo's compiled model: carried over, told, or without effect on the motion.
+"""Fields of MuJoCo's compiled model: converted, reported, or without effect on the motion.
 
-The lists are the whole of mjModel and mjOption of the version named in `compile`; a test holds them to it.
+The lists contain all fields of mjModel and mjOption of the version that `compile` requires; a test checks
+them.
 """
 
 from __future__ import annotations
 
-CARRIED = """
+CONVERTED = """
 opt qpos0 qpos_spring body_parentid body_jntnum body_jntadr body_pos body_quat body_ipos body_iquat
 body_mass body_inertia body_gravcomp jnt_type jnt_qposadr jnt_dofadr jnt_bodyid jnt_actuatorid jnt_limited
 jnt_range jnt_pos jnt_axis jnt_stiffness jnt_stiffnesspoly jnt_actfrclimited jnt_actfrcrange jnt_actgravcomp
@@ -22,7 +23,7 @@ actuator_ctrllimited actuator_ctrlrange actuator_gear key_qpos key_qvel key_act 
 pair_geom2 exclude_signature nq nv nu nactuator na nbody njnt ngeom nsite neq ntendon nkey npair nexclude
 nout nwrap
 """
-TOLD = """
+REPORTED = """
 body_mocapid body_plugin jnt_plasticadr jnt_springyield tree_sleep_policy geom_plugin geom_surfacevel
 geom_adhesion geom_margin geom_gap geom_condim geom_priority geom_solmix geom_solref geom_solimp jnt_solref
 jnt_solimp jnt_margin dof_solref dof_solimp eq_solref eq_solimp pair_dim pair_solref pair_solreffriction
@@ -33,16 +34,16 @@ actuator_ctrlspec actuator_actnum actuator_lengthrange actuator_acc0 sensor_plug
 plugin_attradr plugin_stateadr plugin_statenum key_mpos key_mquat key_plastic nflex nplugin nmocap nplastic
 flg_adhesion flg_surfacevel nsensor
 """
-# Families by the beginning of their names: of flexes, told as a whole, or drawn or measured only.
+# Prefixes of fields: of flexes, which are reported as a whole, and of fields for display or measurement only.
 FLEX = ("flex_", "flexedge_", "nflex", "efm0", "efmC", "nefm")
-IDLE = """
+IGNORED = """
 cam light mat mesh skin tex text tuple numeric sensor bvh oct vis stat hfield name names paths key_time
 nuser nname npath ncam nlight nmat nmesh nskin ntex ntuple nnumeric nsensor nbvh noct nhfield nplugin
 nhistory geom_rgba geom_group geom_matid geom_user geom_castshadow site_type site_size site_rgba site_group
 site_matid site_user site_dataid tendon_rgba tendon_group tendon_matid tendon_user tendon_width body_user
 jnt_user jnt_group actuator_user signature
 """
-# What MuJoCo computes from the rest: sizes of its buffers, sparsity, bounds, values at the reference pose.
+# Values that MuJoCo computes from other fields: buffer sizes, sparsity, bounds, values at the reference pose.
 DERIVED = """
 B_colind B_rowadr B_rownnz D_colind D_diag D_rowadr D_rownnz M_colind M_rowadr M_rownnz mapD2M mapM2D mapM2M
 nB nC nD nJfe nJmom nJten nM narena nbuffer nconmax nemax njmax nuserdata npolygonmax ntree body_rootid
@@ -53,15 +54,15 @@ tree_bodynum tree_dofadr tree_dofnum geom_sameframe geom_aabb geom_rbound site_s
 tendon_treeid ten_J_rownnz ten_J_rowadr ten_J_colind tendon_invweight0 actuator_outnum actuator_historyadr
 actuator_length0 pair_signature flg_gravcomp ngravcomp
 """
-CARRIED_OPTIONS = "gravity wind density viscosity disableflags disableactuator"
-TOLD_OPTIONS = "enableflags o_friction o_margin o_solimp o_solref impratio cone timestep integrator"
-IDLE_OPTIONS = """
+CONVERTED_OPTIONS = "gravity wind density viscosity disableflags disableactuator"
+REPORTED_OPTIONS = "enableflags o_friction o_margin o_solimp o_solref impratio cone timestep integrator"
+IGNORED_OPTIONS = """
 magnetic tolerance ls_tolerance noslip_tolerance ccd_tolerance sleep_tolerance jacobian solver iterations
 ls_iterations noslip_iterations ccd_iterations sdf_initpoints sdf_iterations
 """
 
 
-def known(field: str) -> bool:
-    """Whether a field of mjModel stands on one of the lists."""
-    listed = {*CARRIED.split(), *TOLD.split(), *DERIVED.split()}
-    return field in listed or field.startswith((*FLEX, *IDLE.split()))
+def is_listed(field: str) -> bool:
+    """Check if a field of mjModel is in one of the lists."""
+    listed = {*CONVERTED.split(), *REPORTED.split(), *DERIVED.split()}
+    return field in listed or field.startswith((*FLEX, *IGNORED.split()))

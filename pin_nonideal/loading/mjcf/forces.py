@@ -1,4 +1,4 @@
-"""Springs, damping, friction, gravity compensation and fluid of a compiled MJCF model."""
+"""Springs, damping, friction, gravity compensation and fluid forces of a compiled MJCF model."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from pin_nonideal.description.laws import JointFriction, UserFriction, UserLaw
 from pin_nonideal.types import Array, Placement
 
 from .motion import Motion
-from .tendons import Level, polynomial
+from .tendons import ConstantForce, polynomial
 from .tree import BALL, FREE, Tree, actuator_share, placement, translation
 
-LEAST_MASS = 1e-15  # [kg], and [kg m^2]: MuJoCo's smallest number, below which its fluid forgets a body
+MIN_MASS = 1e-15  # [kg] and [kg m^2]: MuJoCo's mjMINVAL; its fluid model ignores lighter bodies
 
 
 @dataclass(frozen=True, eq=False)
 class Springs:
-    """Springs of joints that `JointSpring` cannot say: ball and free joints, and higher powers.
+    """Springs of joints that `JointSpring` cannot represent: ball and free joints, and higher powers.
 
     Attributes:
-        single: place in q, degree of freedom, stiffness, higher factors, rest [rad or m].
-        turning: the same of rotations; rest is a rotation matrix.
-        sliding: the same of floating bodies; rest is a place.
+        single: index in q, degree of freedom, stiffness, higher coefficients, rest position [rad or m].
+        turning: the same values for rotations; the rest position is a rotation matrix.
+        sliding: the same values for positions of free joints; the rest position is a point.
     """
 
     single: list[tuple[int, int, float, Array, float]]
@@ -35,7 +35,7 @@ class Springs:
     sliding: list[tuple[int, int, float, Array, Array]]
 
     def __call__(self, t: float, q: Array, v: Array) -> Array:
-        """Generalized force, (nv,)."""
+        """Return the generalized force, (nv,)."""
         tau = np.zeros_like(v)
         for at, dof, stiffness, higher, rest in self.single:
             x = q[at] - rest
@@ -52,19 +52,19 @@ class Springs:
 
 @dataclass(frozen=True, eq=False)
 class Damping:
-    """Damping of joints that `JointFriction` cannot say: free joints, and higher powers of the velocity.
+    """Damping of joints that `JointFriction` cannot represent: free joints, and higher velocity powers.
 
     Attributes:
-        dofs: degrees of freedom and their factors: linear, and of the next powers.
-        floating: place of the quaternion in q, and first degree of freedom, of each free joint, whose
-            linear velocities are damped along the world's axes.
+        dofs: degrees of freedom with their linear and higher coefficients.
+        floating: index of the quaternion in q, and first degree of freedom, of each free joint, whose linear
+            velocities are damped along the world's axes.
     """
 
     dofs: list[tuple[int, float, Array]]
     floating: list[tuple[int, int]]
 
     def __call__(self, t: float, q: Array, v: Array, reactions: object) -> Array:
-        """Generalized force, (nv,)."""
+        """Return the generalized force, (nv,)."""
         rates, tau = np.array(v), np.zeros_like(v)
         turns = [(dof, rotation(q, at)) for at, dof in self.floating]
         for dof, turn in turns:
@@ -78,7 +78,7 @@ class Damping:
 
 @dataclass(frozen=True, eq=False)
 class FloatingArmature:
-    """What keeps the armature of a free joint without Coriolis terms along the world's axes: -m_a (w x v).
+    """Force that cancels the Coriolis terms of a free joint's armature: -m_a (w x v).
 
     Attributes:
         bodies: first degree of freedom and armature of each free joint.
@@ -87,7 +87,7 @@ class FloatingArmature:
     bodies: list[tuple[int, float]]
 
     def __call__(self, t: float, q: Array, v: Array) -> Array:
-        """Generalized force, (nv,)."""
+        """Return the generalized force, (nv,)."""
         tau = np.zeros_like(v)
         for dof, armature in self.bodies:
             tau[dof : dof + 3] = -armature * np.cross(v[dof + 3 : dof + 6], v[dof : dof + 3])
@@ -99,9 +99,9 @@ class DofDirection:
     """Direction of the friction of one degree of freedom of a ball or free joint.
 
     Attributes:
-        dof: the degree of freedom.
-        first: first one of three along the world's axes, or -1 where it is the joint's own axis.
-        at: place of the quaternion in q.
+        dof: degree of freedom.
+        first: first of three degrees of freedom along the world's axes, or -1 for the joint's own axis.
+        at: index of the quaternion in q.
         size: number of degrees of freedom.
     """
 
@@ -111,7 +111,7 @@ class DofDirection:
     size: int
 
     def __call__(self, t: float, q: Array) -> Array:
-        """Row of the slip velocity, (nv,)."""
+        """Return the row of the slip velocity, (nv,)."""
         row = np.zeros(self.size)
         if self.first < 0:
             row[self.dof] = 1.0
@@ -124,16 +124,17 @@ class DofDirection:
 class Fluid:
     """Drag and viscous resistance on each body's box of equal inertia, MuJoCo's inertia model.
 
-    With r the edges of the box, d their mean, u and w the velocities of the center of mass through the fluid:
+    The edges of the box are r, with the mean d; the velocities of the center of mass relative to the fluid
+    are u and w:
 
         f_i = -1/2 density r_j r_k |u_i| u_i - 3 pi viscosity d u_i
         g_i = -1/64 density r_i (r_j^4 + r_k^4) |w_i| w_i - pi viscosity d^3 w_i
 
     Attributes:
-        motion: velocities of the bodies.
-        boxes: joint, placement of the principal axes, edges of the box, (3,) [m].
-        density: of the fluid [kg/m^3].
-        viscosity: of the fluid [Pa s].
+        motion: kinematics of the bodies.
+        boxes: joint, placement of the principal axes, and edges (3,) [m] of each box.
+        density: density of the fluid [kg/m^3].
+        viscosity: viscosity of the fluid [Pa s].
         wind: velocity of the fluid, (3,) [m/s].
     """
 
@@ -144,7 +145,7 @@ class Fluid:
     wind: Array
 
     def __call__(self, t: float, q: Array, v: Array, reactions: object) -> Array:
-        """Generalized force, (nv,)."""
+        """Return the generalized force, (nv,)."""
         self.motion.update(q, v)
         forces = []
         for joint, local, r in self.boxes:
@@ -160,13 +161,13 @@ class Fluid:
 
 
 def rotation(q: Array, at: int) -> Array:
-    """Rotation matrix of the quaternion (x, y, z, w) at a place in q."""
+    """Return the rotation matrix of the quaternion (x, y, z, w) at an index of q."""
     x, y, z, w = q[at : at + 4]
     return np.asarray(pin.Quaternion(w, x, y, z).matrix())
 
 
 def joint_springs(tree: Tree) -> list[Any]:
-    """Springs of the joints as given forces."""
+    """Return the springs of the joints as given forces."""
     m = tree.compiled
     result: list[Any] = []
     springs = Springs([], [], [])
@@ -193,12 +194,12 @@ def joint_springs(tree: Tree) -> list[Any]:
 
 
 def joint_resistance(tree: Tree, *, dampers: bool, friction: bool) -> list[Any]:
-    """Damping and dry friction of the joints as laws.
+    """Return damping and dry friction of the joints as laws.
 
     Args:
-        tree: the compiled model and its tree.
-        dampers: whether dampers act.
-        friction: whether dry friction acts.
+        tree: compiled model and its tree.
+        dampers: whether dampers are enabled.
+        friction: whether dry friction is enabled.
     """
     m = tree.compiled
     share = actuator_share(m, np.column_stack([m.actuator_damping, m.actuator_dampingpoly]), joints=True)
@@ -221,26 +222,28 @@ def joint_resistance(tree: Tree, *, dampers: bool, friction: bool) -> list[Any]:
             if kind == FREE:
                 rest.floating.append((int(m.jnt_qposadr[j]) + 3, first))
         if kind <= BALL:
-            laws += _dry_freedoms(tree, j, dofs, dry)
+            laws += _dof_friction(tree, j, dofs, dry)
     if rest.dofs:
         laws.append(UserLaw(rest, reaction=None, name="damping"))
     return laws
 
 
-def _dry_freedoms(tree: Tree, j: int, dofs: range, dry: list[float]) -> list[Any]:
-    """Dry friction of each degree of freedom of a ball or free joint by itself, as MuJoCo has it."""
+def _dof_friction(tree: Tree, j: int, dofs: range, dry: list[float]) -> list[Any]:
+    """Return separate dry friction for each degree of freedom of a ball or free joint, as in MuJoCo."""
     at = int(tree.compiled.jnt_qposadr[j]) + 3
     laws = []
     for k, (dof, level) in enumerate(zip(dofs, dry, strict=True)):
         if level > 0.0:
             world = len(dofs) == 6 and k < 3
             direction = DofDirection(dof, dofs[0] if world else -1, at, tree.model.nv)
-            laws.append(UserFriction(direction, Level(level), name=f"{tree.joint_name(j)} friction {k}"))
+            laws.append(
+                UserFriction(direction, ConstantForce(level), name=f"{tree.joint_name(j)} friction {k}")
+            )
     return laws
 
 
 def floating_armature(tree: Tree) -> list[Any]:
-    """The force that gives free joints MuJoCo's armature, as a given force."""
+    """Return the given force that reproduces MuJoCo's armature of free joints."""
     m, model = tree.compiled, tree.model
     bodies = [
         (int(m.jnt_dofadr[j]), float(model.armature[m.jnt_dofadr[j]]))
@@ -252,12 +255,12 @@ def floating_armature(tree: Tree) -> list[Any]:
 
 @dataclass(frozen=True, eq=False)
 class GravityCompensation:
-    """Generalized force of constant forces at centers of mass, on the degrees of freedom that are asked for.
+    """Generalized force of constant forces at centers of mass, on selected degrees of freedom.
 
     Attributes:
-        motion: places of the bodies.
-        lifts: joint, placement of the center of mass, force [N].
-        on: 1 for each degree of freedom that receives it, else 0, (nv,).
+        motion: kinematics of the bodies.
+        lifts: joint, placement of the center of mass, and force [N].
+        on: 1 for each selected degree of freedom, else 0, (nv,).
     """
 
     motion: Motion
@@ -265,17 +268,17 @@ class GravityCompensation:
     on: Array
 
     def __call__(self, t: float, q: Array, v: Array) -> Array:
-        """Generalized force, (nv,)."""
+        """Return the generalized force, (nv,)."""
         self.motion.update(q)
         forces = [(joint, local, lift, np.zeros(3)) for joint, local, lift in self.lifts]
         return self.on * self.motion.generalized(q, forces)
 
 
 def gravity_compensation(tree: Tree) -> tuple[list[Any], GravityCompensation | None]:
-    """Forces at the centers of mass against gravity.
+    """Return the forces at the centers of mass that compensate gravity.
 
     Returns:
-        Given forces, and what reaches joints through their drives, which may cut it off.
+        Given forces, and the compensation that acts through the drives of joints, whose limits apply to it.
     """
     m, forces, lifts = tree.compiled, [], []
     gravity = np.array(tree.model.gravity.linear)
@@ -297,7 +300,7 @@ def gravity_compensation(tree: Tree) -> tuple[list[Any], GravityCompensation | N
 
 
 def fluid_forces(tree: Tree) -> list[Any]:
-    """Forces of the fluid on bodies without ellipsoids, as a law."""
+    """Return the fluid forces on bodies without ellipsoids, as a law."""
     m = tree.compiled
     if not (m.opt.density or m.opt.viscosity):
         return []
@@ -305,9 +308,9 @@ def fluid_forces(tree: Tree) -> list[Any]:
     boxes = []
     for body in range(1, m.nbody):
         mass, moments = float(m.body_mass[body]), np.array(m.body_inertia[body])
-        if mass < LEAST_MASS or body in elliptic or tree.bodies[body][0] == 0:
+        if mass < MIN_MASS or body in elliptic or tree.bodies[body][0] == 0:
             continue
-        edges = np.sqrt(np.maximum(LEAST_MASS, moments.sum() - 2.0 * moments) / mass * 6.0)
+        edges = np.sqrt(np.maximum(MIN_MASS, moments.sum() - 2.0 * moments) / mass * 6.0)
         boxes.append((*tree.on_body(body, placement(m.body_ipos[body], m.body_iquat[body])), edges))
     law = Fluid(tree.motion, boxes, float(m.opt.density), float(m.opt.viscosity), np.array(m.opt.wind))
     return [UserLaw(law, reaction=None, name="fluid")] if boxes else []

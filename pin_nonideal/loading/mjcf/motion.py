@@ -1,4 +1,4 @@
-"""Places, velocities and forces on bodies, for the forces of MJCF files that are written in Python."""
+"""Kinematics of bodies and generalized forces, for the forces of MJCF files that are computed in Python."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pin_nonideal.types import Array, Model, Placement
 
 
 class Motion:
-    """A weightless copy of a model at one state, a state for each thread that asks.
+    """Kinematics of a model without gravity, with a separate state for each thread.
 
     Args:
         model: pinocchio.Model.
@@ -31,35 +31,35 @@ class Motion:
 
     @property
     def data(self) -> Any:
-        """This thread's pinocchio.Data."""
+        """Return the pinocchio.Data of the current thread."""
         if not hasattr(self._threads, "data"):
             self._threads.data = self.model.createData()
         return self._threads.data
 
     def update(self, q: Array, v: Array | None = None) -> None:
-        """Places, velocities and the accelerations without joint accelerations of all joints."""
+        """Compute placements, velocities and accelerations of all joints, for zero joint accelerations."""
         pin.forwardKinematics(self.model, self.data, q, self._none if v is None else v, self._none)
 
     def place(self, joint: int, local: Placement) -> Placement:
-        """Where a placement on a joint is in the world."""
+        """Return the world placement of a placement on a joint."""
         return self.data.oMi[joint] * local
 
     def velocity(self, joint: int, local: Placement) -> Any:
-        """Velocity of a placement on a joint, a pinocchio.Motion in its own axes."""
+        """Return the velocity of a placement on a joint, a pinocchio.Motion in its own axes."""
         return local.actInv(self.data.v[joint])
 
     def drift(self, joint: int, local: Placement) -> Array:
-        """Acceleration of the origin of a placement on a joint without joint accelerations, in world axes."""
+        """Return the acceleration of a placement's origin for zero joint accelerations, in world axes."""
         v, a = local.actInv(self.data.v[joint]), local.actInv(self.data.a[joint])
         drift = a.linear + np.cross(v.angular, v.linear)
         return np.asarray(self.place(joint, local).rotation @ drift)
 
     def generalized(self, q: Array, forces: Iterable[tuple[int, Placement, Array, Array]]) -> Array:
-        """Generalized force of forces and moments in world axes at placements on joints, (nv,).
+        """Return the generalized force of forces and moments in world axes at placements on joints, (nv,).
 
         Args:
-            q: the configuration of the last update.
-            forces: joint, placement on it, force and moment there.
+            q: configuration of the last update.
+            forces: joint, placement on the joint, force and moment.
         """
         on = [pin.Force.Zero() for _ in range(self.model.njoints)]
         for joint, local, force, moment in forces:
@@ -72,50 +72,50 @@ class Motion:
 
 @dataclass(frozen=True, eq=False)
 class FixedTendon:
-    """A length that is a weighted sum of joint coordinates.
+    """Length that is a weighted sum of joint coordinates.
 
     Attributes:
-        coefficients: of the coordinates, (nq,).
-        row: the same by degrees of freedom, (nv,).
+        coefficients: weights of the coordinates, (nq,).
+        row: weights by degree of freedom, (nv,).
     """
 
     coefficients: Array
     row: Array
 
     def length(self, q: Array) -> float:
-        """Length [m or rad]."""
+        """Return the length [m or rad]."""
         return float(self.coefficients @ q)
 
     def jacobian(self, q: Array) -> Array:
-        """Row of d length/dt = row . v, (nv,)."""
+        """Return the row of d length/dt = row . v, (nv,)."""
         del q
         return self.row
 
     def drift(self, q: Array, v: Array) -> float:
-        """The part of the length's second derivative that velocities make."""
+        """Return the second derivative of the length for zero acceleration."""
         del q, v
         return 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class SpatialTendon:
-    """The weighted length of straight segments between points on bodies.
+    """Weighted length of straight segments between points on bodies.
 
     Attributes:
-        motion: places of the bodies.
-        segments: joint and placement of both ends, and the weight (one over the pulley's divisor).
+        motion: kinematics of the bodies.
+        segments: joint and placement of both ends, and the weight (one over the divisor of the pulley).
     """
 
     motion: Motion
     segments: Sequence[tuple[int, Placement, int, Placement, float]]
 
     def length(self, q: Array) -> float:
-        """Length [m]."""
+        """Return the length [m]."""
         self.motion.update(q)
         return sum(weight * float(np.linalg.norm(self._across(s))) for *s, weight in self.segments)
 
     def jacobian(self, q: Array) -> Array:
-        """Row of d length/dt = row . v, (nv,)."""
+        """Return the row of d length/dt = row . v, (nv,)."""
         self.motion.update(q)
         forces = []
         for joint1, p1, joint2, p2, weight in self.segments:
@@ -128,7 +128,7 @@ class SpatialTendon:
         return self.motion.generalized(q, forces)
 
     def drift(self, q: Array, v: Array) -> float:
-        """The part of the length's second derivative that velocities make [m/s^2]."""
+        """Return the second derivative of the length for zero acceleration [m/s^2]."""
         self.motion.update(q, v)
         total = 0.0
         for joint1, p1, joint2, p2, weight in self.segments:

@@ -1,4 +1,4 @@
-"""Geoms of a compiled MJCF model as shapes for the replay and for collisions."""
+"""Geoms of a compiled MJCF model as visual and collision shapes."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from pin_nonideal.types import GeometryModel
 
 from .tree import Tree, placement
 
-PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH, SDF = range(9)  # of MuJoCo's mjtGeom
+PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH, SDF = range(9)  # MuJoCo's mjtGeom
 SHOWN_GROUPS = 3  # MuJoCo's viewer shows the groups 0, 1 and 2
 
 
 def geom_names(m: Any) -> list[str]:
-    """Names of the geoms; those without one are numbered.
+    """Return the names of the geoms; geoms without a name are numbered.
 
     Args:
         m: mujoco.MjModel.
@@ -30,13 +30,13 @@ def geom_names(m: Any) -> list[str]:
 
 
 def read_shapes(mujoco: Any, tree: Tree, left_out: Collection[int], *, visual: bool) -> GeometryModel:
-    """The geoms that are drawn, or those that can collide.
+    """Return the visual geoms, or the collision geoms.
 
     Args:
-        mujoco: the Python package.
-        tree: the compiled model, meshes included, and its tree.
-        left_out: geoms whose shape was not found.
-        visual: those that MuJoCo's viewer shows; otherwise those that can collide, with their pairs.
+        mujoco: Python package.
+        tree: compiled model with meshes, and its tree.
+        left_out: geoms whose shape is missing.
+        visual: whether to return the geoms of MuJoCo's viewer, or the collision geoms with their pairs.
     """
     m, result = tree.compiled, pin.GeometryModel()
     paired = {int(g) for g in (*m.pair_geom1, *m.pair_geom2)}
@@ -61,7 +61,7 @@ def read_shapes(mujoco: Any, tree: Tree, left_out: Collection[int], *, visual: b
 
 
 def _shape(m: Any, g: int, *, solid: bool) -> Any:
-    """A coal geometry, None for what has none (signed distance functions of plugins)."""
+    """Return a coal geometry, or None for signed distance functions of plugins."""
     import coal
 
     kind, (a, b, c) = int(m.geom_type[g]), m.geom_size[g]
@@ -86,7 +86,7 @@ def _shape(m: Any, g: int, *, solid: bool) -> Any:
 
 
 def _triangles(vertices: Any, faces: Any, *, solid: bool) -> Any:
-    """A mesh; the tree of its bounding boxes, which takes longest, only where it may collide."""
+    """Return a mesh; the bounding volume hierarchy, which takes most time, is built for collisions only."""
     import coal
 
     mesh = coal.BVHModelOBBRSS()
@@ -99,7 +99,7 @@ def _triangles(vertices: Any, faces: Any, *, solid: bool) -> Any:
 
 
 def _height_field(m: Any, data: int, *, solid: bool) -> Any:
-    """A height field as the triangles of its surface."""
+    """Return a height field as the triangles of its surface."""
     rows, columns = int(m.hfield_nrow[data]), int(m.hfield_ncol[data])
     start, (x, y, height, _) = int(m.hfield_adr[data]), m.hfield_size[data]
     z = height * np.array(m.hfield_data[start : start + rows * columns], dtype=float)
@@ -113,12 +113,12 @@ def _height_field(m: Any, data: int, *, solid: bool) -> Any:
 
 
 def colliding_pairs(mujoco: Any, m: Any, geoms: Sequence[int]) -> list[tuple[int, int]]:
-    """Pairs of geoms that MuJoCo lets collide: by their masks, not of one body or a body and its parent.
+    """Return the pairs of geoms that can collide in MuJoCo by masks, bodies and exclusions.
 
     Args:
-        mujoco: the Python package.
+        mujoco: Python package.
         m: mujoco.MjModel.
-        geoms: the geoms to choose from.
+        geoms: indices of the candidate geoms.
     """
     g = np.array(geoms, dtype=int)
     named = {frozenset(pair) for pair in zip(m.pair_geom1.tolist(), m.pair_geom2.tolist(), strict=True)}

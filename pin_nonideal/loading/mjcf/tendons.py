@@ -16,17 +16,17 @@ from pin_nonideal.types import Array
 from .motion import FixedTendon, SpatialTendon, Tendon
 from .tree import Tree, actuator_share
 
-FIXED = 0  # of MuJoCo's mjtTendon
-JOINT, PULLEY, SITE, SPHERE, CYLINDER = range(1, 6)  # of MuJoCo's mjtWrap
+FIXED = 0  # MuJoCo's mjtTendon
+JOINT, PULLEY, SITE, SPHERE, CYLINDER = range(1, 6)  # MuJoCo's mjtWrap
 
 
 def polynomial(linear: float, higher: Array, x: float) -> float:
-    """Factor linear + higher[0] x + higher[1] x^2 of a force -factor x."""
+    """Return the coefficient linear + higher[0] x + higher[1] x^2 of a force -coefficient x."""
     return float(linear + x * (higher[0] + x * higher[1]))
 
 
 def read_tendons(tree: Tree) -> list[Tendon | None]:
-    """The tendons, None for those that wrap around geoms."""
+    """Return the tendons, with None for tendons that wrap around geoms."""
     return [_tendon(tree, i) for i in range(tree.compiled.ntendon)]
 
 
@@ -54,7 +54,7 @@ def _tendon(tree: Tree, index: int) -> Tendon | None:
 
 
 def tendon_name(tree: Tree, index: int) -> str:
-    """Name of a tendon, or its number."""
+    """Return the name of a tendon, or its number."""
     m = tree.compiled
     adr = m.name_tendonadr[index]
     return m.names[adr : m.names.index(b"\0", adr)].decode() or f"tendon_{index}"
@@ -62,13 +62,13 @@ def tendon_name(tree: Tree, index: int) -> str:
 
 @dataclass(frozen=True, eq=False)
 class TendonSpring:
-    """Pull of a spring that is slack between two lengths: -k(x) x along the tendon.
+    """Force -k(x) x of a spring along a tendon, with a slack range of lengths.
 
     Attributes:
-        tendon: its length.
-        stiffness: linear factor [N/m].
-        higher: factors of the next powers.
-        slack: lower and upper length without force.
+        tendon: tendon of the spring.
+        stiffness: linear coefficient [N/m].
+        higher: coefficients of the next powers.
+        slack: lower and upper length of the range without force.
     """
 
     tendon: Tendon
@@ -77,7 +77,7 @@ class TendonSpring:
     slack: tuple[float, float]
 
     def __call__(self, t: float, q: Array, v: Array) -> Array:
-        """Generalized force, (nv,)."""
+        """Return the generalized force, (nv,)."""
         length = self.tendon.length(q)
         x = length - min(max(length, self.slack[0]), self.slack[1])
         return -x * polynomial(self.stiffness, self.higher, x) * self.tendon.jacobian(q)
@@ -85,14 +85,14 @@ class TendonSpring:
 
 @dataclass(frozen=True, eq=False)
 class TendonDamper:
-    """Resistance -d(|u|) u to the rate u of a tendon's length."""
+    """Damping force -d(|u|) u for the rate u of a tendon's length."""
 
     tendon: Tendon
     damping: float
     higher: Array
 
     def __call__(self, t: float, q: Array, v: Array, reactions: object) -> Array:
-        """Generalized force, (nv,)."""
+        """Return the generalized force, (nv,)."""
         row = self.tendon.jacobian(q)
         rate = float(row @ v)
         return -rate * polynomial(self.damping, self.higher, abs(rate)) * row
@@ -100,37 +100,37 @@ class TendonDamper:
 
 @dataclass(frozen=True, eq=False)
 class TendonDirection:
-    """Direction along which friction acts on a tendon."""
+    """Direction of the friction of a tendon."""
 
     tendon: Tendon
 
     def __call__(self, t: float, q: Array) -> Array:
-        """Row of the rate of its length, (nv,)."""
+        """Return the row of the rate of the tendon's length, (nv,)."""
         return self.tendon.jacobian(q)
 
 
 @dataclass(frozen=True)
-class Level:
-    """A friction force that depends on nothing."""
+class ConstantForce:
+    """Constant friction force."""
 
     value: float
 
     def __call__(self, t: float, q: Array, v: Array, reactions: object) -> float:
-        """The force [N or N m]."""
+        """Return the force [N or N m]."""
         return self.value
 
 
 def tendon_forces(
     tree: Tree, tendons: list[Tendon | None], *, springs: bool, dampers: bool, friction: bool
 ) -> tuple[list[Any], list[Any]]:
-    """Springs as given forces, dampers and friction as laws.
+    """Return springs as given forces, and dampers and friction as laws.
 
     Args:
-        tree: the compiled model and its tree.
-        tendons: from `read_tendons`; wrapping ones are left out.
-        springs: whether springs act.
-        dampers: whether dampers act.
-        friction: whether dry friction acts.
+        tree: compiled model and its tree.
+        tendons: tendons from `read_tendons`; None entries are skipped.
+        springs: whether springs are enabled.
+        dampers: whether dampers are enabled.
+        friction: whether dry friction is enabled.
     """
     m = tree.compiled
     share = actuator_share(m, np.column_stack([m.actuator_damping, m.actuator_dampingpoly]), joints=False)
@@ -160,13 +160,13 @@ def tendon_forces(
             damper = TendonDamper(tendon, damping, np.array(damp_poly))
             laws.append(UserLaw(damper, reaction=None, name=f"{name} damping"))
         if friction and m.tendon_frictionloss[i] > 0.0:
-            level = Level(float(m.tendon_frictionloss[i]))
+            level = ConstantForce(float(m.tendon_frictionloss[i]))
             laws.append(UserFriction(TendonDirection(tendon), level, name=f"{name} friction"))
     return laws, forces
 
 
 def _two_points(tree: Tree, index: int, tendon: Tendon) -> tuple[str, str] | None:
-    """Names of the sites of a tendon that is one straight segment between bodies, for a native spring."""
+    """Return the sites of a tendon that is one straight segment between bodies, for a native spring."""
     if not isinstance(tendon, SpatialTendon) or len(tendon.segments) != 1:
         return None
     joint1, _, joint2, _, weight = tendon.segments[0]

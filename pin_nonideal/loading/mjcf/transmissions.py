@@ -1,4 +1,4 @@
-"""Transmissions of MJCF actuators: the length that an actuator sees, and the row its force acts along."""
+"""Transmissions of MJCF actuators: length and moment arms."""
 
 from __future__ import annotations
 
@@ -14,30 +14,31 @@ from .forces import rotation
 from .motion import FixedTendon, Motion, Tendon
 from .tree import BALL, FREE, Tree
 
-JOINT, JOINT_IN_PARENT, SLIDER_CRANK, TENDON, SITE, BODY = range(6)  # of MuJoCo's mjtTrn
+JOINT, JOINT_IN_PARENT, SLIDER_CRANK, TENDON, SITE, BODY = range(6)  # MuJoCo's mjtTrn
 
 
 @dataclass(frozen=True, eq=False)
 class Geared:
-    """A tendon, or a joint of one degree of freedom, behind a gear."""
+    """Tendon, or joint of one degree of freedom, with a gear."""
 
     tendon: Tendon
     gear: float
 
     def rows(self, q: Array) -> tuple[float, Array]:
-        """Length and moment arms, (nv,)."""
+        """Return length and moment arms, (nv,)."""
         return self.gear * self.tendon.length(q), self.gear * self.tendon.jacobian(q)
 
 
 @dataclass(frozen=True, eq=False)
 class _OnTurn:
-    """A joint that turns by a quaternion.
+    """Joint with a quaternion.
 
     Attributes:
-        at: place of the quaternion in q.
+        at: index of the quaternion in q.
         dof: first degree of freedom.
-        gear: (3,) of a ball joint, (6,) of a free one.
-        in_parent: whether what turns is given in the axes of the parent or the world, not of the body.
+        gear: gear vector, (3,) for a ball joint, (6,) for a free joint.
+        in_parent: whether the rotational gear is given in the axes of the parent or the world, or of the
+            body.
         size: number of degrees of freedom.
     """
 
@@ -49,20 +50,20 @@ class _OnTurn:
 
 
 class OnBall(_OnTurn):
-    """A ball joint: its rotation vector along the gear's axis, in the axes of the body or its parent."""
+    """Ball joint: rotation vector along the gear's axis, in the axes of the body or its parent."""
 
     def rows(self, q: Array) -> tuple[float, Array]:
-        """Length and moment arms, (nv,)."""
+        """Return length and moment arms, (nv,)."""
         turn, row = rotation(q, self.at), np.zeros(self.size)
         row[self.dof : self.dof + 3] = axis = turn.T @ self.gear if self.in_parent else self.gear
         return float(pin.log3(turn) @ axis), row
 
 
 class OnFree(_OnTurn):
-    """A free joint: a force in world axes and a moment in the axes of the body or the world; no length."""
+    """Free joint: a force in world axes and a moment in axes of the body or the world, without a length."""
 
     def rows(self, q: Array) -> tuple[float, Array]:
-        """Length and moment arms, (nv,)."""
+        """Return length and moment arms, (nv,)."""
         back, row = rotation(q, self.at).T, np.zeros(self.size)
         row[self.dof : self.dof + 3] = back @ self.gear[:3]
         row[self.dof + 3 : self.dof + 6] = back @ self.gear[3:] if self.in_parent else self.gear[3:]
@@ -71,14 +72,14 @@ class OnFree(_OnTurn):
 
 @dataclass(frozen=True, eq=False)
 class OnSite:
-    """A wrench on a site in its own axes, or between a site and a reference site in the latter's axes.
+    """Wrench on a site in its own axes, or between a site and a reference site in the axes of the latter.
 
     Attributes:
-        motion: places of the bodies.
-        site: joint and placement.
-        reference: joint and placement, or None.
+        motion: kinematics of the bodies.
+        site: joint and placement of the site.
+        reference: joint and placement of the reference site, or None.
         gear: force and moment, (6,).
-        shared: degrees of freedom that move both sites, which the wrench does not load.
+        shared: degrees of freedom that move both sites, and are not loaded by the wrench.
     """
 
     motion: Motion
@@ -88,7 +89,7 @@ class OnSite:
     shared: Array
 
     def rows(self, q: Array) -> tuple[float, Array]:
-        """Length and moment arms, (nv,)."""
+        """Return length and moment arms, (nv,)."""
         self.motion.update(q)
         here = self.motion.place(*self.site)
         frame = here if self.reference is None else self.motion.place(*self.reference)
@@ -105,14 +106,14 @@ class OnSite:
 
 @dataclass(frozen=True, eq=False)
 class SliderCrank:
-    """A crank pin that a rod of given length joins to a slider along a site's z axis.
+    """Crank pin on a rod of given length to a slider along the z axis of a site.
 
     Attributes:
-        motion: places of the bodies.
+        motion: kinematics of the bodies.
         crank: joint and placement of the pin.
         slider: joint and placement of the slider's axis.
         rod: length of the rod [m].
-        gear: of the transmission.
+        gear: gear ratio of the transmission.
     """
 
     motion: Motion
@@ -122,7 +123,7 @@ class SliderCrank:
     gear: float
 
     def rows(self, q: Array) -> tuple[float, Array]:
-        """Length and moment arms, (nv,)."""
+        """Return length and moment arms, (nv,)."""
         self.motion.update(q)
         pin_place, guide = self.motion.place(*self.crank), self.motion.place(*self.slider)
         vector, axis = pin_place.translation - guide.translation, guide.rotation[:, 2]
@@ -143,7 +144,7 @@ Transmission = Geared | OnBall | OnFree | OnSite | SliderCrank
 
 
 def read_transmission(tree: Tree, actuator: int, tendons: list[Tendon | None]) -> Transmission | None:
-    """The transmission of an actuator, None where it cannot be carried (wrapping tendons, bodies, SO(3))."""
+    """Return the transmission of an actuator, or None if unsupported (tendons that wrap, bodies, SO(3))."""
     m, nv = tree.compiled, tree.model.nv
     kind, (one, two) = int(m.actuator_trntype[actuator]), m.actuator_trnid[actuator]
     gear = np.array(m.actuator_gear[m.actuator_outadr[actuator]])
@@ -170,7 +171,7 @@ def read_transmission(tree: Tree, actuator: int, tendons: list[Tendon | None]) -
 
 
 def _shared(tree: Tree, one: int, two: int) -> Any:
-    """Degrees of freedom of the joints that carry both sites."""
+    """Return the degrees of freedom of the joints that move both sites."""
     model = tree.model
     chains = [set(model.supports[tree.on_site(site)[0]]) - {0} for site in (one, two)]
     joints = chains[0] & chains[1]

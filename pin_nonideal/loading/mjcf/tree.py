@@ -1,8 +1,8 @@
-"""The tree of a compiled MJCF model as a Pinocchio model: bodies, joints, inertias, frames and states.
+"""Tree of a compiled MJCF model as a Pinocchio model: bodies, joints, inertias, frames and states.
 
-Joints keep MuJoCo's order and its coordinates, `ref` included, so that joint j of the compiled model is joint
-j + 1 of Pinocchio's.  What differs: quaternions are (x, y, z, w) instead of (w, x, y, z), and the velocity of
-a free joint is in the body's axes, linear part included, where MuJoCo has it in the world's.
+Joints keep MuJoCo's order and coordinates, including `ref`, so that joint j of the compiled model is joint j
++ 1 of Pinocchio. There are two differences. Quaternions are (x, y, z, w) instead of (w, x, y, z). The linear
+velocity of a free joint is in the body's axes, in MuJoCo in the world's axes.
 """
 
 from __future__ import annotations
@@ -19,29 +19,29 @@ from pin_nonideal.types import Array, JointModel, Model, Placement
 
 from .motion import Motion
 
-FREE, BALL, SLIDE, HINGE = range(4)  # of MuJoCo's mjtJoint
-GROUND = "universe"  # Pinocchio's name, which no joint may bear
+FREE, BALL, SLIDE, HINGE = range(4)  # MuJoCo's mjtJoint
+GROUND = "universe"  # name that Pinocchio reserves
 
 
 def placement(position: Array, quaternion: Array) -> Placement:
-    """A pinocchio.SE3 from a place and a quaternion (w, x, y, z)."""
+    """Return a pinocchio.SE3 from a position and a quaternion (w, x, y, z)."""
     w, x, y, z = quaternion / np.linalg.norm(quaternion)
     return pin.SE3(pin.Quaternion(w, x, y, z).matrix(), np.array(position))
 
 
 def translation(position: Array) -> Placement:
-    """A pinocchio.SE3 without rotation."""
+    """Return a pinocchio.SE3 without rotation."""
     return pin.SE3(np.eye(3), np.array(position))
 
 
 @dataclass
 class Tree:
-    """A compiled model and the Pinocchio model of its tree.
+    """Compiled model and the Pinocchio model of its tree.
 
     Attributes:
         compiled: mujoco.MjModel.
         model: pinocchio.Model.
-        bodies: for each body, the joint that carries it and its placement on it.
+        bodies: joint that carries each body, and placement of the body on the joint.
         body_names: names of the bodies' frames.
         site_names: names of the sites' frames.
         key_names: names of the keyframes.
@@ -56,31 +56,31 @@ class Tree:
 
     @cached_property
     def motion(self) -> Motion:
-        """Places and velocities for forces written in Python; the tree must be complete."""
+        """Return the kinematics for forces computed in Python; the tree must be complete."""
         return Motion(self.model)
 
     def joint_name(self, joint: int) -> str:
-        """Name of a joint by its index in the compiled model."""
+        """Return the name of a joint by its index in the compiled model."""
         return str(self.model.names[int(joint) + 1])
 
     def on_body(self, body: int, local: Placement) -> tuple[int, Placement]:
-        """The joint that carries a placement given on a body, and the placement on that joint."""
+        """Return the joint that carries a placement given on a body, and the placement on that joint."""
         joint, place = self.bodies[body]
         return joint, place * local
 
     def on_site(self, site: int) -> tuple[int, Placement]:
-        """The joint that carries a site, and the site's placement on it."""
+        """Return the joint that carries a site, and the placement of the site on the joint."""
         m = self.compiled
         return self.on_body(m.site_bodyid[site], placement(m.site_pos[site], m.site_quat[site]))
 
     def add_frame(self, name: str, body: int, local: Placement) -> str:
-        """Adds a frame on a body and returns its name."""
+        """Add a frame on a body and return its name."""
         joint, place = self.on_body(body, local)
         self.model.addFrame(pin.Frame(name, joint, 0, place, pin.FrameType.OP_FRAME), False)
         return name
 
     def q(self, qpos: Array) -> Array:
-        """Pinocchio's configuration of MuJoCo's `qpos`."""
+        """Return the Pinocchio configuration of MuJoCo's `qpos`."""
         result = np.array(qpos, dtype=float)
         for start in self._quaternions():
             w, x, y, z = result[start : start + 4] / np.linalg.norm(result[start : start + 4])
@@ -88,7 +88,7 @@ class Tree:
         return result
 
     def v(self, qpos: Array, qvel: Array) -> Array:
-        """Pinocchio's velocity of MuJoCo's `qpos` and `qvel`."""
+        """Return the Pinocchio velocity of MuJoCo's `qpos` and `qvel`."""
         result = np.array(qvel, dtype=float)
         m = self.compiled
         for j in np.flatnonzero(m.jnt_type == FREE):
@@ -107,12 +107,12 @@ class Tree:
 
 
 def build_tree(mujoco: Any, compiled: Any, name: str) -> Tree:
-    """Bodies, joints, inertias, armature, gravity, limits, sites and keyframes of a compiled model.
+    """Return the tree of a compiled model: bodies, joints, inertias, gravity, limits, sites and keyframes.
 
     Args:
-        mujoco: the Python package.
+        mujoco: Python package.
         compiled: mujoco.MjModel.
-        name: name of a model that has none.
+        name: name of a model without a name.
     """
     m = compiled
     model = pin.Model()
@@ -138,7 +138,7 @@ def build_tree(mujoco: Any, compiled: Any, name: str) -> Tree:
 
 
 def _names(m: Any, count: int, addresses: Array, kind: str, barred: str = "") -> list[str]:
-    """Names of all objects of a kind, with a new one for each that has none or a barred one."""
+    """Return the names of all objects of a kind, with a new name for an unnamed object or a reserved name."""
     given = [m.names[adr : m.names.index(b"\0", adr)].decode() for adr in addresses[:count]]
     taken = {*given, barred}
     for i, old in enumerate(given):
@@ -151,7 +151,7 @@ def _names(m: Any, count: int, addresses: Array, kind: str, barred: str = "") ->
 
 
 def _add_body(tree: Tree, body: int, joint_names: list[str]) -> tuple[int, Placement]:
-    """Adds one body with its joints, each turning or sliding in the frame that those before it left."""
+    """Add one body with its joints, each in the frame of the joints before it."""
     m, model = tree.compiled, tree.model
     if body == 0:
         return 0, pin.SE3.Identity()
@@ -162,7 +162,9 @@ def _add_body(tree: Tree, body: int, joint_names: list[str]) -> tuple[int, Place
         anchor = translation(m.jnt_pos[j])
         if m.jnt_type[j] == FREE:  # its coordinates are the body's pose in the world
             place, anchor = pin.SE3.Identity(), pin.SE3.Identity()
-        carrier = model.addJoint(carrier, _joint(m, j), place * anchor * _back_to_zero(m, j), joint_names[j])
+        carrier = model.addJoint(
+            carrier, _joint(m, j), place * anchor * _reference_offset(m, j), joint_names[j]
+        )
         model.addJointFrame(carrier)
         place = anchor.inverse()
         _set_limits(model, m, j, carrier)
@@ -186,8 +188,8 @@ def _joint(m: Any, j: int) -> JointModel:
     return (pin.JointModelRevoluteUnaligned if kind == HINGE else pin.JointModelPrismaticUnaligned)(axis)
 
 
-def _back_to_zero(m: Any, j: int) -> Placement:
-    """From the file's pose, where a joint stands at its reference, to where its coordinate is zero."""
+def _reference_offset(m: Any, j: int) -> Placement:
+    """Return the placement from the reference pose of the file to the pose at coordinate zero."""
     axis, reference = np.array(m.jnt_axis[j]), float(m.qpos0[m.jnt_qposadr[j]])
     if m.jnt_type[j] == HINGE:
         return pin.SE3(pin.exp3(-reference * axis), np.zeros(3))
@@ -195,14 +197,14 @@ def _back_to_zero(m: Any, j: int) -> Placement:
 
 
 def _inertia(m: Any, body: int) -> pin.Inertia:
-    """Inertia of a body in its own frame, from its principal moments."""
+    """Return the inertia of a body in its own frame, from its principal moments."""
     turn = placement(np.zeros(3), m.body_iquat[body]).rotation
     moments = turn @ np.diag(m.body_inertia[body]) @ turn.T
     return pin.Inertia(float(m.body_mass[body]), np.array(m.body_ipos[body]), 0.5 * (moments + moments.T))
 
 
 def _set_limits(model: Model, m: Any, j: int, joint: int) -> None:
-    """Ranges of position and of the drives' total force; they play no part in the motion."""
+    """Set the ranges of position and of the total force of the drives; they do not affect the motion."""
     if m.jnt_type[j] <= BALL:
         return
     i, k = model.idx_vs[joint], model.idx_qs[joint]
@@ -213,15 +215,15 @@ def _set_limits(model: Model, m: Any, j: int, joint: int) -> None:
 
 
 def actuator_share(m: Any, values: Array, *, joints: bool) -> Array:
-    """What actuators add to the armature or damping of the joints, or of the tendons, that they drive.
+    """Return the armature or damping that actuators add to their joints or tendons.
 
     Args:
         m: mujoco.MjModel.
-        values: one row for each actuator, (nactuator, k).
-        joints: for the joints; otherwise for the tendons.
+        values: row of values for each actuator, (nactuator, k).
+        joints: whether to return rows for joints, or for tendons.
 
     Returns:
-        One row for each joint or tendon, times the gear ratio squared.
+        Sum of the rows for each joint or tendon, multiplied by the squared gear ratio.
     """
     result = np.zeros((m.njnt if joints else m.ntendon, values.shape[1]))
     driven = m.jnt_actuatorid if joints else m.tendon_actuatorid

@@ -1,4 +1,4 @@
-"""What a scene does not carry of a compiled MJCF model: notes, and errors for what is active."""
+"""Unsupported features of a compiled MJCF model: notes, and errors for active features."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import numpy as np
 from pin_nonideal.errors import LoadingError
 from pin_nonideal.loading.urdf.xml import listed
 
-from .actuators import acts, carriable
+from .actuators import can_produce_force, is_supported
 from .equality import TENDON, equality_name
-from .fields import known
+from .fields import is_listed
 from .motion import Tendon
 from .shapes import colliding_pairs
 from .tendons import tendon_name
@@ -21,15 +21,15 @@ from .transmissions import TENDON as BY_TENDON
 from .tree import BALL, GROUND, Tree, actuator_share
 
 ALLOWED = ("actuator", "flex", "fluid", "muscle", "plasticity", "plugin", "tendon")
-MUSCLE = 2  # of MuJoCo's mjtGain and mjtBias
+MUSCLE = 2  # MuJoCo's mjtGain and mjtBias
 
 
-class Told:
-    """What a scene does not carry of a compiled model: notes, and errors where it is active.
+class UnsupportedFeatures:
+    """Collected unsupported features of a compiled model: notes, and errors for active features.
 
     Args:
-        where: words for messages.
-        allow: what may be left out although it is active, out of `ALLOWED`.
+        where: prefix of error messages.
+        allow: active features that may be ignored, from `ALLOWED`.
         notes: receives the notes.
     """
 
@@ -37,22 +37,22 @@ class Told:
         self._where, self._allow, self.notes = where, allow, notes
         self._active: list[tuple[str, str]] = []
 
-    def active(self, key: str, what: str) -> None:
-        """Something that moves the robot and cannot be carried."""
+    def add_active(self, key: str, what: str) -> None:
+        """Report an unsupported feature that affects the motion."""
         if key in self._allow:
             self.notes.append(f"left out, as allowed: {what}")
         else:
             self._active.append((key, what))
 
-    def note(self, text: str) -> None:
-        """Something that does not move the robot now, or that differs in kind."""
+    def add_note(self, text: str) -> None:
+        """Report a feature that does not affect the motion at present, or that differs in kind."""
         self.notes.append(text)
 
-    def require(self) -> None:
-        """Raises when something active was found.
+    def raise_if_active(self) -> None:
+        """Raise an error if an active feature is unsupported.
 
         Raises:
-            LoadingError: names all of it.
+            LoadingError: an active feature is unsupported; the message lists all of them.
         """
         if self._active:
             keys = tuple(dict.fromkeys(key for key, _ in self._active))
@@ -63,44 +63,48 @@ class Told:
             )
 
 
-def tell(mujoco: Any, tree: Tree, tendons: list[Tendon | None], told: Told) -> None:
-    """Notes and errors for everything that is not carried over.
+def report_unsupported(
+    mujoco: Any, tree: Tree, tendons: list[Tendon | None], unsupported: UnsupportedFeatures
+) -> None:
+    """Report all unsupported features of a compiled model.
 
     Args:
-        mujoco: the Python package.
-        tree: the compiled model and its tree.
-        tendons: from `read_tendons`.
-        told: receives them.
+        mujoco: Python package.
+        tree: compiled model and its tree.
+        tendons: tendons from `read_tendons`.
+        unsupported: receives the features.
     """
-    _tell_actuators(tree, tendons, told)
-    _tell_tendons(tree, tendons, told)
-    _tell_bodies(tree, told)
-    _tell_equalities(tree, tendons, told)
-    _tell_contacts(mujoco, tree, told)
-    _tell_limits(tree, told)
-    _tell_world(mujoco, tree, told)
+    _check_actuators(tree, tendons, unsupported)
+    _check_tendons(tree, tendons, unsupported)
+    _check_bodies(tree, unsupported)
+    _check_equalities(tree, tendons, unsupported)
+    _check_contacts(mujoco, tree, unsupported)
+    _check_limits(tree, unsupported)
+    _check_options(mujoco, tree, unsupported)
 
 
-def _tell_actuators(tree: Tree, tendons: list[Tendon | None], told: Told) -> None:
+def _check_actuators(tree: Tree, tendons: list[Tendon | None], unsupported: UnsupportedFeatures) -> None:
     m = tree.compiled
     names = [
         m.names[adr : m.names.index(b"\0", adr)].decode() or f"actuator_{a}"
         for a, adr in enumerate(m.name_actuatoradr)
     ]
-    working = [a for a in range(m.nactuator) if acts(m, a)]
+    working = [a for a in range(m.nactuator) if can_produce_force(m, a)]
     sticking = [names[a] for a in working if m.actuator_trntype[a] == BODY]
     if sticking:
-        told.note(f"adhesion actuators {listed(sticking)} pull on contacts, which are not carried over")
+        unsupported.add_note(
+            f"adhesion actuators {listed(sticking)} pull on contacts, which are not carried over"
+        )
     muscles = [names[a] for a in working if MUSCLE in (m.actuator_gaintype[a], m.actuator_biastype[a])]
     if muscles:
-        told.active("muscle", f"muscles {listed(muscles)}")
+        unsupported.add_active("muscle", f"muscles {listed(muscles)}")
     others = [
         names[a]
         for a in working
-        if names[a] not in muscles and m.actuator_trntype[a] != BODY and not carriable(m, a)
+        if names[a] not in muscles and m.actuator_trntype[a] != BODY and not is_supported(m, a)
     ]
     if others:
-        told.active(
+        unsupported.add_active(
             "actuator", f"actuators with a controller, a delay or a law of their own {listed(others)}"
         )
     wrapped = [
@@ -111,13 +115,15 @@ def _tell_actuators(tree: Tree, tendons: list[Tendon | None], told: Told) -> Non
         and names[a] not in muscles
     ]
     if wrapped:
-        told.active("tendon", f"actuators on tendons that wrap {listed(wrapped)}")
+        unsupported.add_active("tendon", f"actuators on tendons that wrap {listed(wrapped)}")
     early = [names[a] for a in working if m.actuator_actearly[a] and m.actuator_dyntype[a]]
     if early:
-        told.note(f"actearly of {listed(early)} shifts activations by MuJoCo's time step, and is left out")
+        unsupported.add_note(
+            f"actearly of {listed(early)} shifts activations by MuJoCo's time step, and is left out"
+        )
 
 
-def _tell_tendons(tree: Tree, tendons: list[Tendon | None], told: Told) -> None:
+def _check_tendons(tree: Tree, tendons: list[Tendon | None], unsupported: UnsupportedFeatures) -> None:
     m = tree.compiled
     names = [tendon_name(tree, i) for i in range(m.ntendon)]
     moving = (
@@ -131,24 +137,28 @@ def _tell_tendons(tree: Tree, tendons: list[Tendon | None], told: Told) -> None:
     active = [names[i] for i in wrapping if moving[i]]
     idle = [names[i] for i in wrapping if not moving[i]]
     if active:
-        told.active("tendon", f"springs, damping or friction of tendons that wrap {listed(active)}")
+        unsupported.add_active(
+            "tendon", f"springs, damping or friction of tendons that wrap {listed(active)}"
+        )
     if idle:
-        told.note(f"tendons that wrap around geoms are left out: {listed(idle)}")
+        unsupported.add_note(f"tendons that wrap around geoms are left out: {listed(idle)}")
     inertia = m.tendon_armature + actuator_share(m, m.actuator_armature[:, None], joints=False)[:, 0]
     heavy = [names[i] for i in np.flatnonzero(inertia)]
     if heavy:
-        told.active("tendon", f"armature of tendons {listed(heavy)}, which no mass matrix of a tree holds")
+        unsupported.add_active(
+            "tendon", f"armature of tendons {listed(heavy)}, which no mass matrix of a tree holds"
+        )
     plastic = [names[i] for i in range(m.ntendon) if m.tendon_plasticadr[i] >= 0]
     plastic += [tree.joint_name(j) for j in range(m.njnt) if m.jnt_plasticadr[j] >= 0]
     if plastic:
-        told.active("plasticity", f"springs that yield {listed(plastic)}")
+        unsupported.add_active("plasticity", f"springs that yield {listed(plastic)}")
 
 
-def _tell_bodies(tree: Tree, told: Told) -> None:
+def _check_bodies(tree: Tree, unsupported: UnsupportedFeatures) -> None:
     m = tree.compiled
     if m.nmocap:
         names = [tree.body_names[b] for b in np.flatnonzero(m.body_mocapid >= 0)]
-        told.note(f"mocap bodies {listed(names)} are held where they start")
+        unsupported.add_note(f"mocap bodies {listed(names)} are held where they start")
     elliptic = np.unique(m.geom_bodyid[m.geom_fluid[:, 0] > 0.0])
     if elliptic.size:
         still = "for their bodies do not move"
@@ -157,43 +167,43 @@ def _tell_bodies(tree: Tree, told: Told) -> None:
         what = f"fluid forces on ellipsoids of bodies {listed([tree.body_names[b] for b in elliptic])}"
         moving = any(tree.bodies[b][0] for b in elliptic)
         if moving and (m.opt.density or m.opt.viscosity):
-            told.active("fluid", what)
+            unsupported.add_active("fluid", what)
         else:
-            told.note(f"{what} do not act, {still}")
+            unsupported.add_note(f"{what} do not act, {still}")
     if m.nflex:
         soft = ~m.flex_rigid.astype(bool) & (m.flex_edgeequality == 0)
         stiff = (m.flex_edgestiffness != 0) | (m.flex_edgedamping != 0) | (m.flex_damping != 0)
         if (soft & stiff).any() or m.nflexstiffness or m.nflexbending or m.nefm0dof:
-            told.active("flex", f"elasticity of {m.nflex} flexes")
+            unsupported.add_active("flex", f"elasticity of {m.nflex} flexes")
         else:
-            told.note("flexes play no part: their contacts are not carried over")
+            unsupported.add_note("flexes play no part: their contacts are not carried over")
     if (m.body_plugin >= 0).any() or (m.actuator_plugin >= 0).any():
-        told.active("plugin", "forces of plugins")
+        unsupported.add_active("plugin", "forces of plugins")
     elif m.nplugin:
-        told.note("plugins of shapes and sensors are not read")
+        unsupported.add_note("plugins of shapes and sensors are not read")
 
 
-def _tell_equalities(tree: Tree, tendons: list[Tendon | None], told: Told) -> None:
+def _check_equalities(tree: Tree, tendons: list[Tendon | None], unsupported: UnsupportedFeatures) -> None:
     m, soft = tree.compiled, []
     for i in range(m.neq):
         name, kind = equality_name(tree, i), int(m.eq_type[i])
         if not m.eq_active0[i]:
-            told.note(f'equality "{name}" is inactive in the MJCF file and left out')
+            unsupported.add_note(f'equality "{name}" is inactive in the MJCF file and left out')
         elif kind > TENDON:
-            told.active("flex", f'equality "{name}" of a flex')
+            unsupported.add_active("flex", f'equality "{name}" of a flex')
         elif kind == TENDON and any(tendons[k] is None for k in (m.eq_obj1id[i], m.eq_obj2id[i]) if k >= 0):
-            told.active("tendon", f'equality "{name}" of tendons that wrap')
+            unsupported.add_active("tendon", f'equality "{name}" of tendons that wrap')
         elif not np.allclose(m.eq_solref[i], (0.02, 1.0)) or not np.allclose(
             m.eq_solimp[i], (0.9, 0.95, 0.001, 0.5, 2.0)
         ):
             soft.append(name)
     if soft:
-        told.note(
+        unsupported.add_note(
             f"solref and solimp of {', '.join(soft)} are not used: constraints here are exact, not soft"
         )
 
 
-def _tell_contacts(mujoco: Any, tree: Tree, told: Told) -> None:
+def _check_contacts(mujoco: Any, tree: Tree, unsupported: UnsupportedFeatures) -> None:
     m, off = tree.compiled, mujoco.mjtDisableBit
     if m.opt.disableflags & (off.mjDSBL_CONTACT | off.mjDSBL_CONSTRAINT):
         return
@@ -205,47 +215,49 @@ def _tell_contacts(mujoco: Any, tree: Tree, told: Told) -> None:
             if flag
         ]
         more = f", nor is their {' and '.join(extras)}" if extras else ""
-        told.note(
+        unsupported.add_note(
             f"contacts between geoms ({pairs} pairs) are not carried over{more}: bodies pass through each "
             "other; say the ones that matter with PointContact; scene.contact_friction holds the file's "
             "coefficients"
         )
 
 
-def _tell_limits(tree: Tree, told: Told) -> None:
+def _check_limits(tree: Tree, unsupported: UnsupportedFeatures) -> None:
     m = tree.compiled
     balls = [tree.joint_name(j) for j in np.flatnonzero(m.jnt_limited).tolist() if m.jnt_type[j] == BALL]
     if balls:
-        told.note(f"ranges of ball joints have no place in the model: {listed(balls)}")
+        unsupported.add_note(f"ranges of ball joints have no place in the model: {listed(balls)}")
     tendons = [tendon_name(tree, i) for i in np.flatnonzero(m.tendon_limited).tolist()]
     if tendons:
-        told.note(f"ranges of tendons are left out: {listed(tendons)}")
+        unsupported.add_note(f"ranges of tendons are left out: {listed(tendons)}")
 
 
-def _tell_world(mujoco: Any, tree: Tree, told: Told) -> None:
+def _check_options(mujoco: Any, tree: Tree, unsupported: UnsupportedFeatures) -> None:
     m = tree.compiled
     if m.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP:
-        told.note("bodies do not fall asleep here, whatever the file's sleep flag")
+        unsupported.add_note("bodies do not fall asleep here, whatever the file's sleep flag")
     renamed = [j for j in range(m.njnt) if m.joint(j).name == GROUND]
     if renamed:
-        told.note(
+        unsupported.add_note(
             f'joint "{GROUND}" is called "{tree.joint_name(renamed[0])}" here, for the ground has its name'
         )
     if m.nsensor:
-        told.note(f"sensors ({m.nsensor}) are not read")
+        unsupported.add_note(f"sensors ({m.nsensor}) are not read")
     floating = [
         tree.joint_name(j)
         for j in range(m.njnt)
         if m.jnt_type[j] == 0 and tree.model.armature[m.jnt_dofadr[j]]
     ]
     if floating:
-        told.note(
+        unsupported.add_note(
             f"armature of free joints {listed(floating)}: MuJoCo gives it no Coriolis force along the "
             "world's axes; a given force makes it the same here"
         )
-    unknown = [f for f in dir(m) if not f.startswith("_") and not callable(getattr(m, f)) and not known(f)]
+    unknown = [
+        f for f in dir(m) if not f.startswith("_") and not callable(getattr(m, f)) and not is_listed(f)
+    ]
     if unknown:
-        told.note(
+        unsupported.add_note(
             f"this version of MuJoCo ({mujoco.__version__}) has fields that are not known here and may "
             "matter: " + ", ".join(unknown)
         )

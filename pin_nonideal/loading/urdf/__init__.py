@@ -1,1 +1,1 @@
-"""URDF files: parsing, checks, meshes, inertias."""
+"""URDF files: parsing, checks, meshes and inertias."""

@@ -1,4 +1,4 @@
-"""Damping and dry friction that a robot's file states for its joints, as laws."""
+"""Joint damping and dry friction of a robot's file, as laws."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from pin_nonideal.types import Model
 def dissipation(
     model: Model, taken: Sequence[Any], couplings: Sequence[Any], notes: list[str]
 ) -> list[JointFriction]:
-    """Joint friction that the robot's file states, as laws.
+    """Return the joint friction of the robot's file as laws.
 
-    URDF has it in `<dynamics>`, MJCF in `damping` and `frictionloss`.  Pinocchio keeps these numbers in
-    `model.damping` and `model.upperDryFrictionLimit` and its forward dynamics ignores them.  A mimic joint
-    q = r q_leader + c hands its friction to its leader: dry friction times |r|, damping times r^2.
+    URDF states it in `<dynamics>`, MJCF in `damping` and `frictionloss`. Pinocchio stores these values in
+    `model.damping` and `model.upperDryFrictionLimit`, and its forward dynamics ignores them. The friction of
+    a mimic joint q = r q_leader + c is added to its leader: dry friction times |r|, damping times r^2.
 
     Args:
         model: pinocchio.Model.
-        taken: laws already given; a JointFriction among them replaces the file's numbers for its joint.
-        couplings: constraints of the file; its mimic joints are `JointCoupling` or, when held,
-            `PrescribedMotion`.
-        notes: receives a note for each replacement, and for each joint that has several velocities.
+        taken: laws of the user; a JointFriction replaces the file's values for its joint.
+        couplings: constraints of the file; mimic joints are `JointCoupling`, or `PrescribedMotion` if they
+            are held.
+        notes: receives a note for each replacement, and for each joint with several velocities.
     """
     given = {law.joint for law in taken if isinstance(law, JointFriction)}
     leaders = {c.joint1: (c.joint2, c.ratio) for c in couplings if isinstance(c, JointCoupling)}
@@ -49,7 +49,7 @@ def dissipation(
                 ratio *= leaders[name][1]
                 name = leaders[name][0]
         if model.nvs[j] != 1:
-            radius[name] = 1.0  # so that numbers are the same in both units
+            radius[name] = 1.0  # equal values in both units
         if name in given:
             replaced[name] = None
         elif name not in held:
@@ -68,7 +68,7 @@ def dissipation(
 def _slides_and_turns(
     model: Model, j: int, damping: NDArray[np.float64], friction: NDArray[np.float64], notes: list[str]
 ) -> bool:
-    """Whether the file states one number for all velocities of a joint; notes what is made of it."""
+    """Check if all velocities of a joint have equal values, and add a note on their use."""
     name, kind = model.names[j], model.joints[j].shortname()
     alike = np.ptp(damping) == 0.0 and np.ptp(friction) == 0.0
     if not alike or kind not in ("JointModelPlanar", "JointModelFreeFlyer"):

@@ -1,4 +1,4 @@
-"""Inertias of links that state none, from their shapes and a density."""
+"""Inertias of links without `<inertial>`, from their shapes and a density."""
 
 from __future__ import annotations
 
@@ -11,15 +11,16 @@ import pinocchio as pin
 from .validation import pose
 from .xml import listed, numbers
 
-# A mesh whose volume is below this part of its bounding box is not closed; its box is taken instead.
-CLOSED_PART = 1e-3
+# Minimum volume of a closed mesh, relative to its bounding box. Meshes with less volume are replaced by the
+# box.
+MIN_CLOSED_VOLUME = 1e-3
 
 
-def without_inertia(root: ElementTree.Element) -> list[str]:
-    """Names of the links that move, have a shape and state no inertia.
+def links_without_inertia(root: ElementTree.Element) -> list[str]:
+    """Return the names of moving links with a shape and without an inertia.
 
     Args:
-        root: the `<robot>` element.
+        root: `<robot>` element.
     """
     moved = {e.get("link") for joint in root.findall("joint") for e in joint.findall("child")}
     return [
@@ -32,14 +33,14 @@ def without_inertia(root: ElementTree.Element) -> list[str]:
 
 
 def add_inertias(root: ElementTree.Element, density: float, notes: list[str]) -> None:
-    """Gives the links that state no inertia the one of their shapes, the colliding ones where there are any.
+    """Add the inertias of their shapes to links without one, from collision shapes if there are any.
 
     Args:
-        root: the `<robot>` element, with meshes by absolute path; changed.
-        density: of all of them [kg/m^3].
-        notes: receives what was done.
+        root: `<robot>` element, with absolute paths of meshes; modified.
+        density: density of these links [kg/m^3].
+        notes: receives notes on the links.
     """
-    names = without_inertia(root)
+    names = links_without_inertia(root)
     boxes: list[str] = []
     for link in root.findall("link"):
         name = str(link.get("name"))
@@ -56,7 +57,7 @@ def add_inertias(root: ElementTree.Element, density: float, notes: list[str]) ->
 
 
 def _inertia(shape: ElementTree.Element, density: float, link: str, boxes: list[str]) -> Any:
-    """Inertia of one shape in the link's frame, a pinocchio.Inertia."""
+    """Return the inertia of one shape in the link's frame, a pinocchio.Inertia."""
     where = f'link "{link}"'
     place = pose(shape.find("origin"), where)
     volume, center, moments = _solid(shape.find("geometry")[0], where, boxes, link)  # type: ignore[index]
@@ -66,7 +67,7 @@ def _inertia(shape: ElementTree.Element, density: float, link: str, boxes: list[
 
 
 def _solid(element: ElementTree.Element, where: str, boxes: list[str], link: str) -> tuple[float, Any, Any]:
-    """Volume, center and moments of inertia about the center at density one, in the shape's axes."""
+    """Return volume, center and moments of inertia about the center at unit density, in the shape's axes."""
     import coal
 
     if element.tag == "mesh":
@@ -95,16 +96,16 @@ def _mesh(element: ElementTree.Element, where: str, boxes: list[str], link: str)
     box = coal.Box(high - low)
     volume, center = solid.computeVolume(), solid.computeCOM()
     moments = solid.computeMomentofInertiaRelatedToCOM()
-    if volume < 0.0:  # a mesh that is turned inside out
+    if volume < 0.0:  # mesh with inverted orientation
         volume, moments = -volume, -moments
-    if volume > CLOSED_PART * box.computeVolume() and np.linalg.eigvalsh(moments)[0] > 0.0:
+    if volume > MIN_CLOSED_VOLUME * box.computeVolume() and np.linalg.eigvalsh(moments)[0] > 0.0:
         return volume, center, moments
     boxes.append(link)
     return box.computeVolume(), (low + high) / 2.0, box.computeMomentofInertiaRelatedToCOM()
 
 
 def _element(inertia: Any) -> ElementTree.Element:
-    """The `<inertial>` element of a pinocchio.Inertia."""
+    """Return the `<inertial>` element of a pinocchio.Inertia."""
     element = ElementTree.Element("inertial")
     ElementTree.SubElement(element, "origin", {"xyz": " ".join(repr(float(x)) for x in inertia.lever)})
     ElementTree.SubElement(element, "mass", {"value": repr(float(inertia.mass))})

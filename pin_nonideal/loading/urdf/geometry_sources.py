@@ -1,4 +1,4 @@
-"""Shapes that are read when something asks for them: meshes take most of the time of loading."""
+"""Shapes that are read on first use, because meshes dominate the loading time."""
 
 from __future__ import annotations
 
@@ -10,47 +10,47 @@ from typing import Any
 
 from pin_nonideal.types import GeometryModel
 
-# Models and shapes that stay in memory for the next robot of the same files.
-MOST_KEPT = 8
+# Maximum number of models and shapes that stay cached for the next robot from the same files.
+MAX_CACHED = 8
 
 
 class Shapes:
-    """A geometry model to be.
+    """Geometry model that is read on first use.
 
     Args:
-        read: makes it.
-        notes: what the reading had to say; filled by `read`.
+        read: function that reads the geometry model.
+        notes: notes on the reading, added by `read`.
     """
 
     def __init__(self, read: Callable[[], GeometryModel], notes: list[str] | None = None) -> None:
         self._read, self.notes = read, [] if notes is None else notes
 
     def __call__(self) -> GeometryModel:
-        """The geometry model."""
+        """Return the geometry model."""
         return self._read()
 
     def edited(self, edit: Callable[[GeometryModel], GeometryModel]) -> Shapes:
-        """The same shapes after an edit.
+        """Return the same shapes with an edit that is applied after reading.
 
         Args:
-            edit: what is done with the geometry model once it is read.
+            edit: function from the geometry model to the edited one.
         """
         return Shapes(lambda: edit(self._read()), self.notes)
 
 
-class Kept:
-    """What was read from files, by their content; the least recently asked for goes first."""
+class FileCache:
+    """Cache of data from files by their content, without the least recently used entries."""
 
     def __init__(self) -> None:
         self._found: OrderedDict[Hashable, Any] = OrderedDict()
         self._lock = Lock()
 
     def __call__(self, content: Hashable, read: Callable[[], Any]) -> Any:
-        """What this content gives, read once; to be copied before it is changed.
+        """Return the cached data of a content; copy it before changing it.
 
         Args:
-            content: of the files, with whatever else decides on what is read.
-            read: reads them.
+            content: key of the files' content and of all options of the reading.
+            read: function that reads the files if the key is not cached.
         """
         with self._lock:
             if content in self._found:
@@ -59,19 +59,19 @@ class Kept:
         found = read()
         with self._lock:
             self._found[content] = found
-            while len(self._found) > MOST_KEPT:
+            while len(self._found) > MAX_CACHED:
                 self._found.popitem(last=False)
         return found
 
 
-kept_models, kept_shapes = Kept(), Kept()
+cached_models, cached_shapes = FileCache(), FileCache()
 
 
-def stamps(files: Iterable[str | os.PathLike[str]]) -> tuple[tuple[str, int, int], ...]:
-    """Name, time of the last change and size of files, which a change of their content changes.
+def file_stamps(files: Iterable[str | os.PathLike[str]]) -> tuple[tuple[str, int, int], ...]:
+    """Return name, modification time and size of files, as a key of their content.
 
     Args:
-        files: their paths; those that are not there have neither.
+        files: paths; missing files have the time 0 and the size -1.
     """
     found = []
     for file in files:

@@ -1,4 +1,4 @@
-"""Why a mass matrix is not positive definite, in the words of the model: which joints and links to mend."""
+"""Diagnosis of a mass matrix that is not positive definite, in terms of joints and links."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from pin_nonideal.core_loader import core
 from pin_nonideal.errors import SingularMassError
 from pin_nonideal.types import Model
 
-# Rounding in M is a few units in the last place of the largest term of each entry; once rows and columns
-# are scaled to a unit diagonal, an eigenvalue below this many units cannot be told from zero.
+# Threshold of singularity. The rounding of M is a few units in the last place of the largest term of each
+# entry. After rows and columns are scaled to a unit diagonal, smaller eigenvalues cannot be distinguished
+# from zero.
 SINGULAR = 16.0 * float(np.finfo(float).eps)
 
 
 def mass_diagnosis(model: Model, q: ArrayLike | None = None) -> str | None:
-    """Tells what makes M(q) singular or indefinite.
+    """Return the reason why M(q) is singular or indefinite.
 
-    M is scaled to a unit diagonal first, so that light links beside heavy ones are no fault.
+    M is scaled to a unit diagonal first, so that light links beside heavy ones are accepted.
 
     Args:
         model: pinocchio.Model.
-        q: configuration, shape (nq,); None for the neutral one.
+        q: configuration, (nq,); None for the neutral configuration.
 
     Returns:
-        None when M(q) is positive definite, otherwise a sentence that names joints and links and says what to
-        do.
+        None if M(q) is positive definite, otherwise a sentence that names joints and links and a remedy.
     """
     if model.nv == 0:
         return None
@@ -47,7 +47,7 @@ def mass_diagnosis(model: Model, q: ArrayLike | None = None) -> str | None:
         )
     scale = 1.0 / np.sqrt(diagonal)
     scaled = scale[:, None] * M * scale
-    try:  # much cheaper than eigenvalues, and enough for nearly every robot
+    try:  # Much cheaper than eigenvalues, and sufficient for nearly every robot.
         np.linalg.cholesky(scaled - SINGULAR * model.nv * np.eye(model.nv))
         return None
     except np.linalg.LinAlgError:
@@ -64,15 +64,15 @@ def mass_diagnosis(model: Model, q: ArrayLike | None = None) -> str | None:
 
 
 def require_positive_mass(model: Model, q: ArrayLike | None, name: str | None) -> None:
-    """Raises unless M(q) is positive definite.
+    """Check that M(q) is positive definite.
 
     Args:
         model: pinocchio.Model.
-        q: configuration, shape (nq,); None for the neutral one.
-        name: name of the robot in the message; None for the model's own.
+        q: configuration, (nq,); None for the neutral configuration.
+        name: name of the robot in the message; None for the name of the model.
 
     Raises:
-        SingularMassError: with the sentence of `mass_diagnosis`.
+        SingularMassError: M(q) is not positive definite; the message contains the result of `mass_diagnosis`.
     """
     fault = mass_diagnosis(model, q)
     if fault is not None:
@@ -80,7 +80,7 @@ def require_positive_mass(model: Model, q: ArrayLike | None, name: str | None) -
 
 
 def _joints_of(model: Model, dofs: Sequence[int]) -> list[int]:
-    """Joints that own the given degrees of freedom."""
+    """Return the joints of the given degrees of freedom."""
     return [
         j
         for j in range(1, model.njoints)
@@ -89,13 +89,13 @@ def _joints_of(model: Model, dofs: Sequence[int]) -> list[int]:
 
 
 def _links_beyond(model: Model, joints: Sequence[int]) -> list[str]:
-    """Names of the links that the joints carry directly; of the joints when they carry no named link."""
+    """Return the names of the links on the joints, or of the joints if they carry no named link."""
     links = [f.name for f in model.frames if f.type == pin.FrameType.BODY and f.parentJoint in joints]
     return links or [model.names[j] for j in joints]
 
 
 def _light_links(model: Model, joints: Sequence[int]) -> list[str]:
-    """Links on the joints without mass, or without moment of inertia."""
+    """Return the links on the joints without mass, or without moment of inertia."""
     light = [
         j
         for j in joints
@@ -105,6 +105,6 @@ def _light_links(model: Model, joints: Sequence[int]) -> list[str]:
 
 
 def _quoted(word: str, names: Sequence[str]) -> str:
-    """Word, in the plural when needed, and up to four quoted names."""
+    """Return a word, plural if needed, with up to four quoted names."""
     shown = ", ".join(f'"{n}"' for n in names[:4]) + (", ..." if len(names) > 4 else "")
     return f"{word}{'' if len(names) == 1 else 's'} {shown}"

@@ -1,7 +1,7 @@
-"""Loops whose frames were rounded: which rows depend on others within the tolerance of the assembly.
+"""Loops with rounded frames: detection of rows that depend on others within the assembly tolerance.
 
-Exports of CAD round frames to 1e-8 m or so.  A loop that closes in theory then has a gap that no motion can
-close, and rows that depend on others gain a tiny part of their own, which would decide rank and reactions.
+CAD exports round frames to about 1e-8 m. A loop that closes in theory then has a gap that no motion can
+close, and dependent rows become slightly independent, which would determine rank and reactions.
 """
 
 from __future__ import annotations
@@ -21,23 +21,25 @@ from pin_nonideal.states.projection import nearest_closure
 from pin_nonideal.states.rows import rows_at
 from pin_nonideal.types import Array, Model
 
-# Rows of A, and singular values of its rows at unit length, that are zero to rounding; those between this and
-# the assembly's tolerance are rounded frames.
+# Rounding error of rows of A, and of singular values of its rows at unit length. Values between this bound
+# and the assembly tolerance result from rounded frames.
 ROUNDING = 1e-11
-MOST_ROWS = 200  # whose rank is decided on a dense matrix
-PROBES = 3  # closed configurations at which the rank is looked at: one may be singular
-TOLD = 1e-4  # singular values up to this, beyond the tolerance, are told: links of nearly equal length
-REACH = 0.2  # of the probes [m or rad]
+MAX_ROWS = 200  # for the rank decision on a dense matrix
+MAX_PROBES = 3  # closed configurations at which the rank is computed, since a single one can be singular
+# larger singular values need no note; values between the tolerance and this bound indicate links of nearly
+# equal length
+MAX_NOTED = 1e-4
+PROBE_RANGE = 0.2  # range of the probes [m or rad]
 
 
-class Relaxed(NamedTuple):
-    """Constraints of a scene without the rows that depend on others to the tolerance of the assembly.
+class IndependentRows(NamedTuple):
+    """Constraints of a scene without the rows that depend on others within the assembly tolerance.
 
     Attributes:
-        model: of the scene, with frames for the points by which welds are held that lose rows.
-        constraints: what remains of them.
+        model: model of the scene, with frames for the points of welds that lose rows.
+        constraints: remaining constraints.
         q: configuration with the smallest gaps, (nq,).
-        note: what was left out.
+        note: note on the removed rows.
     """
 
     model: Model
@@ -46,53 +48,48 @@ class Relaxed(NamedTuple):
     note: str
 
 
-# A weld as points of its two frames that lie on each other, each row of which can go by itself: with the
-# origins O, and X and Y at a unit length along the axes x and y, place is held at O, turns about z and y by
-# X along y and z, and turns about x by Y along z.
+# Point anchors that replace a weld, so that each row can be removed separately. With the origin O, and the
+# points X and Y at unit length on the axes x and y, O fixes the position, X along y and z fixes the rotations
+# about z and y, and Y along z fixes the rotation about x.
 _Points = tuple[PointAnchor, ...]
 
 
-def relaxed(scene: Scene, tolerance: float) -> Relaxed | None:
-    """The constraints of a scene whose loops were rounded; None where rounding plays no part.
+def remove_dependent_rows(scene: Scene, tolerance: float) -> IndependentRows | None:
+    """Return the constraints of a scene with rounded loops, or None if no row depends on rounding.
 
     Args:
-        scene: as the file states it.
-        tolerance: to which lengths and angles of the loops are given [m or rad].
+        scene: scene of the file.
+        tolerance: accuracy of lengths and angles of the loops [m or rad].
     """
     constraints = list(scene.constraints)
     program = compiled_scene(scene).program
     holonomic = all(holds for c in program.constraints for holds in c.holonomic)
     looped = [isinstance(c, (PointAnchor, JointCoupling, FrameAnchor)) for c in constraints]
-    if (
-        sum(looped) < 2
-        or not holonomic
-        or len(program.constraints) != len(looped)
-        or program.rows > MOST_ROWS
-    ):
+    if sum(looped) < 2 or not holonomic or len(program.constraints) != len(looped) or program.rows > MAX_ROWS:
         return None
     kept, q, gap, nearly = _independent_rows(scene, program, tolerance)
     if kept is None:
-        return Relaxed(scene.model, constraints, scene.q0, nearly) if nearly else None
-    model, welds = _by_points(scene.model, constraints, [c.name for c in program.constraints])
+        return IndependentRows(scene.model, constraints, scene.q0, nearly) if nearly else None
+    model, welds = _split_welds(scene.model, constraints, [c.name for c in program.constraints])
     if welds:
         split = [part for c in constraints for part in (welds.get(id(c), (c,)))]
         scene = Scene(model, constraints=split, q0=scene.q0, assembly_tolerance=tolerance)
         program = compiled_scene(scene).program
         kept, q, gap, nearly = _independent_rows(scene, program, tolerance)
         if kept is None:
-            return Relaxed(model, constraints, scene.q0, nearly) if nearly else None
-    left, gone = _remaining(constraints, welds, program, kept)
+            return IndependentRows(model, constraints, scene.q0, nearly) if nearly else None
+    left, gone = _remaining_constraints(constraints, welds, program, kept)
     if not gone:
         return None
     note = (
         f"loops close to {gap:.1e} m or rad, within the tolerance of the assembly ({tolerance:g}): rows "
         f"{', '.join(gone)} depend on others and are left out"
     )
-    return Relaxed(model, left, q, "; ".join(filter(None, (note, nearly))))
+    return IndependentRows(model, left, q, "; ".join(filter(None, (note, nearly))))
 
 
-def _by_points(model: Model, constraints: list[Any], names: list[str]) -> tuple[Model, dict[int, _Points]]:
-    """The model with frames for the points of all welds between two frames, and these by the weld's id."""
+def _split_welds(model: Model, constraints: list[Any], names: list[str]) -> tuple[Model, dict[int, _Points]]:
+    """Return the model with frames for the points of all two-frame welds, and the points by the weld's id."""
     welds: dict[int, _Points] = {}
     model = model.copy()
     for c, name in zip(constraints, names, strict=True):
@@ -111,10 +108,10 @@ def _by_points(model: Model, constraints: list[Any], names: list[str]) -> tuple[
     return model, welds
 
 
-def _remaining(
+def _remaining_constraints(
     constraints: list[Any], welds: dict[int, _Points], program: core.Program, kept: NDArray[np.bool_]
 ) -> tuple[list[Any], list[str]]:
-    """What remains of the constraints, and words for rows that do not; welds that lose none stay welds."""
+    """Return the remaining constraints, and descriptions of removed rows; complete welds stay welds."""
     left: list[Any] = []
     gone: list[str] = []
     described = iter(program.constraints)
@@ -126,7 +123,7 @@ def _remaining(
             rows = next(described)
             mine = kept[first : first + rows.count]
             first += rows.count
-            stays = part if mine.all() else _part(part, mine)
+            stays = part if mine.all() else _select_rows(part, mine)
             if stays is not None:
                 remaining.append(stays)
             if stays is not part:
@@ -135,8 +132,8 @@ def _remaining(
     return left, gone
 
 
-def _part(c: Any, kept: NDArray[np.bool_]) -> Any:
-    """A constraint with some of its rows, None with none; whole where a part of it has no description."""
+def _select_rows(c: Any, kept: NDArray[np.bool_]) -> Any:
+    """Return a constraint with some of its rows, or None without rows; unchanged if it cannot be divided."""
     if not kept.any():
         return None
     if isinstance(c, PointAnchor):
@@ -147,10 +144,10 @@ def _part(c: Any, kept: NDArray[np.bool_]) -> Any:
 def _independent_rows(
     scene: Scene, program: core.Program, tolerance: float
 ) -> tuple[NDArray[np.bool_] | None, Array, float, str]:
-    """Which rows are independent, the configuration with the smallest gaps, the largest gap there, a note.
+    """Return the mask of independent rows, the configuration with the smallest gaps, the gap, and a note.
 
-    The note tells of rows that depend on others nearly, though not to the tolerance, wherever loops close.
-    There are none to name where the loops close and no row depends on others by rounded frames alone.
+    The note reports rows that depend on others nearly, but not within the tolerance, if the loops close. The
+    mask is None if the loops do not close, or if no row depends on others because of rounded frames.
     """
     model, runner = scene.model, program.runner()
     q, gap = nearest_closure(model, program, runner, scene.q0, tolerance)
@@ -159,11 +156,11 @@ def _independent_rows(
     generator = np.random.default_rng(5)
     independent, rank, rounded, least = _independent(model, runner, q, tolerance)
     nearest = [least]
-    for _ in range(PROBES):
+    for _ in range(MAX_PROBES):
         free = _null_space(model, runner, q, tolerance)
         if not free.shape[1]:
             break
-        step = free @ generator.uniform(-REACH, REACH, free.shape[1])
+        step = free @ generator.uniform(-PROBE_RANGE, PROBE_RANGE, free.shape[1])
         probe, apart = nearest_closure(model, program, runner, pin.integrate(model, q, step), tolerance)
         if apart <= tolerance:
             found = _independent(model, runner, probe, tolerance)
@@ -172,20 +169,20 @@ def _independent_rows(
             if found[1] > rank:
                 independent, rank = found[:2]
     nearly, apart = "", max(nearest)
-    if apart <= TOLD:
+    if apart <= MAX_NOTED:
         nearly = (
             f"rows of the loops depend on others to {apart:.1e} m or rad, beyond the tolerance of the "
             f"assembly ({tolerance:g}): they may lock what should move; "
-            f"load(..., assembly_tolerance={TOLD:g}) leaves such rows out"
+            f"load(..., assembly_tolerance={MAX_NOTED:g}) leaves such rows out"
         )
     return (independent if rounded or gap > CLOSURE_TOLERANCE else None), q, gap, nearly
 
 
 def _unit_rows(model: Model, runner: core.Runner, q: Array, tolerance: float) -> tuple[Array, bool]:
-    """A at q with rows of unit length, and whether rounding gives any its length.
+    """Return A(q) with rows of unit length, and whether the length of a row is due to rounding.
 
-    Rows that are short to the tolerance beside the longest hold nothing, and are zero: out of the plane of a
-    planar linkage they would point anywhere.
+    Rows that are shorter than the tolerance relative to the longest one are set to zero. They have no effect;
+    outside the plane of a planar linkage their direction is arbitrary.
     """
     A = rows_at(runner, q, np.zeros(model.nv), 0.0)[0]
     length = np.linalg.norm(A, axis=1)
@@ -198,9 +195,9 @@ def _unit_rows(model: Model, runner: core.Runner, q: Array, tolerance: float) ->
 def _independent(
     model: Model, runner: core.Runner, q: Array, tolerance: float
 ) -> tuple[NDArray[np.bool_], int, bool, float]:
-    """Which rows are independent, longest remainders first, and how many; whether rounding counts more.
+    """Return a mask of independent rows, their number, whether rounding adds rows, and a singular value.
 
-    The last is the smallest singular value beyond the tolerance.
+    Rows are chosen by the largest remainder. The singular value is the smallest one above the tolerance.
     """
     rest, rounded = _unit_rows(model, runner, q, tolerance)
     values = np.linalg.svd(rest, compute_uv=False) if rest.size else np.zeros(0)
@@ -219,6 +216,6 @@ def _independent(
 
 
 def _null_space(model: Model, runner: core.Runner, q: Array, tolerance: float) -> Array:
-    """Directions of motion that the rows leave free, (nv, freedoms)."""
+    """Return a basis of the motions that the rows leave free, (nv, freedoms)."""
     _, values, directions = np.linalg.svd(_unit_rows(model, runner, q, tolerance)[0])
     return np.asarray(directions[int((values > tolerance).sum()) :].T)

@@ -1,4 +1,4 @@
-"""Where the meshes of a URDF file lie: resolved as ROS does, and by their endings where a path is broken."""
+"""Paths of the meshes of a URDF file, resolved as in ROS, or by the end of the path if it is broken."""
 
 from __future__ import annotations
 
@@ -14,16 +14,17 @@ import numpy as np
 from .xml import listed, numbers
 
 SCHEMES = ("package://", "model://")
-MESHES = "meshes"  # folder of a package in which a mesh of a broken path is looked for by its ending
-HIGHEST = 3  # folders above the robot's file that may be its package
+MESHES = "meshes"  # folder of a package in which meshes of broken paths are searched
+MAX_PARENTS = 3  # maximum number of folders above the robot's file that are searched as its package
 
 
-class Found(NamedTuple):
-    """Where a mesh lies.
+class FoundMesh(NamedTuple):
+    """Path of a mesh file.
 
     Attributes:
-        path: absolute.
-        broken: whether the path in the file leads nowhere, and the mesh was found by its ending.
+        path: absolute path.
+        broken: whether the path of the robot's file is invalid, and the mesh was found by the end of its
+            path.
     """
 
     path: Path
@@ -31,17 +32,17 @@ class Found(NamedTuple):
 
 
 def resolve_meshes(root: ElementTree.Element, path: Path, package_dirs: Sequence[str | Path]) -> list[str]:
-    """Writes absolute mesh paths into the tree; a mesh that is nowhere loses its shape.
+    """Write absolute mesh paths into the tree, and remove shapes whose mesh is missing.
 
     Args:
-        root: the `<robot>` element; changed.
-        path: of the robot's file.
-        package_dirs: more folders that hold packages.
+        root: `<robot>` element; modified.
+        path: path of the robot's file.
+        package_dirs: additional folders that hold packages.
 
     Returns:
-        Notes on the meshes that were not found, or were found by their endings.
+        Notes on the meshes that were not found, or were found by the end of their path.
     """
-    files = cache(_files)  # for this reading only: files come and go
+    files = cache(_files)  # only during this call, since files can change
     missing: dict[str, None] = {}
     guessed: dict[str, Path] = {}
     drawn: dict[str, float] = {}
@@ -58,7 +59,7 @@ def resolve_meshes(root: ElementTree.Element, path: Path, package_dirs: Sequence
                     link.remove(shape)
                     continue
                 mesh.set("filename", str(found.path))
-                meter = unit_of(found.path)
+                meter = mesh_unit(found.path)
                 if meter != 1.0:
                     scale = numbers(mesh, "scale", 3, (1, 1, 1), f'link "{link.get("name")}"')
                     mesh.set("scale", " ".join(repr(float(x)) for x in meter * scale))
@@ -78,13 +79,13 @@ def resolve_meshes(root: ElementTree.Element, path: Path, package_dirs: Sequence
     return notes
 
 
-def unit_of(path: Path) -> float:
-    """Length of a mesh file's unit [m]: what a COLLADA file states, as RViz reads it, and 1 for every other.
+def mesh_unit(path: Path) -> float:
+    """Return the unit of length of a mesh file [m]: from a COLLADA file as in RViz, else 1.
 
-    Its up axis turns nothing, as in RViz; the other formats state no unit.
+    The up axis of the file has no effect, as in RViz. The other formats state no unit.
 
     Args:
-        path: of the mesh.
+        path: path of the mesh.
     """
     if path.suffix.lower() != ".dae":
         return 1.0
@@ -97,20 +98,20 @@ def unit_of(path: Path) -> float:
             if name == "asset":
                 break
     except (ElementTree.ParseError, OSError, ValueError):
-        pass  # whoever reads the shape says what is wrong with it
+        pass  # the reader of the shape reports the error
     return 1.0
 
 
 def find_mesh(
     filename: str, folder: Path, package_dirs: Sequence[str | Path], files: Callable[[Path], Sequence[Path]]
-) -> Found | None:
-    """Where a mesh lies, or None.
+) -> FoundMesh | None:
+    """Return the path of a mesh, or None.
 
     Args:
-        filename: a path, `file://...`, or `package://name/...` (`package:///...` is taken inside the folder).
+        filename: path, `file://...`, or `package://name/...` (`package:///...` is relative to the folder).
         folder: folder of the robot's file.
-        package_dirs: more folders that hold packages.
-        files: all files beneath a folder.
+        package_dirs: additional folders that hold packages.
+        files: function that returns all files below a folder.
     """
     home = folder.resolve()
     inner = next((filename.removeprefix(s).lstrip("/") for s in SCHEMES if filename.startswith(s)), None)
@@ -121,48 +122,48 @@ def find_mesh(
     else:
         package, _, rest = inner.partition("/")
         rest = rest or inner
-        homes = _homes(home, package_dirs)
-        named = _named(home, package)
+        homes = _package_roots(home, package_dirs)
+        named = _named_packages(home, package)
         candidates = [folder / inner, folder / rest]
         candidates += [base / inner for base in homes]
         candidates += [base / rest for base in (*map(Path, package_dirs), *home.parents[:2], *named)]
         packages = [*(base / package for base in homes), *named]
     whole = next((c.resolve() for c in candidates if c.is_file()), None)
     if whole is not None:
-        return Found(whole, False)
-    for bases in (packages, (home, *home.parents[:HIGHEST])):
+        return FoundMesh(whole, False)
+    for bases in (packages, (home, *home.parents[:MAX_PARENTS])):
         meshes = next((base / MESHES for base in bases if (base / MESHES).is_dir()), None)
         ending = None if meshes is None else _by_ending(files(meshes), inner)
         if ending is not None:
-            return Found(ending, True)
+            return FoundMesh(ending, True)
     return None
 
 
 def package_folder(name: str, folder: Path, package_dirs: Sequence[str | Path]) -> Path | None:
-    """The folder of a ROS package, or None.
+    """Return the folder of a ROS package, or None.
 
     Args:
-        name: of the package.
+        name: name of the package.
         folder: folder of the robot's file.
-        package_dirs: more folders that hold packages.
+        package_dirs: additional folders that hold packages.
     """
     home = folder.resolve()
-    candidates = [*(base / name for base in _homes(home, package_dirs)), *_named(home, name)]
+    candidates = [*(base / name for base in _package_roots(home, package_dirs)), *_named_packages(home, name)]
     return next((c.resolve() for c in candidates if c.is_dir()), None)
 
 
-def _homes(home: Path, package_dirs: Sequence[str | Path]) -> list[Path]:
-    """Folders that may hold packages by their names."""
+def _package_roots(home: Path, package_dirs: Sequence[str | Path]) -> list[Path]:
+    """Return the folders that can hold packages by their names."""
     return [*map(Path, package_dirs), *_ros_folders(), *home.parents]
 
 
-def _named(home: Path, package: str) -> list[Path]:
-    """Folders around a robot's file that are a package, whatever they are called themselves."""
+def _named_packages(home: Path, package: str) -> list[Path]:
+    """Return the folders above a robot's file that are a package, independent of their own names."""
     return [base for base in (home, *home.parents) if _is_package(base, package)]
 
 
 def _by_ending(files: Sequence[Path], inner: str) -> Path | None:
-    """The only file whose path ends as another does, as far as any file's does."""
+    """Return the only file whose path shares the longest end with another path, or None."""
     wanted = Path(inner).parts
     for first in range(len(wanted)):
         ending = wanted[first:]
@@ -177,14 +178,14 @@ def _files(folder: Path) -> tuple[Path, ...]:
 
 
 def _ros_folders() -> list[Path]:
-    """Folders in which ROS looks for packages: ROS 1's own list, and the shares of ROS 2's prefixes."""
+    """Return the package folders of ROS: the path list of ROS 1, and the share folders of ROS 2."""
     first = [Path(p) for p in os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if p]
     second = [Path(p) / "share" for p in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if p]
     return [*first, *second]
 
 
 def _is_package(folder: Path, name: str) -> bool:
-    """Whether a folder is the ROS package of that name, whatever it is called itself."""
+    """Check if a folder is the ROS package of the given name, independent of its own name."""
     try:
         return f"<name>{name}</name>" in (folder / "package.xml").read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError):

@@ -1,6 +1,6 @@
-"""URDF files, read with care.
+"""Reader of URDF files.
 
-What Pinocchio's reader passes over in silence is an error, a note, a law or a constraint here.
+Data that Pinocchio's reader ignores silently are converted to laws, constraints, notes or errors.
 """
 
 from __future__ import annotations
@@ -20,22 +20,22 @@ from pin_nonideal.description.time_functions import Constant
 from pin_nonideal.errors import LoadingError, nearest
 from pin_nonideal.types import Array, GeometryModel, Model
 
-from .density import add_inertias, without_inertia
-from .geometry_sources import Shapes, kept_models, kept_shapes, stamps
+from .density import add_inertias, links_without_inertia
+from .geometry_sources import Shapes, cached_models, cached_shapes, file_stamps
 from .meshes import resolve_meshes
-from .repair import tidy
+from .repair import repair_urdf
 from .validation import check_urdf
 from .xacro import urdf_text
 from .xml import listed, numbers, parse_xml, read_text
 
 
 class Keyframe(NamedTuple):
-    """A state that a file names.
+    """Named state of a file.
 
     Attributes:
         q: configuration, (nq,).
         v: velocity, (nv,).
-        apply: sets the controls that belong to it.
+        apply: function that sets the controls of the state.
     """
 
     q: Array
@@ -45,24 +45,24 @@ class Keyframe(NamedTuple):
 
 @dataclass
 class RobotFile:
-    """What a robot's file holds, before a scene is made of it.
+    """Content of a robot's file.
 
     Attributes:
         model: pinocchio.Model.
-        visual: pinocchio.GeometryModel for display, `Shapes` that make one, or None.
-        collision: the same for collision.
-        constraints: constraints that the file itself states (mimic joints, equalities).
-        forces: given forces that the file itself states (joint springs).
+        visual: pinocchio.GeometryModel for display, `Shapes` that read one, or None.
+        collision: pinocchio.GeometryModel for collision, `Shapes` that read one, or None.
+        constraints: constraints of the file (mimic joints, equalities).
+        forces: given forces of the file (joint springs).
         motors: joints with a transmission.
-        notes: what the user should know about the reading.
-        q0: initial configuration that the file states, shape (nq,), or None.
-        v0: initial velocity that the file states, shape (nv,), or None.
-        laws: nonideal laws that the file itself states, beside those that the model holds.
-        actuation: what drives the joints, or None.
-        keyframes: states that the file names.
-        advice: what may help where the mass matrix is singular, "" for nothing.
-        to_float: what makes it float where nothing moves, "" for nothing.
-        contact_friction: coefficients of sliding, spinning and rolling by the geometry's name.
+        notes: notes on the reading for the user.
+        q0: initial configuration of the file, (nq,), or None.
+        v0: initial velocity of the file, (nv,), or None.
+        laws: nonideal laws of the file, besides the damping and friction of the model.
+        actuation: actuation of the joints, or None.
+        keyframes: named states of the file.
+        advice: advice for a singular mass matrix, or "".
+        to_float: advice on a floating base for a robot without degrees of freedom, or "".
+        contact_friction: coefficients of sliding, torsional and rolling friction by the geometry's name.
         joint_order: names of the joints in the order of the file.
     """
 
@@ -91,36 +91,36 @@ def read_urdf(
     package_dirs: Sequence[str | Path] = (),
     density: float | None = None,
 ) -> RobotFile:
-    """Reads a URDF file.
+    """Read a URDF file.
 
     Args:
-        path: the file.
-        free_flyer: give the root link a floating base, joint "root_joint".
-        package_dirs: folders that hold the packages of `package://` paths; the file's own folder and those
-            above it, and the paths of ROS, are searched as well.
-        density: of links that state no inertia [kg/m^3], which is then that of their shapes.
+        path: path of the file.
+        free_flyer: whether the root link gets a floating base, joint "root_joint".
+        package_dirs: folders that hold the packages of `package://` paths; the folders above the file and the
+            paths of ROS are searched too.
+        density: density of links without an inertia [kg/m^3], to compute it from their shapes.
 
     Raises:
-        LoadingError: the file is malformed, holds a loop, or a link or joint that cannot be.
+        LoadingError: the file is malformed, has a loop, or has an invalid link or joint.
     """
     root = parse_xml(urdf_text(path, package_dirs), path, "robot")
     name = root.get("name") or path.parent.name
     root.set("name", name)
-    notes = tidy(root)
+    notes = repair_urdf(root)
     check_urdf(root, path, ("universe", "root_joint") if free_flyer else ("universe",))
-    shaped = without_inertia(root)
+    shaped = links_without_inertia(root)
     notes += resolve_meshes(root, path, package_dirs)
-    bare = without_inertia(root)
+    bare = links_without_inertia(root)
     if density is not None:
         add_inertias(root, density, notes)
     xml = ElementTree.tostring(root, encoding="unicode")
     try:
-        model = kept_models((xml, free_flyer), lambda: _model(xml, free_flyer)).copy()
+        model = cached_models((xml, free_flyer), lambda: _model(xml, free_flyer)).copy()
     except (ValueError, RuntimeError) as error:
         raise LoadingError(f'"{path}" cannot be read by Pinocchio: {error}') from None
-    _keep_dynamics(model, root, path)
-    _turn_planes(model, root, path, notes)
-    notes += _unused(root)
+    _set_dynamics(model, root, path)
+    _rotate_planar_joints(model, root, path, notes)
+    notes += _unused_notes(root)
     visual, collision = (
         _shapes(model.copy(), root, path, kind, free_flyer) for kind in ("visual", "collision")
     )
@@ -144,7 +144,7 @@ def _model(xml: str, free_flyer: bool) -> Model:
 
 
 def _shapes(model: Model, root: ElementTree.Element, path: Path, kind: str, free_flyer: bool) -> Shapes:
-    """Geometry of one kind, read when something asks for it."""
+    """Return the geometry of one kind, which is read on first use."""
     notes: list[str] = []
 
     def read() -> tuple[GeometryModel, list[str]]:
@@ -154,16 +154,16 @@ def _shapes(model: Model, root: ElementTree.Element, path: Path, kind: str, free
     @cache
     def shapes() -> GeometryModel:
         meshes = (mesh.get("filename", "") for mesh in root.iter("mesh"))
-        content = (ElementTree.tostring(root), free_flyer, kind, stamps(meshes))
-        geometry, dropped = kept_shapes(content, read)
+        content = (ElementTree.tostring(root), free_flyer, kind, file_stamps(meshes))
+        geometry, dropped = cached_shapes(content, read)
         notes.extend(dropped)
         return geometry.copy()
 
     return Shapes(shapes, notes)
 
 
-def _keep_dynamics(model: Model, root: ElementTree.Element, path: Path) -> None:
-    """`<dynamics>` of planar and floating joints, for each dof; Pinocchio's reader keeps those of others."""
+def _set_dynamics(model: Model, root: ElementTree.Element, path: Path) -> None:
+    """Set damping and friction of planar and floating joints, which Pinocchio's reader ignores."""
     for joint in root.findall("joint"):
         dynamics, name = joint.find("dynamics"), joint.get("name", "")
         if dynamics is None or joint.get("type") not in ("planar", "floating"):
@@ -175,8 +175,8 @@ def _keep_dynamics(model: Model, root: ElementTree.Element, path: Path) -> None:
         model.upperDryFrictionLimit[dofs], model.lowerDryFrictionLimit[dofs] = friction, -friction
 
 
-def _turn_planes(model: Model, root: ElementTree.Element, path: Path, notes: list[str]) -> None:
-    """Planar joints move in the plane normal to their axis; Pinocchio's reader takes x-y for all."""
+def _rotate_planar_joints(model: Model, root: ElementTree.Element, path: Path, notes: list[str]) -> None:
+    """Rotate planar joints into the plane normal to their axis; Pinocchio's reader uses x-y for all."""
     up = np.array([0.0, 0.0, 1.0])
     for joint in root.findall("joint"):
         name = joint.get("name", "")
@@ -203,17 +203,17 @@ def _turn_planes(model: Model, root: ElementTree.Element, path: Path, notes: lis
         )
 
 
-def _unused(root: ElementTree.Element) -> list[str]:
-    """Notes on limits of effort and velocity, and on reductions of transmissions."""
+def _unused_notes(root: ElementTree.Element) -> list[str]:
+    """Return notes on limits of effort and velocity, and on transmission ratios."""
     notes = []
     limits = [j.find("limit") for j in root.findall("joint") if j.get("type") != "fixed"]
-    told = []
+    limited = []
     for key in ("effort", "velocity"):
         bounded = sum(float(numbers(limit, key, 1, (0,), "limit")[0]) > 0.0 for limit in limits)
         if bounded:
-            told.append(f"the {key} of {bounded} joints (scene.model.upper{key.capitalize()}Limit)")
-    if told:
-        notes.append(f"bounds of {' and '.join(told)} are not enforced")
+            limited.append(f"the {key} of {bounded} joints (scene.model.upper{key.capitalize()}Limit)")
+    if limited:
+        notes.append(f"bounds of {' and '.join(limited)} are not enforced")
     geared = [
         str(t.get("name"))
         for t in root.findall("transmission")
@@ -232,16 +232,16 @@ def _unused(root: ElementTree.Element) -> list[str]:
 
 
 def read_mimics(path: Path) -> list[Constraint]:
-    """The mimic joints of a URDF file as couplings.
+    """Return the mimic joints of a URDF file as couplings.
 
     Raises:
-        LoadingError: the file is malformed, or a mimic joint follows nothing.
+        LoadingError: the file is malformed, or the leader of a mimic joint does not exist.
     """
     return _mimics(parse_xml(read_text(path), path, "robot"), path)
 
 
 def _mimics(root: ElementTree.Element, path: Path) -> list[Constraint]:
-    """Mimic joints as couplings: q = multiplier q_leader + offset (Pinocchio's reader leaves them free)."""
+    """Return mimic joints, which Pinocchio leaves free, as couplings: q = multiplier q_leader + offset."""
     kinds = {j.get("name", ""): j.get("type") for j in root.findall("joint")}
     result: list[Constraint] = []
     for joint in root.findall("joint"):
@@ -267,7 +267,7 @@ def _mimics(root: ElementTree.Element, path: Path) -> list[Constraint]:
 
 
 def _geometry(model: Model, root: ElementTree.Element, path: Path, kind: str, notes: list[str]) -> Any:
-    """Geometry of one kind, without the meshes that the mesh reader refuses (each leaves a note)."""
+    """Return the geometry of one kind, without unreadable meshes; each of them gives a note."""
     geometry_type = pin.GeometryType.VISUAL if kind == "visual" else pin.GeometryType.COLLISION
     try:
         return pin.buildGeomFromUrdfString(
@@ -284,7 +284,7 @@ def _geometry(model: Model, root: ElementTree.Element, path: Path, kind: str, no
 
 
 def _drop_unreadable(root: ElementTree.Element, kind: str, notes: list[str]) -> None:
-    """Removes the shapes whose mesh cannot be read."""
+    """Remove the shapes whose mesh cannot be read."""
     import coal
 
     for link in root.findall("link"):

@@ -1,4 +1,4 @@
-"""What does not move a robot is no reason to refuse its file: it is mended or left out, and told."""
+"""Repair of URDF files: parts that do not affect the motion are corrected or removed, with a note."""
 
 from __future__ import annotations
 
@@ -8,31 +8,32 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from .unread_tags import tell_unread
+from .unread_tags import unread_notes
 from .validation import SHAPES
 from .xml import listed
 
-# Tags of URDF that the robot's own elements may hold; what other tools add is left out.
+# URDF tags of elements in <robot>; other elements belong to other tools and are removed.
 ROBOT = ("link", "joint", "material", "transmission")
-VERSION = "1.1"  # of URDF; Pinocchio's parser forgets capsules and quaternions where a file states none
-WORLD = "world"  # link that many files attach to and do not declare
-INFINITE = ("inf", "-inf", "+inf", "infinity", "-infinity", "+infinity")  # bounds that are none
-LEFT_OUT = "{"  # tags of a namespace begin so
-# Principal moments below this part of the mass times (1 m)^2 are rounding.
-LEAST_INERTIA = 1e-12
-UNBALANCED = 1e-2  # part by which a principal moment may exceed the sum of the others: files round them
+VERSION = "1.1"  # version of URDF; without it, Pinocchio's parser ignores capsules and quaternions
+WORLD = "world"  # link that many files use without declaring it
+INFINITE = ("inf", "-inf", "+inf", "infinity", "-infinity", "+infinity")  # limits without a bound
+NAMESPACE_MARK = "{"  # beginning of tags with a namespace
+# Maximum rounding error of principal moments, relative to the mass times (1 m)^2.
+INERTIA_ROUNDING = 1e-12
+# tolerance by which a principal moment may exceed the sum of the others, since files round them
+INERTIA_TOLERANCE = 1e-2
 
 
-def tidy(root: ElementTree.Element) -> list[str]:
-    """Mends what is cosmetic in a URDF file.
+def repair_urdf(root: ElementTree.Element) -> list[str]:
+    """Correct defects of a URDF file that do not affect the motion.
 
     Args:
-        root: the `<robot>` element; changed.
+        root: `<robot>` element; modified.
 
     Returns:
-        Notes on what was done.
+        Notes on the corrections.
     """
-    notes = [*_foreign(root), *_stray_shapes(root), *tell_unread(root), *_world(root)]
+    notes = [*_remove_foreign(root), *_remove_stray_shapes(root), *unread_notes(root), *_world(root)]
     root.set("version", VERSION)
     for number, material in enumerate(root.iter("material")):
         if not material.get("name"):
@@ -52,26 +53,26 @@ def tidy(root: ElementTree.Element) -> list[str]:
     return notes + _inertias(root) + _limits(root)
 
 
-def _foreign(root: ElementTree.Element) -> list[str]:
-    """Leaves out elements of other tools and of other namespaces."""
+def _remove_foreign(root: ElementTree.Element) -> list[str]:
+    """Remove elements of other tools and of other namespaces."""
     found: dict[str, None] = {}
     for element in list(root):
         if element.tag not in ROBOT:
             found[str(element.tag).rpartition("}")[2]] = None
             root.remove(element)
     for parent in list(root.iter()):
-        for child in [c for c in parent if str(c.tag).startswith(LEFT_OUT)]:
+        for child in [c for c in parent if str(c.tag).startswith(NAMESPACE_MARK)]:
             found[str(child.tag).rpartition("}")[2]] = None
             parent.remove(child)
-        for key in [k for k in parent.attrib if k.startswith(LEFT_OUT)]:
+        for key in [k for k in parent.attrib if k.startswith(NAMESPACE_MARK)]:
             del parent.attrib[key]
     return (
         [f"elements of other tools are not read: {', '.join(f'<{tag}>' for tag in found)}"] if found else []
     )
 
 
-def _stray_shapes(root: ElementTree.Element) -> list[str]:
-    """Leaves out of a `<geometry>` what stands beside its shape."""
+def _remove_stray_shapes(root: ElementTree.Element) -> list[str]:
+    """Remove elements of a `<geometry>` other than its shape."""
     lost: dict[str, None] = {}
     for link in root.findall("link"):
         for geometry in (g for kind in ("visual", "collision") for g in link.findall(f"{kind}/geometry")):
@@ -84,7 +85,7 @@ def _stray_shapes(root: ElementTree.Element) -> list[str]:
 
 
 def _world(root: ElementTree.Element) -> list[str]:
-    """Declares the link "world" where joints hang on it and the file forgot it."""
+    """Declare the link "world" if joints use it and the file does not declare it."""
     declared = {link.get("name") for link in root.findall("link")}
     named = {e.get("link") for joint in root.findall("joint") for e in joint.findall("parent")}
     if WORLD in declared or WORLD not in named or not declared:
@@ -115,7 +116,7 @@ def _colors(root: ElementTree.Element) -> list[str]:
 
 
 def _undefined_materials(root: ElementTree.Element) -> list[str]:
-    """Materials that are named and nowhere defined lose their mention; the shape keeps its own color."""
+    """Remove references to undefined materials; the shapes keep their own colors."""
     defined = {m.get("name") for m in root.iter("material") if len(m)}
     lost = []
     for link in root.findall("link"):
@@ -138,7 +139,7 @@ def _undefined_materials(root: ElementTree.Element) -> list[str]:
 
 
 def _sizeless(shape: ElementTree.Element) -> bool:
-    """Whether a shape has a dimension of zero, or none at all."""
+    """Check if a shape has a dimension of zero, or no geometry."""
     geometry = shape.find("geometry")
     if geometry is None or not len(geometry):
         return True
@@ -154,14 +155,14 @@ def _sizeless(shape: ElementTree.Element) -> bool:
 
 
 def _uniform_scale(shape: ElementTree.Element) -> None:
-    """A scale of one number stands for three."""
+    """Expand a scale of one number to three."""
     mesh = shape.find("geometry/mesh")
     if mesh is not None and len((mesh.get("scale") or "").split()) == 1:
         mesh.set("scale", " ".join([str(mesh.get("scale"))] * 3))
 
 
 def _inertias(root: ElementTree.Element) -> list[str]:
-    """Principal moments that miss zero by rounding are zero; those that no body has are told."""
+    """Set principal moments to zero if they are negative by rounding, and note unphysical ones."""
     keys, rounded, unbalanced = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), [], []
     for link in root.findall("link"):
         element, mass = link.find("inertial/inertia"), link.find("inertial/mass")
@@ -176,12 +177,12 @@ def _inertias(root: ElementTree.Element) -> list[str]:
         if not np.isfinite(moments).all():
             continue
         values, axes = np.linalg.eigh(moments)
-        if -LEAST_INERTIA * max(scale, values[2]) <= values[0] < 0.0:
+        if -INERTIA_ROUNDING * max(scale, values[2]) <= values[0] < 0.0:
             moments = axes @ np.diag(np.maximum(values, 0.0)) @ axes.T
             for key, value in zip(keys, moments[np.triu_indices(3)], strict=True):
                 element.set(key, repr(float(value)))
             rounded.append(str(link.get("name")))
-        elif values[0] >= 0.0 and values[2] > (1.0 + UNBALANCED) * (values[0] + values[1]):
+        elif values[0] >= 0.0 and values[2] > (1.0 + INERTIA_TOLERANCE) * (values[0] + values[1]):
             unbalanced.append(str(link.get("name")))
     notes = []
     if rounded:
@@ -195,7 +196,7 @@ def _inertias(root: ElementTree.Element) -> list[str]:
 
 
 def _limits(root: ElementTree.Element) -> list[str]:
-    """Limits play no part in the motion: what is missing or turned around in them is mended."""
+    """Correct missing or reversed joint limits, which do not affect the motion."""
     mended = []
     for joint in root.findall("joint"):
         kind, limit = joint.get("type"), joint.find("limit")

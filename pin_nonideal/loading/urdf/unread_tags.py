@@ -1,11 +1,11 @@
-"""The words of URDF, and what a file holds beside them: told, lest a misspelt word is lost."""
+"""Elements and attributes of URDF, and notes on unknown ones, for example misspelled words."""
 
 from __future__ import annotations
 
 from collections import Counter
 from xml.etree import ElementTree
 
-# Elements that each element may hold; one of each but for shapes.
+# Permitted elements of each element; only shapes can occur several times.
 CHILDREN: dict[str, tuple[str, ...]] = {
     "link": ("inertial", "visual", "collision"),
     "inertial": ("origin", "mass", "inertia"),
@@ -26,14 +26,14 @@ ATTRIBUTES: dict[str, tuple[str, ...]] = {
     "mimic": ("joint", "multiplier", "offset"),
 }
 SEVERAL = ("visual", "collision", "material")
-TRANSPOSED = {"iyx": "ixy", "izx": "ixz", "izy": "iyz"}  # written by some, and equal to its twin
+TRANSPOSED = {"iyx": "ixy", "izx": "ixz", "izy": "iyz"}  # equal to the symmetric entry, written by some tools
 
 
-def tell_unread(root: ElementTree.Element) -> list[str]:
-    """Notes on elements and attributes of links and joints that play no part.
+def unread_notes(root: ElementTree.Element) -> list[str]:
+    """Return notes on elements and attributes of links and joints that have no effect.
 
     Args:
-        root: the `<robot>` element.
+        root: `<robot>` element.
     """
     unknown: dict[str, None] = {}
     misspelt: dict[str, None] = {}
@@ -58,7 +58,7 @@ def tell_unread(root: ElementTree.Element) -> list[str]:
 
 
 def _known(top: ElementTree.Element) -> list[ElementTree.Element]:
-    """An element and those of URDF inside it, shapes left aside."""
+    """Return an element and its URDF elements, without shapes."""
     below = [
         child for child in top if child.tag in CHILDREN.get(str(top.tag), ()) and child.tag != "material"
     ]

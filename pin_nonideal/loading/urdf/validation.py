@@ -1,4 +1,4 @@
-"""What a URDF file must hold: a tree of named links, with inertias, joints and shapes that can be."""
+"""Checks of a URDF file: a tree of named links, with valid inertias, joints and shapes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pin_nonideal.types import Placement
 
 from .xml import numbers
 
-# Sizes of the shapes URDF knows, with how many numbers each holds.
+# Attributes of the sizes of URDF shapes, with their number of values.
 SHAPES: dict[str, dict[str, int]] = {
     "box": {"size": 3},
     "cylinder": {"radius": 1, "length": 1},
@@ -26,15 +26,15 @@ MOVING = ("revolute", "continuous", "prismatic", "floating", "planar")
 
 
 def check_urdf(root: ElementTree.Element, path: Path, barred: Collection[str] = ()) -> None:
-    """Raises on the first thing that Pinocchio's reader would misread.
+    """Check a URDF file for content that Pinocchio's reader would misread.
 
     Args:
-        root: the `<robot>` element.
-        path: the file, for messages.
-        barred: names that no joint may bear, for Pinocchio gives them to joints of its own.
+        root: `<robot>` element.
+        path: path of the file, for messages.
+        barred: names that no joint may have, because Pinocchio uses them.
 
     Raises:
-        LoadingError: names the link or joint and says what must hold.
+        LoadingError: the file is invalid; the message names the link or joint and the requirement.
     """
     _check_tree(root, path)
     for link in root.findall("link"):
@@ -49,7 +49,7 @@ def check_urdf(root: ElementTree.Element, path: Path, barred: Collection[str] = 
 
 
 def _check_tree(root: ElementTree.Element, path: Path) -> None:
-    """Each link has one parent at most, names are unique, and there is one root."""
+    """Check that each link has at most one parent, names are unique, and there is one root."""
     links = [_attribute(e, "name", "link", path) for e in root.findall("link")]
     joints = [_attribute(e, "name", "joint", path) for e in root.findall("joint")]
     for kind, names in (("link", links), ("joint", joints)):
@@ -113,7 +113,7 @@ def _attribute(element: ElementTree.Element, key: str, kind: str, path: Path) ->
 
 
 def _check_link(link: ElementTree.Element, path: Path) -> None:
-    """Shapes and inertia in full (urdfdom drops malformed ones, and links lose their mass without a word)."""
+    """Check shapes and inertia, because urdfdom drops malformed ones silently."""
     where = f'"{path}": link "{link.get("name")}"'
     for origin in link.iter("origin"):
         pose(origin, where)
@@ -139,14 +139,14 @@ def _check_link(link: ElementTree.Element, path: Path) -> None:
 
 
 def pose(origin: ElementTree.Element | None, where: str) -> Placement:
-    """The placement that an `<origin>` states, a pinocchio.SE3.
+    """Return the placement of an `<origin>`, a pinocchio.SE3.
 
     Args:
-        origin: the element, or None.
-        where: words for messages.
+        origin: element, or None.
+        where: prefix of error messages.
 
     Raises:
-        LoadingError: not numbers, a quaternion without length, or two rotations.
+        LoadingError: values are not numbers, a quaternion is zero, or there are two rotations.
     """
     xyz, rpy = (numbers(origin, key, 3, (0, 0, 0), where) for key in ("xyz", "rpy"))
     x, y, z, w = numbers(origin, "quat_xyzw", 4, (0, 0, 0, 1), where)
@@ -160,7 +160,7 @@ def pose(origin: ElementTree.Element | None, where: str) -> Placement:
 
 
 def _check_shape(shape: ElementTree.Element, where: str) -> None:
-    """One geometry, with positive sizes."""
+    """Check that a shape has one geometry, with positive sizes."""
     geometry = shape.find("geometry")
     inner = [] if geometry is None else list(geometry)
     if len(inner) != 1 or inner[0].tag not in SHAPES:
@@ -177,7 +177,7 @@ def _check_shape(shape: ElementTree.Element, where: str) -> None:
 
 
 def _check_joint(joint: ElementTree.Element, path: Path) -> None:
-    """Known type, an axis with a direction, and dissipation that does not feed energy."""
+    """Check that a joint has a known type, a nonzero axis, and nonnegative damping and friction."""
     where = f'"{path}": joint "{joint.get("name")}"'
     kind = joint.get("type")
     if kind not in (*MOVING, "fixed"):

@@ -1,4 +1,4 @@
-"""The text of URDF files; `.xacro` files are expanded by the xacro package."""
+"""Text of URDF files; the xacro package expands `.xacro` files."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ XACRO = threading.Lock()  # xacro finds packages by a function of its module
 
 
 def urdf_text(path: Path, package_dirs: Sequence[str | Path] = ()) -> str:
-    """The text of a URDF file; a `.xacro` file is expanded by the xacro package.
+    """Return the text of a URDF file; the xacro package expands a `.xacro` file.
 
     Args:
-        path: the file.
-        package_dirs: more folders in which `$(find package)` looks.
+        path: path of the file.
+        package_dirs: additional folders that `$(find package)` searches.
 
     Raises:
-        LoadingError: it cannot be read, or cannot be expanded.
+        LoadingError: the file cannot be read, or cannot be expanded.
     """
     if path.suffix.lower() != ".xacro":
         return read_text(path)
@@ -37,7 +37,7 @@ def urdf_text(path: Path, package_dirs: Sequence[str | Path] = ()) -> str:
     try:
         with _finding_packages(path.parent, package_dirs):
             return str(xacro.process_file(str(path)).toxml())
-    except Exception as error:  # xacro raises whatever its macros raise
+    except Exception as error:  # any error of xacro's macros
         raise LoadingError(
             f'"{path}" cannot be expanded by xacro: {" ".join(str(error).split())}; what it needs can be '
             "given by hand: xacro FILE NAME:=VALUE > robot.urdf"
@@ -46,13 +46,13 @@ def urdf_text(path: Path, package_dirs: Sequence[str | Path] = ()) -> str:
 
 @contextmanager
 def _finding_packages(folder: Path, package_dirs: Sequence[str | Path]) -> Iterator[None]:
-    """`$(find package)` of xacro looks where meshes are looked for, before it asks ROS."""
+    """Let `$(find package)` of xacro search the folders of meshes before those of ROS."""
     with XACRO:
         try:
             from xacro import substitution_args as names
 
             ask_ros = names._eval_find
-        except (ImportError, AttributeError):  # another version of xacro, which asks ROS alone
+        except (ImportError, AttributeError):  # another version of xacro, which searches ROS only
             yield
             return
 

@@ -1,4 +1,4 @@
-"""XML files as text, elements and numbers; what is malformed is said with the place."""
+"""XML files as text, elements and numbers; error messages name the position."""
 
 from __future__ import annotations
 
@@ -12,16 +12,17 @@ import numpy as np
 
 from pin_nonideal.errors import LoadingError
 
-# Numbers as all readers of such files take them; Python's float also takes 1_000 and digits of other scripts.
+# Numbers that all readers of such files accept; Python's float also accepts 1_000 and digits of other
+# scripts.
 NUMBER = re.compile(r"[-+]?((\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|inf|infinity|nan)", re.ASCII | re.IGNORECASE)
-FOREIGN = "unbound:"  # namespace that stands for a prefix which a file does not declare
+FOREIGN = "unbound:"  # namespace of prefixes that a file does not declare
 
 
 def read_text(path: Path) -> str:
-    """The text of a file.
+    """Return the text of a file.
 
     Raises:
-        LoadingError: it cannot be read, or is no text.
+        LoadingError: the file cannot be read, or is not text.
     """
     try:
         return path.read_text(encoding="utf-8")
@@ -34,15 +35,15 @@ def read_text(path: Path) -> str:
 
 
 def parse_xml(text: str, path: Path, root: str) -> ElementTree.Element:
-    """The root element of an XML file.
+    """Return the root element of an XML file.
 
     Raises:
-        LoadingError: it is truncated or malformed, declares entities, or has another root.
+        LoadingError: the file is truncated or malformed, declares entities, or has another root.
     """
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise LoadingError(f'"{path}" must not declare a DOCTYPE or entities; remove them')
     try:
-        element = ElementTree.fromstring(_bound(text, root))
+        element = ElementTree.fromstring(_declare_prefixes(text, root))
     except ElementTree.ParseError as error:
         raise LoadingError(f'"{path}" is truncated or not XML: {error}; export it again') from None
     if element.tag != root:
@@ -50,8 +51,8 @@ def parse_xml(text: str, path: Path, root: str) -> ElementTree.Element:
     return element
 
 
-def _bound(text: str, root: str) -> str:
-    """The text with every prefix of its tags and attributes declared: tools leave their own unbound."""
+def _declare_prefixes(text: str, root: str) -> str:
+    """Declare all undeclared prefixes of tags and attributes, which some tools write, in the root element."""
     used = set(re.findall(r"</?([\w.-]+):[\w.-]", text)) | set(re.findall(r"\s([\w.-]+):[\w.-]+\s*=", text))
     declared = set(re.findall(r"xmlns:([\w.-]+)\s*=", text))
     unbound = sorted(used - declared - {"xmlns", "xml"})
@@ -60,10 +61,10 @@ def _bound(text: str, root: str) -> str:
 
 
 def listed(names: Iterable[str]) -> str:
-    """Up to four quoted names, and how many more.
+    """Return up to four quoted names, and the number of the remaining ones.
 
     Args:
-        names: each counts once.
+        names: names; repeated names count once.
     """
     once = list(dict.fromkeys(names))
     return ", ".join(f'"{name}"' for name in once[:4]) + (f" and {len(once) - 4} more" if once[4:] else "")
@@ -72,17 +73,17 @@ def listed(names: Iterable[str]) -> str:
 def numbers(
     element: ElementTree.Element | None, key: str, size: int, default: Sequence[float] | None, where: str
 ) -> Any:
-    """Finite numbers of an XML attribute.
+    """Return the finite numbers of an XML attribute.
 
     Args:
-        element: the element, or None.
+        element: element, or None.
         key: name of the attribute.
-        size: how many numbers it must hold.
-        default: what an absent element or attribute means; None when it must be there.
-        where: words for messages.
+        size: required number of values.
+        default: values if the element or attribute is missing; None if it is required.
+        where: prefix of error messages.
 
     Raises:
-        LoadingError: absent where it must be there, not numbers, not finite, or another count.
+        LoadingError: a required value is missing, or the values are not finite numbers of this count.
     """
     text = None if element is None else element.get(key)
     if text is None:

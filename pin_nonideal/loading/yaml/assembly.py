@@ -1,6 +1,6 @@
-"""From a robot's file and a robot.yaml table to the arguments of a Scene.
+"""Assembly of a robot's file and a robot.yaml table into the arguments of a Scene.
 
-Every joint that the table names is looked up here; the Scene looks up the frames.
+Names of joints in the table are resolved here; the Scene resolves names of frames.
 """
 
 from __future__ import annotations
@@ -9,14 +9,14 @@ import numpy as np
 import pinocchio as pin
 
 from pin_nonideal.errors import SingularMassError
-from pin_nonideal.loading.edit.tree import exchange_joints, fix_idle, lock, place_base, still_moves
+from pin_nonideal.loading.edit.tree import exchange_joints, fix_massless, has_joints, lock, place_base
 from pin_nonideal.loading.urdf.damping_friction import dissipation
 from pin_nonideal.loading.urdf.inertia import require_positive_mass
 from pin_nonideal.loading.urdf.reader import RobotFile
 from pin_nonideal.states.joint_order import remember_order
 from pin_nonideal.types import Table
 
-from .initial_state import Start, asked_start, initial_state, joint_index, vector
+from .initial_state import Start, initial_state, joint_index, requested_state, vector
 from .motors import actuation_of
 from .robot import (
     CONSTRAINTS,
@@ -40,20 +40,20 @@ def scene_arguments(
     start: Start = None,
     speed: Start = None,
 ) -> Table:
-    """Keyword arguments of Scene.
+    """Return the keyword arguments of Scene.
 
     Args:
-        robot: what the robot's file holds; consumed.
-        table: content of robot.yaml, {} when there is none.
+        robot: content of the robot's file; consumed.
+        table: content of robot.yaml, {} if there is none.
         name: name of the scene, also used in messages.
-        merge: merge three revolutes with massless links between into ball joints.
-        start: initial configuration in place of the file's: (nq,), by joint name, or the name of a reference
-            configuration.
-        speed: initial velocity in place of the file's: (nv,), or by joint name.
+        merge: whether three revolute joints with massless links are merged into a ball joint.
+        start: initial configuration that replaces the file's: (nq,), by joint name, or the name of a
+            reference configuration.
+        speed: initial velocity that replaces the file's: (nv,), or by joint name.
 
     Raises:
-        LoadingError: a name in the table does not exist, or a value is refused.
-        InputError: the start is refused.
+        LoadingError: a name in the table does not exist, or a value is invalid.
+        InputError: the initial state is invalid.
         SingularMassError: M is not positive definite at the initial configuration.
     """
     where = f'robot.yaml of "{name}"'
@@ -61,7 +61,7 @@ def scene_arguments(
     optional_string(table, "description", where)
     exchange_joints(robot, table, where, notes, merge)
     place_base(robot, table, where)
-    if robot.model.nv == 0:  # what stands on nothing and has no joint was meant to float
+    if robot.model.nv == 0:  # a robot without joints and base was meant to float
         notes.append(f"nothing moves: {robot.to_float}" if robot.to_float else "nothing moves")
     if "gravity" in table:
         robot.model.gravity = pin.Motion(
@@ -70,10 +70,10 @@ def scene_arguments(
     remember_order(robot.model, robot.joint_order)
     q0, v0 = initial_state(robot, table.get("initial"), where, notes)
     q0, v0 = lock(robot, table, q0, v0, where)
-    q0, v0 = fix_idle(robot, names_in(table), q0, v0, notes)
-    remember_order(robot.model, robot.joint_order)  # of the model that is left
-    q0, v0 = asked_start(robot, q0, v0, start, speed)
-    robot.constraints = [c for c in robot.constraints if still_moves(robot.model, c, where)]
+    q0, v0 = fix_massless(robot, names_in(table), q0, v0, notes)
+    remember_order(robot.model, robot.joint_order)  # for the remaining model
+    q0, v0 = requested_state(robot, q0, v0, start, speed)
+    robot.constraints = [c for c in robot.constraints if has_joints(robot.model, c, where)]
     motors = strings(table, "name_mot", where) or [m for m in robot.motors if robot.model.existJointName(m)]
     for motor in motors:
         joint_index(robot.model, motor, f"{where}: name_mot")

@@ -1,7 +1,7 @@
-"""robot.yaml: what a URDF cannot say, as a table of plain values that becomes descriptions.
+"""robot.yaml: data that URDF cannot express, as a table of plain values that is converted to descriptions.
 
-A superset of what community closed-loop robots keep beside their URDF.  Only data: nothing in the file is
-ever executed.
+The keys are a superset of the keys in community repositories of closed-loop robots. The file contains data
+only; no content is executed.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any, get_args
 
 from pin_nonideal.description import actuation, constraints, contacts, forces, laws
 from pin_nonideal.description import time_functions as timefunctions
-from pin_nonideal.errors import InputError, LoadingError, nearest
+from pin_nonideal.errors import InputError, LoadingError, nearest, short_repr
 from pin_nonideal.geometry.from_model import GeometryContact
 from pin_nonideal.types import Table
 from pin_nonideal.validation import number
@@ -63,14 +63,14 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
 
 
 def read_yaml(path: Path) -> Table:
-    """The table in a robot.yaml, keys checked.
+    """Return the table of a robot.yaml, with checked keys.
 
     Raises:
-        LoadingError: the file is truncated or malformed, holds tags that name code, anchors, a key twice, or
-            a key that is not known.
+        LoadingError: the file is truncated or malformed, or has a tag, an anchor, a repeated key, or an
+            unknown key.
     """
     table = plain_yaml(path)
-    if table is None:  # an empty file: a robot without extras
+    if table is None:  # an empty file is a robot without further data
         table = {}
     if not isinstance(table, dict):
         raise LoadingError(f'"{path}" must be a table of keys; got {_kind(table)}')
@@ -80,13 +80,13 @@ def read_yaml(path: Path) -> Table:
 
 
 def _check_numbers(value: Any, where: str) -> None:
-    """Raises where true or false, which YAML also writes yes and no, stands among numbers."""
+    """Check that no list of numbers contains true or false, which YAML also writes as yes and no."""
     parts = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
     for key, part in parts:
         _check_numbers(part, f"{where}: {key}")
     kinds = {type(x) for x in value} if isinstance(value, list) else set()
     if bool in kinds and kinds & {int, float}:
-        raise LoadingError(f"{where} must hold numbers; got {value!r}")
+        raise LoadingError(f"{where} must hold numbers; got {short_repr(value)}")
 
 
 def _kind(value: object) -> str:
@@ -95,10 +95,10 @@ def _kind(value: object) -> str:
 
 
 def check_keys(table: Mapping[Any, Any], known: Iterable[str], where: str) -> None:
-    """Raises on the first key that is not known, naming the nearest that is.
+    """Check that all keys are known.
 
     Raises:
-        LoadingError: see above.
+        LoadingError: a key is unknown; the message has the nearest known key.
     """
     known = list(known)
     for key in table:
@@ -107,15 +107,15 @@ def check_keys(table: Mapping[Any, Any], known: Iterable[str], where: str) -> No
 
 
 def build(kind: type, values: Any, where: str) -> Any:
-    """One description from a table of its arguments.
+    """Return one description from a table of its arguments.
 
     Args:
-        kind: a description's class.
+        kind: class of the description.
         values: table of arguments.
-        where: words for messages.
+        where: prefix of error messages.
 
     Raises:
-        LoadingError: unknown or missing arguments, or values the description refuses.
+        LoadingError: arguments are unknown or missing, or the description rejects a value.
     """
     if not isinstance(values, dict):
         raise LoadingError(f"{where}: {kind.__name__} must be a table of arguments; got {_kind(values)}")
@@ -137,10 +137,10 @@ def build(kind: type, values: Any, where: str) -> Any:
 
 
 def time_function(table: Table, where: str) -> Any:
-    """`{sinusoid: {amplitude: 1, frequency: 2}}` and its like.
+    """Return a function of time from a table such as `{sinusoid: {amplitude: 1, omega: 2}}`.
 
     Raises:
-        LoadingError: not one known function with its arguments.
+        LoadingError: the table is not one known function with its arguments.
     """
     name, values = one_entry(table, where)
     if name not in FUNCTIONS:
@@ -149,24 +149,25 @@ def time_function(table: Table, where: str) -> Any:
 
 
 def one_entry(table: Any, where: str) -> tuple[str, Any]:
-    """The only key of a table, and its value.
+    """Return the only key of a table, and its value.
 
     Raises:
-        LoadingError: no table, or not one key.
+        LoadingError: the value is not a table with one key.
     """
     if not isinstance(table, dict) or len(table) != 1:
         raise LoadingError(
-            f"{where} must be a table with one key, the kind, such as {{PointAnchor: {{...}}}}; got {table!r}"
+            f"{where} must be a table with one key, the kind, such as {{PointAnchor: {{...}}}}; "
+            f"got {short_repr(table)}"
         )
     key, value = next(iter(table.items()))
     return str(key), value
 
 
 def descriptions(entries: Any, kinds: Mapping[str, type], where: str) -> list[Any]:
-    """A list of descriptions from a list of one-key tables `{Kind: {argument: value}}`.
+    """Return a list of descriptions from a list of one-key tables `{Kind: {argument: value}}`.
 
     Raises:
-        LoadingError: no list, an unknown kind, or arguments that are refused.
+        LoadingError: the value is not a list, a kind is unknown, or arguments are invalid.
     """
     if entries is None:
         return []
@@ -187,24 +188,24 @@ def descriptions(entries: Any, kinds: Mapping[str, type], where: str) -> list[An
 
 
 def strings(table: Table, key: str, where: str) -> list[str]:
-    """A list of names under a key, empty when the key is absent.
+    """Return a list of names under a key, or an empty list if the key is missing.
 
     Raises:
-        LoadingError: something else is there.
+        LoadingError: the value is not a list of names.
     """
     value = table.get(key)
     if value is None:
         return []
     if not isinstance(value, list) or not all(isinstance(v, str) for v in value):
-        raise LoadingError(f"{where}: {key} must be a list of names; got {value!r}")
+        raise LoadingError(f"{where}: {key} must be a list of names; got {short_repr(value)}")
     return value
 
 
 def optional_string(table: Table, key: str, where: str) -> str | None:
-    """A text under a key, or None.
+    """Return a string under a key, or None.
 
     Raises:
-        LoadingError: something else is there.
+        LoadingError: the value is not a string.
     """
     value = table.get(key)
     if value is not None and not isinstance(value, str):
@@ -213,10 +214,10 @@ def optional_string(table: Table, key: str, where: str) -> str | None:
 
 
 def loops(table: Table, where: str) -> list[Any]:
-    """Anchors from the community's `closed_loop` and `type` (6d where `type` is absent).
+    """Return anchors from the community keys `closed_loop` and `type` (6d without `type`).
 
     Raises:
-        LoadingError: pairs or types are malformed, or their counts differ.
+        LoadingError: pairs or types are malformed, or their numbers differ.
     """
     pairs = table.get("closed_loop")
     types = table.get("type")
@@ -239,17 +240,17 @@ def loops(table: Table, where: str) -> list[Any]:
     for i, (pair, kind) in enumerate(zip(pairs, types, strict=True)):
         place = f"{where}: closed_loop[{i}]"
         if not isinstance(pair, list) or len(pair) != 2:
-            raise LoadingError(f"{place} must be a pair of frame names; got {pair!r}")
+            raise LoadingError(f"{place} must be a pair of frame names; got {short_repr(pair)}")
         arguments = {"frame1": pair[0], "frame2": pair[1], "name": f"{pair[0]}-{pair[1]}"}
         if not isinstance(kind, str) or kind.lower() not in ("3d", "6d"):
-            raise LoadingError(f'{where}: type[{i}] must be "3d" or "6d"; got {kind!r}')
+            raise LoadingError(f'{where}: type[{i}] must be "3d" or "6d"; got {short_repr(kind)}')
         anchor = constraints.PointAnchor if kind.lower() == "3d" else constraints.FrameAnchor
         result.append(build(anchor, arguments, place))
     return result
 
 
 def joint_types(table: Table, where: str) -> dict[str, str]:
-    """Joints whose type is exchanged, from the community's `joint_name` and `joint_type`.
+    """Return the new joint types by joint name, from the community keys `joint_name` and `joint_type`.
 
     Raises:
         LoadingError: the two lists differ in length.
@@ -263,14 +264,14 @@ def joint_types(table: Table, where: str) -> dict[str, str]:
 
 
 def pitches(table: Table, where: str) -> dict[str, float]:
-    """Joints that are screws, and their rise per radian [m/rad], from `model: {helical: {joint: pitch}}`.
+    """Return the rise per radian [m/rad] of screw joints by name, from `model: {helical: {joint: pitch}}`.
 
     Raises:
-        LoadingError: no table of numbers other than zero.
+        LoadingError: the value is not a table of nonzero numbers.
     """
     given = (table.get("model") or {}).get("helical") or {}
     if not isinstance(given, dict):
-        raise LoadingError(f"{where}: model: helical must be a table by joint name; got {given!r}")
+        raise LoadingError(f"{where}: model: helical must be a table by joint name; got {short_repr(given)}")
     result = {}
     for joint, value in given.items():
         what = f'{where}: model: helical: pitch of "{joint}"'
@@ -284,7 +285,7 @@ def pitches(table: Table, where: str) -> dict[str, float]:
 
 
 def names_in(value: object) -> set[str]:
-    """Every text anywhere in a table: what the file may refer to."""
+    """Return every string in a table, as a superset of the names that it refers to."""
     if isinstance(value, str):
         return {value}
     if isinstance(value, dict):

@@ -1,4 +1,4 @@
-"""YAML files as plain values: nothing in them is executed, and nothing is read as other than it looks."""
+"""YAML files as plain values, without execution of code and without ambiguous numbers."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from pin_nonideal.loading.urdf.xml import read_text
 
 
 def plain_yaml(path: Path) -> Any:
-    """What a YAML file holds: tables, lists, texts and numbers that are what they look like.
+    """Return the content of a YAML file: tables, lists, strings and numbers.
 
     Args:
-        path: the file.
+        path: path of the file.
 
     Raises:
-        LoadingError: it is truncated or malformed, or holds tags that name code, anchors, a key twice, or
-            octal or sexagesimal numbers.
+        LoadingError: the file is truncated or malformed, or has a tag, an anchor, a repeated key, or an octal
+            or sexagesimal number.
     """
     import yaml
 
@@ -31,7 +31,7 @@ def plain_yaml(path: Path) -> Any:
 
 
 def _loader() -> Any:
-    """yaml.SafeLoader that also refuses repeated keys and anchors, and reads 1e-3 as a number."""
+    """Return a yaml.SafeLoader that rejects repeated keys and anchors, and reads 1e-3 as a number."""
     import yaml
 
     class Loader(yaml.SafeLoader):

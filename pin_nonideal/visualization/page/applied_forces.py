@@ -1,7 +1,8 @@
-"""Arrows of what acts where it is said: springs, wrenches and drag."""
+"""Arrows of applied forces at their points of action: springs, wrenches and drag."""
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,19 +21,19 @@ if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
 
 
-def given_arrows(run: Trajectory, motion: Motion, marks: list[Mark]) -> list[Arrow]:
-    """Arrows of the springs, wrenches and laws of drag of a scene, where they act.
+def applied_force_arrows(run: Trajectory, motion: Motion, marks: list[Mark]) -> list[Arrow]:
+    """Return the arrows of the springs, wrenches and drag laws of a scene, at their points of action.
 
     Args:
-        run: the run.
-        motion: its motion.
-        marks: of the scene, for the ends of springs.
+        run: run of the replay.
+        motion: motion of the run.
+        marks: marks of the scene, for the ends of springs.
     """
-    ends = {mark.name: mark for mark in marks if mark.kind == "spring"}
+    ends, twists = {mark.name: mark for mark in marks if mark.kind == "spring"}, _Twists(run, motion)
     found: list[Arrow] = []
     for item in run.scene.forces:
         if isinstance(item, SpringDamper):
-            found.append(_spring(run, motion, item, ends[item.name or f"spring {item.frame1}"]))
+            found.append(_spring(motion, twists, item, ends[item.name or f"spring {item.frame1}"]))
         elif isinstance(item, JointSpring):
             joint = run.scene.model.getJointId(item.joint)
             q, v = run.scene.model.joints[joint].idx_q, run.scene.model.joints[joint].idx_v
@@ -48,7 +49,7 @@ def given_arrows(run: Trajectory, motion: Motion, marks: list[Mark]) -> list[Arr
         if isinstance(law, Drag):
             joint, place = frame_on_joint(run.scene.model, law.frame)
             point = np.asarray(place.translation)
-            slip = _velocity(run, motion, joint, point)
+            slip = twists.velocity(joint, point)
             speed = np.linalg.norm(slip, axis=1, keepdims=True)
             push = np.where(
                 speed > 0.0, -law.coefficient * np.maximum(speed, 1e-300) ** (law.exponent - 1.0) * slip, 0.0
@@ -59,12 +60,12 @@ def given_arrows(run: Trajectory, motion: Motion, marks: list[Mark]) -> list[Arr
     return found
 
 
-def _spring(run: Trajectory, motion: Motion, item: SpringDamper, mark: Mark) -> Arrow:
-    """The force on the body of its first frame."""
+def _spring(motion: Motion, twists: _Twists, item: SpringDamper, mark: Mark) -> Arrow:
+    """Return the arrow of the force on the body of the spring's first frame."""
     first, second = motion.point(mark.joint1, mark.point1), motion.point(mark.joint2, mark.point2)
     length = np.linalg.norm(first - second, axis=1, keepdims=True)
     way = np.divide(first - second, length, out=np.zeros_like(first), where=length > 0.0)
-    rate = _velocity(run, motion, mark.joint1, mark.point1) - _velocity(run, motion, mark.joint2, mark.point2)
+    rate = twists.velocity(mark.joint1, mark.point1) - twists.velocity(mark.joint2, mark.point2)
     size = item.stiffness * (length - item.rest_length) + item.damping * np.sum(
         rate * way, axis=1, keepdims=True
     )
@@ -82,14 +83,29 @@ def _wrench(run: Trajectory, motion: Motion, item: Wrench) -> list[Arrow]:
     ]
 
 
-def _velocity(run: Trajectory, motion: Motion, joint: int, point: Array) -> Array:
-    """Velocity of a point that a joint carries at each frame, in world axes [m/s], (n, 3)."""
-    if not joint:
-        return np.zeros((len(motion.times), 3))
-    model, v = run.scene.model, motion.of(run.v)
-    data, found = model.createData(), np.empty((len(v), 3))
-    for k, q in enumerate(motion.q):
-        pin.forwardKinematics(model, data, q, v[k])
-        own = data.v[joint]
-        found[k] = data.oMi[joint].rotation @ (own.linear + np.cross(own.angular, point))
-    return found
+class _Twists:
+    """Velocities of all joints at the frames, computed on first access."""
+
+    def __init__(self, run: Trajectory, motion: Motion) -> None:
+        self.run, self.motion = run, motion
+
+    @cached_property
+    def own(self) -> Array:
+        """Linear and angular velocity of each joint in its own axes, (n, njoints, 6)."""
+        model, v = self.run.scene.model, self.motion.of(self.run.v)
+        data, found = model.createData(), np.zeros((len(v), model.njoints, 6))
+        moving = range(1, model.njoints)
+        for k, q in enumerate(self.motion.q):
+            pin.forwardKinematics(model, data, q, v[k])
+            for joint in moving:
+                found[k, joint] = data.v[joint].vector
+        return found
+
+    def velocity(self, joint: int, point: Array) -> Array:
+        """Return the velocity of a point on a joint at each frame, in world axes [m/s], (n, 3)."""
+        if not joint:
+            return np.zeros((len(self.motion.times), 3))
+        linear, angular = np.split(self.own[:, joint], 2, axis=1)
+        return np.asarray(
+            np.einsum("nij,nj->ni", self.motion.rotation(joint), linear + np.cross(angular, point))
+        )

@@ -1,4 +1,4 @@
-"""How a page carries numbers: typed arrays after a header in JSON, and shapes of bodies, equal ones once."""
+"""Binary data of a page: typed arrays after a JSON header, and shapes without duplicates."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .visuals import Shape, Visual
 
 
 class Payload:
-    """The run as bytes: a JSON header, which refers to the typed arrays that follow it."""
+    """Run as bytes: a JSON header with references to the typed arrays after it."""
 
     def __init__(self) -> None:
         self._chunks: list[bytes] = []
@@ -21,10 +21,10 @@ class Payload:
         self._known: dict[tuple[str, bytes], dict[str, list[Any]]] = {}
 
     def add(self, values: Any, kind: str = "f4") -> dict[str, list[Any]]:
-        """Reference to a stored array; equal ones are stored once.
+        """Return a reference to a stored array; equal arrays are stored once.
 
         Args:
-            values: anything NumPy can turn into an array; stored flat.
+            values: array-like data; stored flat.
             kind: type of the stored numbers, "f4", "f8", "u1", "u2" or "u4".
         """
         chunk = np.ascontiguousarray(values, dtype=f"<{kind}").tobytes()
@@ -35,10 +35,10 @@ class Payload:
         return self._known[kind, chunk]
 
     def curve(self, values: Array) -> dict[str, list[Any]]:
-        """Reference to values that are plotted: 32 bits where they tell a thousandth of the range, else 64.
+        """Return a reference to plotted values: 32 bits if they resolve a thousandth of the range, else 64.
 
         Args:
-            values: of the curve.
+            values: values of the curve.
         """
         large, range_of = (
             float(np.abs(values).max(initial=0.0)),
@@ -47,13 +47,13 @@ class Payload:
         return self.add(values, "f4" if large <= 1e3 * range_of or large == 0.0 else "f8")
 
     def bytes(self, header: Table) -> bytes:
-        """Length of the header as four bytes, header, arrays."""
+        """Return the length of the header as four bytes, the header, and the arrays."""
         text = json.dumps(header, allow_nan=False, separators=(",", ":")).encode()
         return b"".join([len(text).to_bytes(4, "little"), text, *self._chunks])
 
 
 class Shapes:
-    """Shapes, equal ones once, and the visuals that refer to them by number."""
+    """Shapes without duplicates, and the visuals that refer to them by number."""
 
     def __init__(self, payload: Payload) -> None:
         self.payload = payload
@@ -61,7 +61,7 @@ class Shapes:
         self.stored: list[Table] = []
 
     def add(self, visuals: list[Visual]) -> list[Table]:
-        """Visuals as the page reads them."""
+        """Return visuals in the format of the page."""
         drawn = []
         for visual in visuals:
             key = _fingerprint(visual.shape)
@@ -81,7 +81,7 @@ class Shapes:
 
 
 def _fingerprint(shape: Shape) -> bytes:
-    """Equal for equal shapes."""
+    """Return equal bytes for equal shapes."""
     words = repr((shape.kind, shape.size, shape.parts)).encode()
     return b"|".join([words, shape.vertices.tobytes(), shape.triangles.tobytes()])
 

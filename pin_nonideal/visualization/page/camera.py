@@ -1,4 +1,4 @@
-"""Where a replay looks from, what it follows, and where it draws the ground."""
+"""View of a replay: camera direction, tracked bodies, and height of the ground."""
 
 from __future__ import annotations
 
@@ -18,26 +18,26 @@ from .visuals import Visual
 if TYPE_CHECKING:
     from pin_nonideal.scene.scene import Scene
 
-# The bounding box of the motion is taken over so many frames.
+# Number of frames from which the bounding box of the motion is computed.
 BOX_FRAMES = 200
-# What travels farther than so many times the model's size leaves a view that stands still.
-FAR = 4.0
+# Bodies with a longer travel than this multiple of the model's size leave a fixed view.
+MAX_FIXED_TRAVEL = 4.0
 
 
 @dataclass(frozen=True)
 class View:
-    """Where to look from.
+    """Camera direction and content of the view.
 
     Attributes:
         up: direction against gravity, (3,).
-        direction: from the target to the camera, unit, (3,).
-        outline: outermost points of what is drawn over the whole run [m], (k, 3); when the camera follows,
-            as seen from the center of mass of what it follows.
+        direction: unit vector from the target to the camera, (3,).
+        outline: extreme points of the drawn bodies over the whole run [m], (k, 3), relative to the tracked
+            center of mass if the camera follows it.
         size: diagonal of the model at the start [m].
         link: typical length of a link, for the size of marks [m].
-        ground: height of the ground along `up` [m]; None where nothing stands on one.
-        follow: whether the model travels so far that the camera should go with it.
-        stays: joints that the camera keeps in view, (njoints,): all, or those without a belt that runs away.
+        ground: height of the ground along `up` [m], or None without a ground.
+        follow: whether the model travels so far that the camera follows it.
+        stays: whether the camera keeps each joint in view, (njoints,); False for belts that leave the view.
     """
 
     up: Array
@@ -53,14 +53,14 @@ class View:
 def view(
     scene: Scene, motion: Motion, visuals: list[Visual], marks: list[tuple[int, Array]], shown: Array
 ) -> View:
-    """The view that shows the whole motion.
+    """Return the view that shows the whole motion.
 
     Args:
-        scene: the scene, for its gravity, masses and contacts.
-        motion: its motion.
-        visuals: what is drawn.
-        marks: further points, as joint index and position in its frame [m].
-        shown: points of the world that should be seen too [m], (k, 3).
+        scene: scene with gravity, masses and contacts.
+        motion: motion of the run.
+        visuals: drawn shapes.
+        marks: additional points, as joint index and position in its frame [m].
+        shown: additional points of the world in the view [m], (k, 3).
     """
     model = scene.model
     up = upward(model)
@@ -69,26 +69,23 @@ def view(
     clouds += [(joint, coarse.point(joint, local)) for joint, local in marks]
     clouds += [(v.joint, cloud) for v in visuals if v.joint for cloud in _corners(coarse, v)]
     clouds = clouds or [(0, np.zeros((len(coarse.times), 3)))]
-    size = max(_diagonal(np.array([cloud[0] for _, cloud in clouds])), motion.size)
-    stays, follow = _traveling(model.njoints, clouds, size)
+    size = _diagonal(np.array([cloud[0] for _, cloud in clouds]))
+    # A particle has the size of its path; a distant or traveling body has the size of its shape.
+    if motion.size <= MAX_FIXED_TRAVEL * size or not any(v.joint for v in visuals):
+        size = max(size, motion.size)
+    stays, follow = _joints_in_view(model.njoints, clouds, size)
     if not all(stays):
         size = _diagonal(np.array([cloud[0] for joint, cloud in clouds if stays[joint]]))
     points = np.array([cloud for joint, cloud in clouds if stays[joint]])
-    reach = 1.5 * _diagonal(points)
-    # A large floor would make all that moves on it small.
-    still = [v for v in visuals if v.joint == 0 and np.linalg.norm(v.shape.half_extent()[1]) < reach]
-    fixed = np.array([cloud for v in still for cloud in _corners(coarse, v)]).reshape(
-        -1, len(coarse.times), 3
-    )
     if follow:
         points = points - center_of_mass(model, coarse, stays)[None]
-    elif len(fixed):
-        points = np.vstack([points, fixed])
+    else:
+        points = np.vstack([points, *_still(coarse, visuals, points)])
     beside = points if follow else np.vstack([points.reshape(-1, 3), shown])
     return View(
         up=up,
         direction=_direction(points, up, 0.25 if not len(shown) else 0.6),
-        outline=_outermost(beside),
+        outline=_extreme_points(beside),
         size=max(size, 0.05 * _diagonal(points)),
         link=link_length(model, marks, max(size, 0.05 * _diagonal(points))),
         ground=_ground(scene, visuals, points, size, up, follow),
@@ -98,7 +95,7 @@ def view(
 
 
 def upward(model: pin.Model) -> Array:
-    """Direction against gravity, (3,); z where there is none.
+    """Return the direction against gravity, (3,), or z without gravity.
 
     Args:
         model: the model.
@@ -109,7 +106,7 @@ def upward(model: pin.Model) -> Array:
 
 
 def center_of_mass(model: pin.Model, motion: Motion, stays: list[bool]) -> Array:
-    """Center of the masses of some joints at each frame [m], (n, 3); of their origins without mass."""
+    """Return the center of mass of some joints at each frame [m], (n, 3), or of their origins if massless."""
     kept = [joint for joint in range(1, model.njoints) if stays[joint]]
     mass = np.array([model.inertias[joint].mass for joint in kept])
     mass = mass if mass.sum() > 0.0 else np.ones(len(kept))
@@ -118,30 +115,51 @@ def center_of_mass(model: pin.Model, motion: Motion, stays: list[bool]) -> Array
 
 
 def link_length(model: pin.Model, marks: list[tuple[int, Array]], size: float) -> float:
-    """A typical length of a link [m]: twice the median distance between joints, at most the model's size."""
+    """Return a typical link length [m]: twice the median distance of joints, at most the model's size."""
     lengths = [float(np.linalg.norm(place.translation)) for place in model.jointPlacements[1:]]
     lengths += [float(np.linalg.norm(point)) for joint, point in marks if joint]
     real = [length for length in lengths if 1e-3 * size < length <= size]
     return min(float(np.median(real)) * 2.0, size) if real else size
 
 
-def _traveling(njoints: int, clouds: list[tuple[int, Array]], size: float) -> tuple[list[bool], bool]:
-    """Which joints stay in view, and whether the camera must follow."""
+def _still(motion: Motion, visuals: list[Visual], points: Array) -> list[Array]:
+    """Return the corners of fixed visuals, (8, n, 3) each, that leave half of the view to the moving ones.
+
+    A large floor would make the moving bodies small.
+    """
+    least, most = points.reshape(-1, 3).min(axis=0), points.reshape(-1, 3).max(axis=0)
+    room, found = 2.0 * float(np.linalg.norm(most - least)), []
+    for visual in (v for v in visuals if v.joint == 0):
+        corners = np.array(_corners(motion, visual))
+        if not len(corners):
+            continue
+        low = np.minimum(least, corners[:, 0].min(axis=0))
+        high = np.maximum(most, corners[:, 0].max(axis=0))
+        if np.linalg.norm(high - low) <= room:
+            least, most = low, high
+            found.append(corners)
+    return found
+
+
+def _joints_in_view(njoints: int, clouds: list[tuple[int, Array]], size: float) -> tuple[list[bool], bool]:
+    """Return the joints that stay in view, and whether the camera must follow."""
     travel = np.zeros(njoints)
     for joint, cloud in clouds:
         travel[joint] = max(travel[joint], _diagonal(cloud))
-    far = travel > FAR * size
+    far = travel > MAX_FIXED_TRAVEL * size
     if not far[1:].any():
         return [True] * njoints, False
     if np.count_nonzero(far[1:]) * 2 <= njoints - 1:
-        return [not gone for gone in far], False
+        near = [cloud for joint, cloud in clouds if not far[joint]]
+        if _diagonal(np.array(near)) > 1e-6 * size:
+            return [not gone for gone in far], False
     return [True] + [bool(gone) for gone in far[1:]], True
 
 
 def _ground(
     scene: Scene, visuals: list[Visual], points: Array, size: float, up: Array, follow: bool
 ) -> float | None:
-    """Height of the world's plane that something touches, or of a floor under a robot that stands at zero."""
+    """Return the height of the ground plane in contact, or of a floor below a robot near height zero."""
     touched = ground_of(planes_of(scene), up)
     if touched is not None:
         return float(touched.point @ up)
@@ -152,57 +170,60 @@ def _ground(
 
 
 def _corners(motion: Motion, visual: Visual) -> list[Array]:
-    """Corners of the box around a visual at each frame [m], (n, 3) each; none of a plane."""
+    """Return the corners of the box around a visual at each frame [m], (n, 3) each; none for a plane."""
     center, half = visual.shape.half_extent()
     if not half.any():
         return []
-    signs = product((-1.0, 1.0), repeat=3)
-    return [motion.point(visual.joint, visual.placement.act(center + half * np.array(s))) for s in signs]
+    corners = center + half * np.array(list(product((-1.0, 1.0), repeat=3)))
+    local = corners @ visual.placement.rotation.T + visual.placement.translation
+    world = np.einsum("nij,kj->kni", motion.rotation(visual.joint), local) + motion.poses[:, visual.joint, :3]
+    return list(world)
 
 
 def _diagonal(points: Array) -> float:
-    """Diagonal of the box around a cloud [m], at least a nanometer."""
+    """Return the diagonal of the box around a cloud [m], at least a nanometer."""
     return max(float(np.linalg.norm(np.ptp(points.reshape(-1, 3), axis=0))), 1e-9)
 
 
-def _outermost(points: Array) -> Array:
-    """The points of a cloud that reach farthest in each of 98 directions [m], (k, 3)."""
+def _extreme_points(points: Array) -> Array:
+    """Return the extreme points of a cloud in 98 directions [m], (k, 3)."""
     cloud = points.reshape(-1, 3)
     grid = np.array(list(product((-1.0, -0.5, 0.0, 0.5, 1.0), repeat=3)))
     shell = grid[np.abs(grid).max(axis=1) == 1.0]
-    reach = cloud @ (shell / np.linalg.norm(shell, axis=1, keepdims=True)).T
-    return np.asarray(cloud[np.unique(np.argmax(reach, axis=0))])
+    reach = (shell / np.linalg.norm(shell, axis=1, keepdims=True)) @ cloud.T
+    return np.asarray(cloud[np.unique(np.argmax(reach, axis=1))])
 
 
 def _direction(points: Array, up: Array, aslant: float) -> Array:
-    """Direction to the camera: across a motion that is nearly planar, else from the front and the right."""
+    """Return the direction to the camera: normal to a nearly planar motion, else from the front right."""
     centered = points.reshape(-1, 3) - points.reshape(-1, 3).mean(axis=0)
     _, spread, axes = np.linalg.svd(centered[:: max(1, len(centered) // 5000)], full_matrices=False)
     front = np.array([0.75, -1.0, 0.0]) if abs(up[2]) > 0.9 else np.array([0.5, 0.0, 1.0])
     front = front + 0.5 * up
     if len(spread) == 3 and spread[2] < 0.15 * spread[1] and spread[1] > 0.05 * spread[0]:
         normal = axes[2]
-        if abs(normal @ up) > 0.9:  # a plane seen from above
+        if abs(normal @ up) > 0.9:  # a horizontal plane
             front = up + 0.6 * np.cross(up, np.cross([0.0, -1.0, 0.0], up))
         else:
-            right = np.cross(up, normal)  # to the right on the screen when looking against the normal
+            right = np.cross(up, normal)  # to the right on the screen if the view is against the normal
             front = normal * (1.0 if right.sum() > 0.0 else -1.0)
             front = front + aslant * (up + np.cross(up, front))
     return np.asarray(front / np.linalg.norm(front))
 
 
-def treads(motion: Motion, visuals: list[Visual], axes: dict[int, Array]) -> dict[int, float]:
-    """Spacing of the pattern of visuals that slide along with a joint farther than they reach [m].
+def pattern_spacings(motion: Motion, visuals: list[Visual], axes: dict[int, Array]) -> dict[int, float]:
+    """Return the pattern spacing of visuals that slide with a joint farther than their own extent [m].
 
-    A belt with ribs at even distances looks the same one rib on: drawn there, it stays on its rollers.
+    A belt with evenly spaced ribs looks the same after a shift by one spacing, and the shifted belt stays on
+    its rollers.
 
     Args:
-        motion: the motion.
-        visuals: what is drawn.
-        axes: axis of each sliding joint in its own frame, by index.
+        motion: motion of the run.
+        visuals: drawn shapes.
+        axes: axis of each prismatic joint in its own frame, by index.
 
     Returns:
-        By number of the visual.
+        Spacing by number of the visual.
     """
     found: dict[int, float] = {}
     for joint, axis in axes.items():

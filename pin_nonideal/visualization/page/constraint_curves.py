@@ -1,8 +1,8 @@
-"""Curves and surfaces that constraints of a user keep a point on, traced from their rows near its path.
+"""Curves and surfaces of user constraints, traced from the constraint rows near the path of a point.
 
-A constraint that acts on the place of one point alone, A = N J with the point's Jacobian J, is a curve or a
-surface in space: tangents come from the null space of N, and Newton's method on the residual brings each
-step back.  One on velocities only, which has no residual, is shown as the disk of directions that it allows.
+A constraint on the position of one point, A = N J with the Jacobian J of the point, is a curve or a surface
+in space. Tangents are in the null space of N, and Newton's method on the residual corrects each step. A
+constraint on velocities, which has no residual, is shown as the disk of allowed directions.
 """
 
 from __future__ import annotations
@@ -25,29 +25,30 @@ from .frames import Motion
 if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
 
-# Steps of a curve over the extent of the path, extents traced each way, and steps across a surface.
+# Steps of a curve over the extent of the path, maximum extents in each direction, and steps across a surface.
 ALONG, EXTENTS, ACROSS = 60, 16, 6
-# A row is one of a point when what its Jacobian does not explain is this part of it.
-EXPLAINED = 1e-6
-# Differences of placements: their error is near 1e-9.
+# Tolerance of A = N J, relative to A.
+POINT_TOLERANCE = 1e-6
+# Step of difference quotients of placements; their error is near 1e-9.
 NUDGE = 1e-6
-# Joints beyond this number are not searched for a point.
-MOST_DOFS = 30
+# Maximum number of degrees of freedom for which points are searched.
+MAX_DOFS = 30
 
 
 @dataclass(frozen=True)
 class Guide:
-    """What a constraint keeps a point on.
+    """Curve, surface or disk to which a constraint restricts a point.
 
     Attributes:
-        name: of the constraint.
+        name: name of the constraint.
         kind: "curve", "surface" (a grid of points, row by row), or "disk" (of allowed directions).
         joint: index of the joint that carries the point.
-        point: the point in that joint's frame [m], (3,).
-        points: of the curve or surface in the world at the first frame [m], (k, 3); empty for a disk.
-        columns: points in a row of the grid; 2 for a curve in a plane, drawn as a band across it, else 1.
-        closed: whether the curve comes back to its start.
-        shift: how the whole moves in time [m], (n, 3), or None when it stands still.
+        point: position of the point in the frame of that joint [m], (3,).
+        points: points of the curve or surface in the world at the first frame [m], (k, 3); empty for a disk.
+        columns: points in a row of the grid; 2 for a curve in a plane, which is drawn as a band across it,
+            else 1.
+        closed: whether the curve is closed.
+        shift: translation over time [m], (n, 3), or None if there is none.
         normals: unit normal of the disk at each frame, (n, 3), or None.
         size: radius of the disk, or extent of the path [m].
     """
@@ -65,23 +66,23 @@ class Guide:
 
 
 def guides_of(run: Trajectory, motion: Motion) -> list[Guide]:
-    """A guide for each constraint of a user that keeps one point on something."""
+    """Return a guide for each user constraint that restricts one point."""
     scene, found = run.scene, []
     items = [(name, c) for name, c in zip(scene.constraint_slices, scene.constraints, strict=False)]
-    if scene.model.nv > MOST_DOFS:
+    if scene.model.nv > MAX_DOFS:
         return []
     for name, item in items:
         if isinstance(item, UserConstraint):
             try:
                 guide = _Tracer(run, motion, name).guide()
             except (PinNonidealError, RuntimeError, np.linalg.LinAlgError):
-                guide = None  # a function that knows no states beside the path
+                guide = None  # a function that fails for states beside the path
             found += [guide] if guide is not None else []
     return found
 
 
 class _Tracer:
-    """The rows of one constraint and the point that they act on."""
+    """Rows of one constraint and the point on which they act."""
 
     def __init__(self, run: Trajectory, motion: Motion, name: str) -> None:
         self.run, self.motion, self.name = run, motion, name
@@ -92,7 +93,7 @@ class _Tracer:
         self.joint, self.local = 0, np.zeros(3)
 
     def at(self, q: Array, t: float, v: Array | None = None) -> tuple[Array, Array]:
-        """Rows and residual."""
+        """Return rows and residual."""
         A, _, phi, _ = rows_at(self.runner, q, np.zeros(self.model.nv) if v is None else v, t)
         return A[self.rows], phi[self.rows]
 
@@ -108,12 +109,12 @@ class _Tracer:
         return np.asarray(np.array(ends).T / (2.0 * NUDGE))
 
     def normals(self, q: Array, t: float, v: Array | None = None) -> tuple[Array, Array] | None:
-        """N with A = N J, and J; None when the rows act on more than the point's place."""
+        """Return N with A = N J, and J, or None if the rows act on more than the position of the point."""
         A, _ = self.at(q, t, v)
         J = self.jacobian(q)
         N = A @ np.linalg.pinv(J, rcond=1e-8)
         off = np.abs(A - N @ J).max(initial=0.0)
-        return (N, J) if off <= EXPLAINED * np.abs(A).max(initial=1e-300) else None
+        return (N, J) if off <= POINT_TOLERANCE * np.abs(A).max(initial=1e-300) else None
 
     def guide(self) -> Guide | None:
         q, t = np.asarray(self.run.q[0]), float(self.run.t[0])
@@ -149,7 +150,7 @@ class _Tracer:
         return None
 
     def disk(self, extent: float) -> Guide | None:
-        """The directions that a constraint on velocities allows along the run."""
+        """Return the disk of directions that a constraint on velocities allows along the run."""
         chosen = np.unique(np.linspace(0, len(self.motion.times) - 1, 200).astype(int))
         normals = []
         for frame in chosen:
@@ -166,14 +167,14 @@ class _Tracer:
         )
 
     def shift(self, q: Array, N: Array) -> Array | None:
-        """How far what the constraint draws has moved along its normals at each frame."""
+        """Return the displacement of the constraint surface along its normals at each frame, or None."""
         back = -np.linalg.pinv(N)
         first = self.at(q, float(self.motion.times[0]))[1]
         moved = np.array([back @ (self.at(q, float(t))[1] - first) for t in self.motion.times])
         return moved if np.abs(moved).max(initial=0.0) > 1e-9 * self.motion.size else None
 
     def step(self, q: Array, t: float, along: Array) -> Array:
-        """The configuration whose point lies a tangent step farther, back on the constraint."""
+        """Return a configuration after a tangent step of the point, projected onto the constraint."""
         q = pin.integrate(self.model, q, np.linalg.pinv(self.jacobian(q), rcond=1e-8) @ along)
         for _ in range(3):
             A, phi = self.at(q, t)
@@ -181,7 +182,7 @@ class _Tracer:
         return np.asarray(q)
 
     def tangents(self, q: Array, t: float) -> Array:
-        """Unit vectors of the point's motions that the constraint allows, (k, 3)."""
+        """Return unit vectors of the allowed velocities of the point, (k, 3)."""
         found = self.normals(q, t)
         if found is None:
             return np.zeros((0, 3))
@@ -192,7 +193,7 @@ class _Tracer:
         return np.asarray(axes[spread < 1e-6]) if len(spread) == 3 else np.zeros((0, 3))
 
     def walk(self, q: Array, t: float, heading: Array, length: float, count: int) -> list[Array]:
-        """Configurations of steps along a tangent, as straight as it can go on; ends where it closes."""
+        """Return the configurations of straight steps along a tangent, up to the closure of the curve."""
         start, found = self.place(q), []
         for number in range(count):
             tangents = self.tangents(q, t)
@@ -207,7 +208,7 @@ class _Tracer:
         return found
 
     def curve(self, q: Array, t: float, path: Array, extent: float) -> tuple[Array, bool]:
-        """Points of the whole curve when it closes, else of the part around the path."""
+        """Return the points of a closed curve, or of the part of an open curve near the path."""
         length, (first,) = extent / ALONG, self.tangents(q, t)[:1]
         ahead = [self.place(x) for x in self.walk(q, t, first, length, ALONG * EXTENTS)]
         start = self.place(q)
@@ -221,7 +222,7 @@ class _Tracer:
         return points[kept.min() : kept.max() + 1], False
 
     def surface(self, extent: float) -> Array:
-        """Points of a strip of the surface along the path, rows across it."""
+        """Return the points of a strip of the surface along the path, in rows across it."""
         rows, length = [], 0.25 * extent / ACROSS
         path = self.motion.q
         chosen = np.unique(np.linspace(0, len(path) - 1, ALONG).astype(int))

@@ -1,4 +1,4 @@
-"""Where contacts touch in a run, and along which normals: from the rows that the core makes of them."""
+"""Contact points and normals in a run, from the rows of the core."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Touch:
-    """A contact between two frames, as the frames of a replay show it.
+class ContactPoint:
+    """Contact between two frames at the frames of a replay.
 
     Attributes:
-        name: its unique name.
-        item: its description.
-        joint: index of the joint that carries the body it presses, 0 for the world.
-        other: index of the joint that carries what it presses against.
-        place: where it touches that body in the world [m], (n, 3).
-        normal: along which it presses that body, unit, in world axes, (n, 3).
-        closed: whether it is closed, (n,).
+        name: unique name of the contact.
+        item: description of the contact.
+        joint: index of the joint of the body on which the contact force acts, 0 for the world.
+        other: index of the joint of the other body.
+        place: contact point on that body in the world [m], (n, 3).
+        normal: unit normal of the force on that body, in world axes, (n, 3).
+        closed: whether the contact is closed, (n,).
     """
 
     name: str
@@ -43,19 +43,19 @@ class Touch:
 
     @property
     def on_plane(self) -> bool:
-        """Whether it touches a plane, and so has a place on its body however far the plane is."""
+        """Check if the contact is with a plane, so that its point is defined at any distance."""
         return hasattr(self.item, "plane")
 
 
-def touches_of(run: Trajectory, motion: Motion) -> list[Touch]:
-    """The contacts between two frames: all with planes, and of others those that touched.
+def contact_points(run: Trajectory, motion: Motion) -> list[ContactPoint]:
+    """Return the contacts between two frames: all contacts with planes, and others that were closed.
 
-    A contact is closed from a sample to the next.  One that strikes and flies off between two samples is told
-    by its event.
+    The state of a contact holds from a sample to the next. Impacts between two samples are found from their
+    events.
 
     Args:
-        run: the run.
-        motion: its motion.
+        run: run of the replay.
+        motion: motion of the run.
     """
     compiled = compiled_scene(run.scene)
     names = [compiled.program.constraints[block].name for block in compiled.program.framed_contacts]
@@ -66,23 +66,23 @@ def touches_of(run: Trajectory, motion: Motion) -> list[Touch]:
         for k, name in enumerate(names)
         if hasattr(compiled.described[name], "plane") or name in struck or closed[name].any()
     ]
-    lines = _pressing_lines(run, motion, chosen)
+    lines = _action_lines(run, motion, chosen)
     return [
-        _touch(run, names[k], lines[:, column], closed[names[k]][motion.before])
+        _contact_point(run, names[k], lines[:, column], closed[names[k]][motion.before])
         for column, k in enumerate(chosen)
     ]
 
 
 def _closed(run: Trajectory, name: str) -> NDArray[np.bool_]:
-    """Whether a contact is closed at each sample."""
+    """Check if a contact is closed at each sample, (nt,)."""
     closed = getattr(run, "closed", None)
     if closed is None:
         return np.ones(len(run.t), dtype=bool)
     return np.asarray(closed)[:, run.scene.contact_names.index(name)]
 
 
-def _pressing_lines(run: Trajectory, motion: Motion, chosen: list[int]) -> Array:
-    """A point of the line along which each contact presses, and its normal, at each frame, (n, k, 6)."""
+def _action_lines(run: Trajectory, motion: Motion, chosen: list[int]) -> Array:
+    """Return a point on the line of action of each contact, and its normal, at each frame, (n, k, 6)."""
     if not chosen:
         return np.zeros((len(motion.times), 0, 6))
     runner, still = compiled_scene(run.scene).program.runner(), np.zeros(run.scene.model.nv)
@@ -90,22 +90,22 @@ def _pressing_lines(run: Trajectory, motion: Motion, chosen: list[int]) -> Array
     return np.array([runner.pressing_lines(q, still, float(t)).reshape(-1, 6)[chosen] for q, t in states])
 
 
-def _touch(run: Trajectory, name: str, line: Array, closed: NDArray[np.bool_]) -> Touch:
-    """A contact on its line: the surface of what has a radius lies so far from the point of its row."""
+def _contact_point(run: Trajectory, name: str, line: Array, closed: NDArray[np.bool_]) -> ContactPoint:
+    """Return a contact on its line of action; a radius shifts the contact point from the point of the row."""
     item: Any = compiled_scene(run.scene).described[name]
     frames = (item.frame, item.plane) if hasattr(item, "plane") else (item.frame1, item.frame2)
     joint, other = (0 if frame is None else frame_on_joint(run.scene.model, frame)[0] for frame in frames)
     radius = getattr(item, "radius1", getattr(item, "radius", 0.0))
-    return Touch(name, item, joint, other, line[:, :3] - radius * line[:, 3:], line[:, 3:], closed)
+    return ContactPoint(name, item, joint, other, line[:, :3] - radius * line[:, 3:], line[:, 3:], closed)
 
 
-def touching_marks(touches: list[Touch], motion: Motion, marks: list[Mark]) -> list[Mark]:
-    """Marks of the contacts that have none yet, because their places move over their bodies.
+def contact_point_marks(touches: list[ContactPoint], motion: Motion, marks: list[Mark]) -> list[Mark]:
+    """Return marks of contacts without a mark, because their points move over their bodies.
 
     Args:
-        touches: the contacts.
-        motion: the motion.
-        marks: of the scene.
+        touches: contacts of the run.
+        motion: motion of the run.
+        marks: marks of the scene.
     """
     marked, found = {mark.name for mark in marks}, []
     for touch in touches:

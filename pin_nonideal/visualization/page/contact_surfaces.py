@@ -1,4 +1,4 @@
-"""What contacts touch: the ground, other planes as patches, and the stops of joints."""
+"""Surfaces of contacts: the ground, patches of other planes, and stops of joints."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ from .visuals import LINK_COLORS, Color, Shape, Visual, joint_axis
 if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
 
-# A patch reaches so far beyond what touches it, and so far at most from where that is mostly, in sizes.
-BEYOND, FARTHEST = 0.25, 2.5
+# Margin of a patch beyond the contact points, and maximum distance from their median, in model sizes.
+PATCH_MARGIN, MAX_PATCH_REACH = 0.25, 2.5
 PATCH: Color = (0.66, 0.46, 0.24, 0.6)
 STOP: Color = (0.28, 0.33, 0.41, 1.0)
 
 
 @dataclass(frozen=True)
 class Plane:
-    """A plane that contacts touch.
+    """Plane of one or more contacts.
 
     Attributes:
         joint: index of the joint that carries it, 0 for the world.
-        point: a point of it in that joint's frame [m], (3,).
-        normal: unit, there, (3,).
-        touching: joint and point of what touches it, (3,) each.
+        point: point of the plane in that joint's frame [m], (3,).
+        normal: unit normal in that joint's frame, (3,).
+        touching: joint and position (3,) of each point that touches the plane.
     """
 
     joint: int
@@ -44,7 +44,7 @@ class Plane:
     touching: list[tuple[int, Array]]
 
     def same(self, other: Plane) -> bool:
-        """Whether both are one plane."""
+        """Check if both planes are equal."""
         return self.joint == other.joint and bool(
             self.normal @ other.normal > 1.0 - 1e-9
             and abs(self.normal @ (self.point - other.point)) < 1e-9 * (1.0 + np.abs(self.point).max())
@@ -52,7 +52,7 @@ class Plane:
 
 
 def planes_of(scene: Scene) -> list[Plane]:
-    """Planes of all contacts and rolling bodies, each once."""
+    """Return the planes of all contacts and rolling bodies, without duplicates."""
     found: list[Plane] = []
     for item in [*scene.contacts, *scene.constraints]:
         name = getattr(item, "plane", "")
@@ -76,18 +76,18 @@ def _touching(model: pin.Model, item: Any) -> tuple[int, Array]:
 
 
 def ground_of(planes: list[Plane], up: Array) -> Plane | None:
-    """The lowest plane of the world that lies level."""
+    """Return the lowest horizontal plane of the world, or None."""
     level = [plane for plane in planes if not plane.joint and plane.normal @ up > 0.999]
     return min(level, key=lambda plane: float(plane.point @ up)) if level else None
 
 
-def touched_of(run: Trajectory, motion: Motion, visuals: list[Visual], up: Array) -> list[Visual]:
-    """Patches of planes that nothing is drawn of, and stops that were struck.
+def contact_surfaces(run: Trajectory, motion: Motion, visuals: list[Visual], up: Array) -> list[Visual]:
+    """Return patches of planes without shapes, and the stops of joints with impacts.
 
     Args:
-        run: the run.
-        motion: its motion.
-        visuals: what is drawn already.
+        run: run of the replay.
+        motion: motion of the run.
+        visuals: existing shapes.
         up: direction against gravity, (3,).
     """
     planes = planes_of(run.scene)
@@ -98,11 +98,11 @@ def touched_of(run: Trajectory, motion: Motion, visuals: list[Visual], up: Array
     patches = [
         _patch(number, plane, motion) for number, plane in enumerate(hidden) if 0 not in drawn or plane.joint
     ]
-    return patches + _stops(run, motion) + _rounds(run.scene)
+    return patches + _stops(run, motion) + _round_bodies(run.scene)
 
 
-def _rounds(scene: Scene) -> list[Visual]:
-    """Spheres and capsules that touch each other, of a scene without shapes."""
+def _round_bodies(scene: Scene) -> list[Visual]:
+    """Return the spheres and capsules in contact with each other, for a scene without shapes."""
     if scene.visual_model is not None and len(scene.visual_model.geometryObjects):
         return []
     found: dict[tuple[str, bytes], Visual] = {}
@@ -133,14 +133,14 @@ def _rounds(scene: Scene) -> list[Visual]:
 
 
 def _patch(number: int, plane: Plane, motion: Motion) -> Visual:
-    """A thin plate on a plane around the path of what touches it."""
+    """Return a thin plate on a plane around the path of its contact points."""
     t1, t2, _ = (np.asarray(axis) for axis in axis_triad(unit_axis("normal", plane.normal)))
     clouds = [motion.local(plane.joint, motion.point(joint, local)) for joint, local in plane.touching]
     cloud = np.concatenate(clouds) - plane.point
     along = np.column_stack([cloud @ t1, cloud @ t2])
-    middle, reach = np.median(along, axis=0), FARTHEST * motion.size
-    low = np.maximum(along.min(axis=0), middle - reach) - BEYOND * motion.size
-    high = np.minimum(along.max(axis=0), middle + reach) + BEYOND * motion.size
+    middle, reach = np.median(along, axis=0), MAX_PATCH_REACH * motion.size
+    low = np.maximum(along.min(axis=0), middle - reach) - PATCH_MARGIN * motion.size
+    high = np.minimum(along.max(axis=0), middle + reach) + PATCH_MARGIN * motion.size
     thick, center = 0.01 * motion.size, (low + high) / 2.0
     place = plane.point + center[0] * t1 + center[1] * t2 - 0.5 * thick * plane.normal
     turn = np.column_stack([t1, t2, plane.normal])
@@ -149,7 +149,7 @@ def _patch(number: int, plane: Plane, motion: Motion) -> Visual:
 
 
 def _stops(run: Trajectory, motion: Motion) -> list[Visual]:
-    """Stops of joints that were struck: where the body points at the end of a turning joint, or a plate."""
+    """Return the stops of joints with impacts: a bar for a revolute joint, a plate for a prismatic one."""
     struck = {str(event.element) for event in run.events if event.kind in ("impact", "touch_down")}
     found = []
     model = run.scene.model

@@ -1,4 +1,4 @@
-"""Coordinates of joints that can be plotted: angles, displacements and their rates, with labels and units."""
+"""Joint coordinates for plots: angles, displacements and their rates, with labels and units."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from .visuals import joint_axis
 
 @dataclass(frozen=True)
 class Coordinate:
-    """One number of a configuration or velocity that can be plotted.
+    """Component of a configuration or velocity for plots.
 
     Attributes:
-        joint: name of its joint.
-        label: the joint's name, with the component when the joint has several.
-        unit: unit.
-        values: one a sample, (nt,).
+        joint: name of the joint.
+        label: name of the joint, with the component if the joint has several.
+        unit: unit of the values.
+        values: value of each sample, (nt,).
     """
 
     joint: str
@@ -30,10 +30,10 @@ class Coordinate:
 
 
 def positions(model: pin.Model, q: Array) -> list[Coordinate]:
-    """Angles and displacements of all joints; of an orientation in space there is none.
+    """Return the angles and displacements of all joints; spatial orientations have none.
 
     Args:
-        model: the model.
+        model: model of the scene.
         q: configurations, (nt, nq).
     """
     found = []
@@ -55,12 +55,12 @@ def positions(model: pin.Model, q: Array) -> list[Coordinate]:
 
 
 def velocities(model: pin.Model, v: Array, per: str = "/s") -> list[Coordinate]:
-    """Components of a velocity or, with `per` "/s²", of an acceleration.
+    """Return the components of a velocity or, with `per` "/s²", of an acceleration.
 
     Args:
-        model: the model.
+        model: model of the scene.
         v: velocities, (nt, nv).
-        per: what is added to rad and m.
+        per: suffix of the units rad and m.
     """
     found = []
     for joint in range(1, model.njoints):

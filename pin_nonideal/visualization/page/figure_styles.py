@@ -1,24 +1,25 @@
-"""How figures look: on a screen, or printed in one or two columns so that lines survive gray."""
+"""Styles of figures: for a screen, or for one or two printed columns with curves distinct in grayscale."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
 
-from pin_nonideal.errors import InputError
+from pin_nonideal.errors import InputError, nearest, short_repr
 from pin_nonideal.validation import choice
 
 from .style import CURVES
 
 MM = 1.0 / 25.4  # [inch]
-# Widths of one and of two columns of a printed page, and of a window [inch]; height of a plot over its width.
+# Widths of one and two columns of a printed page, and of a window [inch]. Ratio of the height of a plot to
+# its width.
 WIDTHS = {1: 85.0 * MM, 2: 176.0 * MM, None: 8.5}
 RATIOS = {1: 0.5, 2: 0.24, None: 0.27}
 STYLES = ("screen", "paper")
-# Told apart without color: dashes and, at some samples, markers.
+# Distinction without color: dashes and markers at some samples.
 DASHES = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1.5, 1, 1.5)), (0, (8, 2)), (0, (3, 1, 1, 1, 1, 1)))
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
-# Ways in which runs that are compared differ.
+# Dashes of compared runs.
 RUN_DASHES = ("-", (0, (4, 1.5)), (0, (1, 1.2)), (0, (6, 1.5, 1, 1.5)))
 
 SCREEN: dict[str, Any] = {"font.size": 9.0, "legend.fontsize": 8.0}
@@ -37,24 +38,44 @@ PAPER: dict[str, Any] = {
 }
 
 
+def _checked(style: Mapping[str, Any]) -> dict[str, Any]:
+    """Return settings that matplotlib knows.
+
+    Raises:
+        InputError: matplotlib has no setting of a name, or refuses its value.
+    """
+    from matplotlib import RcParams, rcParams
+
+    for key, value in style.items():
+        if key not in rcParams:
+            raise InputError(f'plot: style: matplotlib has no setting "{key}"{nearest(str(key), rcParams)}')
+        try:
+            RcParams({key: value})
+        except (ValueError, TypeError) as error:
+            raise InputError(f"plot: style: {error}") from None
+    return dict(style)
+
+
 class Style:
-    """The settings of one figure."""
+    """Settings of one figure."""
 
     def __init__(self, columns: int | None, style: str | Mapping[str, Any] | None) -> None:
         choice("plot: columns", columns, (None, 1, 2))
         if not (style is None or isinstance(style, (str, Mapping))):
-            raise InputError(f'plot: style must be "screen", "paper" or matplotlib settings; got {style!r}')
+            raise InputError(
+                f'plot: style must be "screen", "paper" or matplotlib settings; got {short_repr(style)}'
+            )
         self.print = columns is not None if style is None else style == "paper"
         if isinstance(style, str):
             choice("plot: style", style, STYLES)
         self.settings = dict(PAPER if self.print else SCREEN)
         if isinstance(style, Mapping):
-            self.settings |= dict(style)
+            self.settings |= _checked(style)
         self.width = WIDTHS[columns]
         self.height = RATIOS[columns] * self.width
 
     def legend(self) -> dict[str, Any]:
-        """Where legends stand: beside a plot, in print above it."""
+        """Return the position of legends: beside a plot, in print above it."""
         if self.print:
             place = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "ncols": 2 if self.width < 4.0 else 5}
             return {
@@ -67,13 +88,13 @@ class Style:
         return {"loc": "upper left", "bbox_to_anchor": (1.0, 1.02), "frameon": False}
 
     def line(self, number: int, samples: int, run: int = 0, runs: int = 1) -> dict[str, Any]:
-        """How curve `number` of one of some runs is drawn.
+        """Return the line style of one curve of one run.
 
         Args:
-            number: of the curve in its plot.
-            samples: of the curve.
+            number: number of the curve in its plot.
+            samples: number of samples of the curve.
             run: number of the run.
-            runs: how many are compared.
+            runs: number of compared runs.
         """
         look: dict[str, Any] = {"color": CURVES[number % len(CURVES)]}
         look["linewidth"] = 1.0 if self.print else 1.3
@@ -84,7 +105,7 @@ class Style:
         if samples == 1:
             look["marker"] = "o"
         elif self.print:
-            # Markers of the curves stand beside each other.
+            # Markers of different curves have different positions.
             start = (0.05 + 0.13 * number / 8.0) % 0.13 + 0.02 * run
             look |= {
                 "marker": MARKERS[(number + run) % len(MARKERS)],

@@ -1,4 +1,4 @@
-"""How the replay moves: frames of a run, close together where it moves fast, as placements of all joints."""
+"""Motion of the replay: frames of a run, closer together in fast motion, as placements of all joints."""
 
 from __future__ import annotations
 
@@ -9,41 +9,42 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from pin_nonideal.errors import InputError, PinNonidealError
+from pin_nonideal.errors import InputError
 from pin_nonideal.types import Array
 
+from .between_samples import Cubics
 from .joint_tracks import Tracks, halfway, turned
 
 if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
 
 
-# More frames than this make a page that no browser opens: an hour at 50 frames a second.
+# Maximum number of frames that a browser can open: an hour at 50 frames per second.
 MAX_FRAMES = 200_000
-# Chosen frames: at least so many, also where little moves, and at most so many numbers in all of them.
-LEAST_FRAMES, MOST_NUMBERS = 600, 400_000
-# Between frames the page may err by this part of the smallest link.
-CLOSE = 2e-3
-# An interval whose end rates and displacement disagree by more than this [rad, or part of the size] was
-# sampled too coarsely to tell the motion in it; so was one that must be moved so far to close its loops.
-TOLD = 0.3
-# Rounds of halving: 2^12 frames between two samples.
+# Minimum number of frames, also for slow motions, and maximum number of values in all frames.
+MIN_FRAMES, MAX_NUMBERS = 600, 400_000
+# Interpolation tolerance between frames, relative to the smallest link.
+POSITION_TOLERANCE = 2e-3
+# Tolerance between the end rates and the displacement of an interval [rad, or relative to the size]. If the
+# difference or the projection onto the loops exceeds it, the sampling is too coarse to show the motion.
+MAX_MISMATCH = 0.3
+# Rounds of bisection: up to 2^12 frames between two samples.
 ROUNDS = 12
 
 
 @dataclass(frozen=True)
 class Motion:
-    """A run at the frames of the replay.
+    """Run at the frames of the replay.
 
     Attributes:
         times: time of each frame [s], (n,), from the first to the last sample of the run.
         poses: placement of each joint in the world as x, y, z, qx, qy, qz, qw, (n, njoints, 7); joint 0 is
-            the world itself.
-        before: sample of the run before each frame, (n,).
-        part: how far the frame lies between that sample and the next, 0 to 1, (n,).
+            the world.
+        before: index of the sample before each frame, (n,).
+        part: relative position of the frame between that sample and the next, 0 to 1, (n,).
         q: configurations, (n, nq).
-        coordinates: those of all joints, (n, width), see `Tracks`.
-        held: intervals in which the run does not tell the motion, (n - 1,): the page shows their first frame.
+        coordinates: coordinates of all joints, (n, width), see `Tracks`.
+        held: intervals that are sampled too coarsely, (n - 1,); the page shows their first frame.
         size: diagonal of the model at the start [m].
     """
 
@@ -57,13 +58,13 @@ class Motion:
     size: float = 1.0
 
     def of(self, values: Array) -> Array:
-        """Samples of the run at the frames, by linear interpolation; (nt, ...) gives (n, ...)."""
+        """Return samples of the run at the frames, by linear interpolation; (nt, ...) gives (n, ...)."""
         part = self.part.reshape(-1, *[1] * (values.ndim - 1))
         after = np.minimum(self.before + 1, len(values) - 1)
         return np.asarray((1.0 - part) * values[self.before] + part * values[after])
 
     def only(self, chosen: NDArray[np.int64]) -> Motion:
-        """Some of the frames."""
+        """Return the motion at some of the frames."""
         return Motion(
             times=self.times[chosen],
             poses=self.poses[chosen],
@@ -76,34 +77,34 @@ class Motion:
         )
 
     def rotation(self, joint: int) -> Array:
-        """Orientation of a joint in the world at each frame, (n, 3, 3)."""
+        """Return the orientation of a joint in the world at each frame, (n, 3, 3)."""
         columns = [
             turned(self.poses[:, joint, 3:], np.tile(axis, (len(self.times), 1))) for axis in np.eye(3)
         ]
         return np.stack(columns, axis=-1)
 
     def point(self, joint: int, local: Array) -> Array:
-        """World position of a point fixed to a joint at each frame [m], (n, 3)."""
+        """Return the world position of a point on a joint at each frame [m], (n, 3)."""
         moved = np.broadcast_to(np.asarray(local, dtype=float), (len(self.times), 3))
         return np.asarray(self.poses[:, joint, :3] + turned(self.poses[:, joint, 3:], moved))
 
     def along(self, joint: int, vectors: Array) -> Array:
-        """Vectors in world axes (n, 3) in the axes of a joint, (n, 3)."""
+        """Transform vectors from world axes to the axes of a joint, (n, 3)."""
         return turned(self.poses[:, joint, 3:] * np.array([-1.0, -1.0, -1.0, 1.0]), np.asarray(vectors))
 
     def local(self, joint: int, points: Array) -> Array:
-        """Points of the world (n, 3) as a joint carries them [m], (n, 3)."""
+        """Transform points from the world to the frame of a joint [m], (n, 3)."""
         return self.along(joint, np.asarray(points) - self.poses[:, joint, :3])
 
 
 def sample(run: Trajectory, fps: float | None = None, share: int = 1) -> Motion:
-    """The run at the frames of a replay.
+    """Return the run at the frames of a replay.
 
     Args:
-        run: the run.
-        fps: even frames, so many a second; None for frames chosen by the motion: the samples of the run, and
-            between them as many as keep what the page blends within `CLOSE` of the smallest link.
-        share: how many runs share the room of a page.
+        run: run of the replay.
+        fps: frames per second; None for the samples of the run, and frames between them that keep the
+            interpolation of the page within `POSITION_TOLERANCE` of the smallest link.
+        share: number of runs that share a page.
 
     Raises:
         InputError: the run has no sample or is not finite, or it needs more than `MAX_FRAMES` frames.
@@ -122,23 +123,25 @@ def sample(run: Trajectory, fps: float | None = None, share: int = 1) -> Motion:
 
 
 class _Frames:
-    """Frames of a run while they are chosen: sample before, part of the way to the next, coordinates."""
+    """Frames of a run during their selection: sample before, relative position, and coordinates."""
 
     def __init__(self, run: Trajectory, share: int) -> None:
-        # Ghosts by the dozen have fewer frames each.
-        self.least = max(LEAST_FRAMES // max(share // 4, 1), 60)
-        self.most = MOST_NUMBERS // share
-        self.run, self.t = run, np.asarray(run.t, dtype=np.float64)
+        # Many ghosts have fewer frames each.
+        self.least = max(MIN_FRAMES // max(share // 4, 1), 60)
+        self.most = MAX_NUMBERS // share
+        self.run, self.t, self.cubics = run, np.asarray(run.t, dtype=np.float64), Cubics(run)
         self.tracks = Tracks(run.scene.model)
         start = self.tracks.placements(self.tracks.coordinates(run.q[:1]))[0]
         self.size, self.link = _sizes(run.scene.model, start)
-        if self.size == 0.0:  # a particle: as large as its path
-            every = np.unique(np.linspace(0, len(self.t) - 1, LEAST_FRAMES).astype(int))
+        if self.size == 0.0:  # a particle is as large as its path
+            every = np.unique(np.linspace(0, len(self.t) - 1, MIN_FRAMES).astype(int))
             path = self.tracks.placements(self.tracks.coordinates(run.q[every]))[:, 1:, :3]
             self.size = self.link = float(np.linalg.norm(np.ptp(path.reshape(-1, 3), axis=0))) or 1.0
         self.reach = np.minimum(np.maximum(self.tracks.reaches(start), self.link), self.size)
         self.dense = getattr(run, "dense", None) is not None
-        self.told = np.ones(max(len(self.t) - 1, 0), dtype=bool) if self.dense else _told(run, self.size)
+        self.well_sampled = (
+            np.ones(max(len(self.t) - 1, 0), dtype=bool) if self.dense else _well_sampled(run, self.size)
+        )
         self.before, self.part = np.zeros(0, dtype=np.int64), np.zeros(0)
         self.q, self.rows = np.zeros((0, run.q.shape[1])), np.zeros((0, self.tracks.width))
 
@@ -147,7 +150,7 @@ class _Frames:
         return np.asarray(self.t[self.before] + self.part * (self.t[after] - self.t[self.before]))
 
     def even(self, fps: float) -> None:
-        """So many frames a second."""
+        """Set a constant number of frames per second."""
         t, duration = self.t, float(self.t[-1] - self.t[0])
         if duration * fps > MAX_FRAMES:
             raise InputError(
@@ -162,7 +165,7 @@ class _Frames:
         self.rows = self.tracks.steady(self.tracks.coordinates(self.q))
 
     def choose(self) -> None:
-        """The samples, thinned where there are too many, and frames between them where the motion asks."""
+        """Set the samples, thinned if there are too many, and frames in between where the motion is fast."""
         most = int(np.clip(self.most // max(self.tracks.width, 1), 2 * self.least, MAX_FRAMES // 10))
         self.before = _base(self.run, self.size, most)
         self.part = np.zeros(len(self.before))
@@ -180,10 +183,10 @@ class _Frames:
             blended = halfway(times, self.rows)[where]
             rows = self.tracks.near(self.tracks.coordinates(q), blended)
             gap = self.tracks.distance(rows, blended, self.reach)
-            wrong = (gap > CLOSE * self.link) | (np.diff(times)[where] > longest)
+            wrong = (gap > POSITION_TOLERANCE * self.link) | (np.diff(times)[where] > longest)
             new = np.flatnonzero(wrong)
             new = np.sort(new[np.argsort(-gap[new], kind="stable")[:room]])
-            # What was right stays so; each new frame opens the two intervals beside it.
+            # Accurate intervals stay accurate; each new frame opens the two adjacent intervals.
             open_ones[where[~wrong]] = False
             open_ones = np.insert(open_ones, where[new], True)
             at = where[new] + 1
@@ -195,14 +198,14 @@ class _Frames:
             self.rows = self.tracks.steady(np.insert(self.rows, at, rows[new], axis=0))
 
     def _divisible(self) -> NDArray[np.bool_]:
-        """Intervals of time that have a length and a told motion."""
-        last = len(self.told) - 1
+        """Return the intervals with a positive length and sufficient sampling."""
+        last = len(self.well_sampled) - 1
         alone = self.before[:-1] == np.where(self.part[1:] == 0.0, self.before[1:] - 1, self.before[1:])
-        told = ~alone | (self.told[np.clip(self.before[:-1], 0, last)] if last >= 0 else False)
+        told = ~alone | (self.well_sampled[np.clip(self.before[:-1], 0, last)] if last >= 0 else False)
         return np.asarray((np.diff(self.times()) > 1e-12 * (1.0 + abs(self.t[-1]))) & told)
 
     def _middle(self, where: NDArray[np.int64]) -> tuple[NDArray[np.int64], Array]:
-        """The sample in the middle of each interval, or the middle between two samples."""
+        """Return the middle sample of each interval, or the middle between two samples."""
         k0, k1 = self.before[where], self.before[where + 1]
         s0, s1 = self.part[where], self.part[where + 1]
         inside = (k1 == k0) | ((k1 == k0 + 1) & (s1 == 0.0))
@@ -210,75 +213,33 @@ class _Frames:
         return np.where(inside, k0, (k0 + k1 + 1) // 2), part
 
     def _configurations(self, before: NDArray[np.int64], part: Array) -> Array:
-        if self.dense:
-            found, inner = self.run.q[np.where(part < 1.0, before, before + 1)], (part > 0.0) & (part < 1.0)
-            if inner.any():
-                length = self.t[before[inner] + 1] - self.t[before[inner]]
-                found[inner] = self.run.at(self.t[before[inner]] + part[inner] * length).q
+        found, inner = self.run.q[np.where(part < 1.0, before, before + 1)], (part > 0.0) & (part < 1.0)
+        if not inner.any():
             return np.asarray(found)
-        each = [self._configuration(int(k), float(s)) for k, s in zip(before, part, strict=True)]
-        return np.array(each).reshape(-1, self.run.q.shape[1])
-
-    def _configuration(self, k: int, s: float) -> Array:
-        """Configuration at the part s between samples k and k + 1, its loops closed."""
-        run = self.run
-        if s in (0.0, 1.0) or len(self.t) == 1:
-            return np.asarray(run.q[k if s < 1.0 else k + 1])
-        q = np.asarray(pin.integrate(run.scene.model, run.q[k], cubic(run, k, s)[0]))
-        project = getattr(run.scene, "project", None)
-        if project is None or not run.scene.constraint_slices:
-            return q
-        t = float(self.t[k] + s * (self.t[k + 1] - self.t[k]))
-        try:
-            closed, _ = project(q, (1.0 - s) * run.v[k] + s * run.v[k + 1], t)
-        except PinNonidealError:
-            self.told[k] = False
-            return q
-        if np.abs(pin.difference(run.scene.model, q, closed)).max(initial=0.0) > TOLD * min(1.0, self.size):
-            self.told[k] = False
-        return np.asarray(closed)
+        k, s = before[inner], part[inner]
+        if self.dense:
+            found[inner] = self.run.at(self.t[k] + s * (self.t[k + 1] - self.t[k])).q
+            return np.asarray(found)
+        found[inner], moved = self.cubics.closed(k, s, self.size, POSITION_TOLERANCE * self.link)
+        self.well_sampled[k[~(moved <= MAX_MISMATCH * min(1.0, self.size))]] = False
+        return np.asarray(found)
 
     def motion(self) -> Motion:
         poses = self.tracks.placements(self.rows)
-        # q and -q are one rotation: neighbors in time take the nearer sign.
+        # q and -q are equal rotations: adjacent frames get the nearer sign.
         turned_over = np.sum(poses[1:, :, 3:] * poses[:-1, :, 3:], axis=2) < 0.0
         poses[1:, :, 3:] *= np.cumprod(np.where(turned_over, -1.0, 1.0), axis=0)[:, :, None]
         held = np.zeros(max(len(self.before) - 1, 0), dtype=bool)
-        if len(self.told):
-            held = ~self.told[np.minimum(self.before[:-1], len(self.told) - 1)]
+        if len(self.well_sampled):
+            held = ~self.well_sampled[np.minimum(self.before[:-1], len(self.well_sampled) - 1)]
         return Motion(self.times(), poses, self.before, self.part, self.q, self.rows, held, self.size)
 
 
-def cubic(run: Trajectory, k: int, s: float) -> tuple[Array, Array]:
-    """What leads from sample k to the part s before the next, (nv,), and its rate in time, (nv,).
+def _well_sampled(run: Trajectory, size: float) -> NDArray[np.bool_]:
+    """Return the intervals between samples that are sampled finely enough, (nt - 1,).
 
-    The cubic with the q and v of both samples at its ends runs in the tangent space at sample k, where the
-    rate at k + 1 is d difference/d q_1 times v.
-
-    Args:
-        run: the run.
-        k: sample.
-        s: part of the way to the next, 0 to 1.
-    """
-    model = run.scene.model
-    q0, q1, v0, v1 = run.q[k], run.q[k + 1], run.v[k], run.v[k + 1]
-    h = run.t[k + 1] - run.t[k]
-    step = pin.difference(model, q0, q1)
-    for joint in model.joints:
-        if joint.nq == 2 and joint.nv == 1:  # a continuous joint may turn more than once in a long step
-            i = joint.idx_v
-            step[i] += 2.0 * np.pi * np.round((h * (v0[i] + v1[i]) / 2.0 - step[i]) / (2.0 * np.pi))
-    end_rate = pin.dDifference(model, q0, q1, pin.ARG1) @ v1
-    xi = h * s * (1.0 - s) ** 2 * v0 + s * s * (3.0 - 2.0 * s) * step - h * s * s * (1.0 - s) * end_rate
-    rate = (1.0 - s) * (1.0 - 3.0 * s) * v0 + 6.0 * s * (1.0 - s) / h * step - s * (2.0 - 3.0 * s) * end_rate
-    return np.asarray(xi), np.asarray(rate)
-
-
-def _told(run: Trajectory, size: float) -> NDArray[np.bool_]:
-    """Intervals between samples whose motion the rates at their ends tell, (nt - 1,).
-
-    There the displacement is the mean rate times the length up to its curvature; turns of a continuous joint
-    and orientations in space count as told.
+    In such an interval the displacement is the mean rate times the duration, up to the curvature. Continuous
+    joints and spatial orientations are not checked.
     """
     model, h = run.scene.model, np.diff(np.asarray(run.t, dtype=float))[:, None]
     told = np.ones(len(h), dtype=bool)
@@ -288,14 +249,14 @@ def _told(run: Trajectory, size: float) -> NDArray[np.bool_]:
         q, v = run.q[:, joint.idx_q : joint.idx_q + 1], run.v[:, joint.idx_v : joint.idx_v + 1]
         mean = h * (v[1:] + v[:-1]) / 2.0
         scale = 1.0 if "P" not in joint.shortname().removeprefix("JointModel")[:1] else size
-        told &= (np.abs(np.diff(q, axis=0) - mean) < TOLD * scale)[:, 0]
-    # Among intervals that are not told, some agree by chance.
+        told &= (np.abs(np.diff(q, axis=0) - mean) < MAX_MISMATCH * scale)[:, 0]
+    # Among coarse intervals, some agree by chance.
     beside = np.convolve(~told, np.ones(7), mode="same") if len(told) else np.zeros(0)
     return np.asarray(beside[: len(told)] == 0.0 if len(told) >= 7 else np.full(len(told), told.all()))
 
 
 def _base(run: Trajectory, size: float, most: int) -> NDArray[np.int64]:
-    """All samples, or as many as half of the frames allow, evenly along the motion."""
+    """Return all samples, or half of the maximum number of frames, evenly along the motion."""
     count = len(run.t)
     if count <= most // 2:
         return np.arange(count)
@@ -308,7 +269,7 @@ def _base(run: Trajectory, size: float, most: int) -> NDArray[np.int64]:
 
 
 def _sizes(model: pin.Model, poses: Array) -> tuple[float, float]:
-    """Diagonal of the box around all joints and centers of mass, and the smallest link [m]."""
+    """Return the diagonal of the box around all joints and centers of mass, and the smallest link [m]."""
     levers = np.array([model.inertias[joint].lever for joint in range(model.njoints)])
     centers = poses[:, :3] + turned(poses[:, 3:], levers)
     frames = [

@@ -1,4 +1,4 @@
-"""Frictional elements where they are: their modes, how near each is to its limit, and cones of contacts."""
+"""Frictional elements at their positions: modes, friction over its limit, and cones of contacts."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pin_nonideal.states.kinematics import frame_on_joint
 from pin_nonideal.types import Array
 from pin_nonideal.validation import unit_axis
 
-from .contact_points import Touch
+from .contact_points import ContactPoint
 from .frames import Motion
 from .markers import Mark
 from .mode_timeline import bands_of
@@ -25,19 +25,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Element:
-    """A frictional element as the replay draws it.
+    """Frictional element of the replay.
 
     Attributes:
-        name: as the run names it.
-        band: its number among the modes of the run.
-        joint: index of the joint that carries its place, 0 for the world.
-        point: the place in that joint's frame [m], (3,), or where it moves, that at each frame, (n, 3).
-        axis: axis of the joint or normal of the contact, in the frame of `axis_joint`, in the same way.
+        name: name of the element in the run.
+        band: index among the modes of the run.
+        joint: index of the joint that carries the element's position, 0 for the world.
+        point: position in that joint's frame [m], (3,), or at each frame, (n, 3), if it moves.
+        axis: axis of the joint or normal of the contact, in the frame of `axis_joint`, (3,) or (n, 3).
         axis_joint: index of the joint that carries the axis.
-        mu: half-opening of the friction cone, radius over height; 0 for a joint.
-        share: friction over its limit at each frame, 0 to 1, (n,), or None when it was not recorded.
+        mu: friction coefficient, the radius of the friction cone over its height; 0 for a joint.
+        share: friction over its limit at each frame, 0 to 1, (n,), or None if it was not recorded.
         normal: normal force of a contact at each frame [N], (n,), or None.
-        stays: whether it is drawn while its contact is open too.
+        stays: whether the element is also drawn while its contact is open.
     """
 
     name: str
@@ -53,15 +53,15 @@ class Element:
 
 
 def elements_of(
-    run: Trajectory, motion: Motion, marks: list[Mark], touches: Sequence[Touch] = ()
+    run: Trajectory, motion: Motion, marks: list[Mark], touches: Sequence[ContactPoint] = ()
 ) -> list[Element]:
-    """The elements of a run that have a place: friction in joints and at anchors, and contacts.
+    """Return the elements with a position: friction in joints and at anchors, and contacts.
 
     Args:
-        run: the run.
-        motion: its motion.
-        marks: of the scene.
-        touches: the contacts of the run.
+        run: run of the replay.
+        motion: motion of the run.
+        marks: marks of the scene.
+        touches: contacts of the run.
     """
     joints, found = friction_joints(run), []
     contacts = {touch.name: touch for touch in touches}
@@ -83,7 +83,7 @@ def elements_of(
 
 
 def _anchor(run: Trajectory, law: str) -> str:
-    """The anchor that a law rubs in, by name."""
+    """Return the name of the anchor of a friction law, or ""."""
     for item in run.scene.laws:
         label = getattr(item, "name", None) or f"{type(item).__name__}({getattr(item, 'joint', '')})"
         if label == law:
@@ -92,7 +92,7 @@ def _anchor(run: Trajectory, law: str) -> str:
 
 
 def _hinge_axis(run: Trajectory, anchor: str) -> Array:
-    """Axis of a hinge in the frame of the joint that carries frame1, (3,); z of an anchor without one."""
+    """Return the axis of a hinge in the frame of the joint of frame1, (3,), or z for other anchors."""
     item = dict(zip(run.scene.constraint_slices, run.scene.constraints, strict=False)).get(anchor)
     if item is None or not hasattr(item, "frame1"):
         return np.array([0.0, 0.0, 1.0])
@@ -101,7 +101,7 @@ def _hinge_axis(run: Trajectory, anchor: str) -> Array:
 
 
 def _joint_share(run: Trajectory, law: str, joint: int, element: int) -> Array | None:
-    """Friction in a joint over its limit, (nt,)."""
+    """Return the friction in a joint over its limit, (nt,)."""
     force, limits = run.law(law).force, run.limits
     if force is None or limits is None:
         return None
@@ -112,8 +112,10 @@ def _part(size: Array, limit: Array) -> Array:
     return np.clip(np.divide(size, limit, out=np.zeros_like(size), where=limit > 0.0), 0.0, 1.0)
 
 
-def _contact(run: Trajectory, motion: Motion, name: str, band: int, touch: Touch, whole: bool) -> Element:
-    """A contact with its cone, and how much of it the force needs where forces were recorded."""
+def _contact(
+    run: Trajectory, motion: Motion, name: str, band: int, touch: ContactPoint, whole: bool
+) -> Element:
+    """Return a contact with its cone, and with the friction over its limit if forces were recorded."""
     share = pressing = None
     mu = float(getattr(touch.item, "mu", 0.0)) if whole or name == touch.name else 0.0
     forces = getattr(run, "contact_forces", None) or {}

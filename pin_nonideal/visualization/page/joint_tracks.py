@@ -1,8 +1,8 @@
-"""How the joints of a tree move: coordinates that a page blends in time and turns into placements.
+"""Coordinates of the joints of a tree, which a page interpolates in time and converts to placements.
 
-A joint that turns or slides along one axis has one coordinate, every other one the placement of its frame
-after the joint against the one before it.  Blended coordinates keep what a joint joins together, however far
-apart the frames of a replay lie.
+A joint that rotates about or slides along one axis has one coordinate. Other joints have the placement of
+their frame after the joint relative to the frame before it. Interpolated coordinates keep joints connected
+for any distance of the frames of a replay.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ ONE_AXIS = re.compile(r"JointModel(R[XYZ]|RUB[XYZ]|P[XYZ]|Revolute|Prismatic)")
 
 @dataclass(frozen=True)
 class Track:
-    """One joint.
+    """Coordinates of one joint.
 
     Attributes:
-        parent: index of the joint before it.
-        place: its fixed placement there, as x, y, z, qx, qy, qz, qw, (7,).
-        first: column of its first coordinate.
-        axis: in its own frame, (3,); None for a joint whose seven coordinates are its placement.
-        turning: whether it turns about its axis, or slides along it.
+        parent: index of the parent joint.
+        place: fixed placement on the parent joint, as x, y, z, qx, qy, qz, qw, (7,).
+        first: column of the first coordinate.
+        axis: axis in the joint's own frame, (3,); None for a joint whose seven coordinates are its placement.
+        turning: whether the joint rotates about its axis, or slides along it.
     """
 
     parent: int
@@ -41,12 +41,12 @@ class Track:
 
     @property
     def columns(self) -> slice:
-        """Columns of its coordinates."""
+        """Return the columns of the joint's coordinates."""
         return slice(self.first, self.first + (7 if self.axis is None else 1))
 
 
 class Tracks:
-    """The joints of a model, the world's first."""
+    """Coordinates of the joints of a model; index 0 is the world."""
 
     def __init__(self, model: pin.Model) -> None:
         self.model = model
@@ -61,11 +61,11 @@ class Tracks:
             self.width = track.columns.stop
 
     def moving(self) -> list[tuple[int, Track]]:
-        """All but the world, with their numbers."""
+        """Return all joints except the world, with their indices."""
         return [(number, track) for number, track in enumerate(self.joints) if track is not None]
 
     def coordinates(self, q: Array) -> Array:
-        """Coordinates of configurations, (n, nq) to (n, width)."""
+        """Return the coordinates of configurations, (n, nq) to (n, width)."""
         found = np.empty((len(q), self.width))
         for number, track in self.moving():
             joint = self.model.joints[number]
@@ -82,7 +82,7 @@ class Tracks:
         return found
 
     def near(self, coordinates: Array, others: Array) -> Array:
-        """The same places in coordinates next to others: whole turns and signs of quaternions are free."""
+        """Shift coordinates by full turns and signs of quaternions to the nearest equivalent of others."""
         found = coordinates.copy()
         for number, track in self.moving():
             c = track.columns
@@ -95,7 +95,7 @@ class Tracks:
         return np.asarray(found)
 
     def steady(self, coordinates: Array) -> Array:
-        """The same places with each frame's coordinates next to those of the frame before it."""
+        """Shift the coordinates of each frame to the nearest equivalent of the frame before it."""
         found = coordinates.copy()
         for number, track in self.moving():
             c = track.columns
@@ -107,7 +107,7 @@ class Tracks:
         return np.asarray(found)
 
     def placements(self, coordinates: Array) -> Array:
-        """Placement of each joint in the world as x, y, z, qx, qy, qz, qw, (n, njoints, 7)."""
+        """Return the placement of each joint in the world as x, y, z, qx, qy, qz, qw, (n, njoints, 7)."""
         world = np.zeros((len(coordinates), len(self.joints), 7))
         world[:, 0, 6] = 1.0
         for number, track in self.moving():
@@ -125,7 +125,7 @@ class Tracks:
         return world
 
     def reaches(self, poses: Array) -> Array:
-        """How far what a joint moves reaches from its origin at some placements [m], (njoints,)."""
+        """Return the maximum distance of the points that a joint moves from its origin [m], (njoints,)."""
         levers = np.array([inertia.lever for inertia in self.model.inertias])
         ends = poses[:, :3] + turned(poses[:, 3:], levers)
         found = np.zeros(len(self.joints))
@@ -141,12 +141,12 @@ class Tracks:
         return found
 
     def distance(self, one: Array, other: Array, reach: Array) -> Array:
-        """How far apart two sets of coordinates place a point at most [m], (n,).
+        """Return an upper bound of the distance between equal points under two sets of coordinates [m], (n,).
 
         Args:
             one: coordinates, (n, width).
             other: coordinates, (n, width).
-            reach: as `reaches` gives it [m], (njoints,).
+            reach: result of `reaches` [m], (njoints,).
         """
         gap = np.abs(one - other)
         total = np.zeros((len(gap), len(self.joints)))
@@ -163,16 +163,18 @@ class Tracks:
 
 
 def _after(first: Array, second: Array) -> Array:
-    """Placements one after the other, (n, 7) each."""
+    """Return products of placements, (n, 7) each."""
     moved = first[:, :3] + turned(first[:, 3:], second[:, :3])
     return np.column_stack([moved, _product(first[:, 3:], second[:, 3:])])
 
 
 def turned(quaternions: Array, vectors: Array) -> Array:
-    """Vectors (n, 3) turned by quaternions x, y, z, w, (n, 4)."""
-    axis, w = quaternions[:, :3], quaternions[:, 3:]
-    once = 2.0 * np.cross(axis, vectors)
-    return np.asarray(vectors + w * once + np.cross(axis, once))
+    """Return vectors (n, 3) rotated by quaternions x, y, z, w, (n, 4)."""
+    x, y, z, w = quaternions.T
+    a, b, c = vectors.T
+    u, v, t = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)  # 2 axis x vector
+    turns = (a + w * u + y * t - z * v, b + w * v + z * u - x * t, c + w * t + x * v - y * u)
+    return np.stack(turns, axis=-1)
 
 
 def _product(a: Array, b: Array) -> Array:
@@ -181,10 +183,10 @@ def _product(a: Array, b: Array) -> Array:
 
 
 def slopes(times: Array, values: Array) -> tuple[Array, Array]:
-    """Rates of change at both ends of every interval, (n - 1, c) each, as the page blends frames.
+    """Return the rates of change at both ends of every interval, (n - 1, c) each, for the page.
 
-    Inside, that of the parabola through three frames; where two frames share a time, as at an impact, and at
-    the ends of the run, the one-sided rate of the parabola that ends there.
+    Inner frames have the rate of the parabola through three frames. Frames with equal times, as at an impact,
+    and the ends of the run have the one-sided rate of the parabola that ends there.
     """
     h = np.diff(times)[:, None]
     chord = np.divide(np.diff(values, axis=0), h, out=np.zeros((len(h), values.shape[1])), where=h > 0.0)
@@ -201,7 +203,7 @@ def slopes(times: Array, values: Array) -> tuple[Array, Array]:
 
 
 def halfway(times: Array, values: Array) -> Array:
-    """Values in the middle of every interval, (n - 1, c): Hermite's cubic through values and `slopes`."""
+    """Return the values at the middle of every interval, (n - 1, c), by cubic Hermite interpolation."""
     left, right = slopes(times, values)
     h = np.diff(times)[:, None]
     return np.asarray((values[1:] + values[:-1]) / 2.0 + h * (left - right) / 8.0)

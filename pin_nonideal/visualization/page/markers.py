@@ -1,4 +1,4 @@
-"""Marks where bodies meet: the places of anchors, rods, contacts and springs."""
+"""Marks of anchors, rods, contacts and springs at their points of action."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ from .frames import Motion
 
 @dataclass(frozen=True)
 class Mark:
-    """Two points that a constraint or a spring ties together.
+    """Two points that a constraint or a spring connects.
 
     Attributes:
         name: name of the constraint, contact or force.
         kind: "anchor", "rod", "spring" or "contact".
         joint1: index of the joint that carries the first point, 0 for the world.
-        point1: the point in that joint's frame [m], (3,).
+        point1: first point in that joint's frame [m], (3,).
         joint2: index of the joint that carries the second point.
-        point2: the second point [m], (3,).
+        point2: second point in that joint's frame [m], (3,).
         axes: unit vectors in the second joint's frame along which the points must coincide, (k, 3).
-        path: of a place that moves over its body, where it is in the first joint's frame at each frame of the
-            replay [m], (n, 3); None of one that stays.
-        closed: while what is drawn, of a contact whose place means nothing while it is open, (n,); None for
-            always.
+        path: positions of a moving first point in the first joint's frame at each frame of the replay [m],
+            (n, 3); None for a fixed point.
+        closed: whether a contact mark is drawn at each frame, (n,), if the point is undefined for an open
+            contact; None to draw it always.
     """
 
     name: str
@@ -50,11 +50,11 @@ class Mark:
 
 @dataclass(frozen=True)
 class Side:
-    """One side of a constraint: a placement fixed to a joint.
+    """Side of a constraint: a placement fixed to a joint.
 
     Attributes:
-        joint: its index, 0 for the world.
-        placement: in the joint's frame.
+        joint: index of the joint, 0 for the world.
+        placement: placement in the joint's frame.
     """
 
     joint: int
@@ -62,25 +62,25 @@ class Side:
 
     @property
     def point(self) -> Array:
-        """Its origin in the joint's frame [m], (3,)."""
+        """Return the origin of the side in the joint's frame [m], (3,)."""
         return np.asarray(self.placement.translation)
 
     def turned(self, motion: Motion, local: Array) -> Array:
-        """Vectors in the axes of this side as vectors in world axes, (n, 3).
+        """Transform vectors from the axes of this side to world axes, (n, 3).
 
         Args:
-            motion: the motion.
-            local: the vectors, (n, 3).
+            motion: motion of the run.
+            local: vectors in the axes of this side, (n, 3).
         """
         turn = motion.rotation(self.joint) @ np.asarray(self.placement.rotation)
         return np.asarray(np.einsum("nij,nj->ni", turn, local))
 
 
 def marks_of(scene: Scene) -> list[Mark]:
-    """Marks of all anchors, rods, points and spheres on planes, and springs of a scene.
+    """Return the marks of all anchors, rods, points and spheres on planes, and springs of a scene.
 
     Args:
-        scene: the scene.
+        scene: scene of the run.
     """
     marks = []
     for name, item, shown in constraints_of(scene):
@@ -95,7 +95,7 @@ def marks_of(scene: Scene) -> list[Mark]:
 
 
 def _tie(scene: Scene, name: str, kind: str, item: Any) -> Mark:
-    """The mark of what ties two frames."""
+    """Return the mark of a connection of two frames."""
     first, second = sides_of(scene, item)
     held = ["xyz".index(axis) for axis in getattr(item, "axes", "xyz")] if kind == "anchor" else []
     axes = np.asarray(second.placement.rotation).T[held]
@@ -103,10 +103,10 @@ def _tie(scene: Scene, name: str, kind: str, item: Any) -> Mark:
 
 
 def constraints_of(scene: Scene) -> list[tuple[str, Any, core.Shown]]:
-    """Constraints and contacts with the names of their rows, and what the core says is shown of them.
+    """Return constraints and contacts with the names of their rows and their display kinds from the core.
 
     Args:
-        scene: the scene.
+        scene: scene of the run.
     """
     compiled = compiled_scene(scene)
     shown = {c.name: c.shown for c in compiled.program.constraints}
@@ -114,24 +114,24 @@ def constraints_of(scene: Scene) -> list[tuple[str, Any, core.Shown]]:
 
 
 def side_of(model: pin.Model, frame: str) -> Side:
-    """The side of a frame.
+    """Return the side of a frame.
 
     Args:
-        model: the model.
-        frame: name.
+        model: model of the scene.
+        frame: name of the frame.
     """
     return Side(*frame_on_joint(model, frame))
 
 
 def sides_of(scene: Scene, item: Any) -> tuple[Side, Side]:
-    """Both sides of what ties two frames.
+    """Return both sides of a connection of two frames.
 
     Args:
-        scene: the scene.
-        item: the constraint, contact or spring.
+        scene: scene of the run.
+        item: constraint, contact or spring.
     """
     model = scene.model
-    if hasattr(item, "joint1_placement"):  # a constraint model of Pinocchio
+    if hasattr(item, "joint1_placement"):  # constraint model of Pinocchio
         return (
             Side(int(item.joint1_id), item.joint1_placement),
             Side(int(item.joint2_id), item.joint2_placement),

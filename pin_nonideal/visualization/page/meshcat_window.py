@@ -1,4 +1,4 @@
-"""A run in a meshcat window that is already open: robot, animation and arrows of forces."""
+"""Replay in an open meshcat window: robot, animation and force arrows."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pinocchio as pin
 from pin_nonideal.types import Array
 
 from .camera import link_length
-from .contact_points import touches_of
+from .contact_points import contact_points
 from .force_arrows import Arrow, arrows_of
 from .frames import Motion, sample
 from .style import FORCES
@@ -18,21 +18,21 @@ from .style import FORCES
 if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
 
-RATE = 30  # pictures a second that an animation is stored at
-LONGEST = 20.0  # a longer or shorter run is played in this time [s] at most
+RATE = 30  # frames per second of the stored animation
+MAX_DURATION = 20.0  # maximum duration of the animation [s]
 
 
 def show(run: Trajectory, viewer: Any, name: str, forces: bool) -> Any:
-    """Fills a `meshcat.Visualizer` with a run.
+    """Show a run in a `meshcat.Visualizer`.
 
     Args:
-        run: the run.
-        viewer: the window.
-        name: of the robot in the window's tree.
+        run: run of the replay.
+        viewer: open window.
+        name: name of the robot in the window's tree.
         forces: whether arrows are drawn.
 
     Returns:
-        The pinocchio.visualize.MeshcatVisualizer.
+        Robot in the window, a pinocchio.visualize.MeshcatVisualizer.
     """
     import meshcat.animation
     from pinocchio.visualize import MeshcatVisualizer
@@ -42,14 +42,16 @@ def show(run: Trajectory, viewer: Any, name: str, forces: bool) -> Any:
     shown.initViewer(viewer=viewer)
     shown.loadViewerModel(rootNodeName=name)
     length = float(run.t[-1] - run.t[0])
-    count = int(np.clip(RATE * length, 2, RATE * LONGEST)) if length > 0.0 else 1
+    count = int(np.clip(RATE * length, 2, RATE * MAX_DURATION)) if length > 0.0 else 1
     motion = sample(run, (count - 1) / length if length > 0.0 else 1.0)
-    arrows = [a for a in arrows_of(run, motion, touches_of(run, motion)) if a.unit == "N"] if forces else []
+    arrows = (
+        [a for a in arrows_of(run, motion, contact_points(run, motion)) if a.unit == "N"] if forces else []
+    )
     scale = _add_arrows(viewer[name]["forces"], arrows, 0.3 * link_length(scene.model, [], motion.size))
     animation = meshcat.animation.Animation(default_framerate=RATE)
     for frame in range(len(motion.times)):
         with animation.at_frame(viewer, frame) as keyed:
-            shown.viewer = keyed  # Pinocchio's own placements, written into the animation
+            shown.viewer = keyed  # writes Pinocchio's placements into the animation
             shown.display(motion.q[frame])
             for number, arrow in enumerate(arrows):
                 _place(keyed[name]["forces"][str(number)], arrow, motion, frame, scale)
@@ -60,7 +62,7 @@ def show(run: Trajectory, viewer: Any, name: str, forces: bool) -> Any:
 
 
 def _add_arrows(root: Any, arrows: list[Arrow], reach: float) -> float:
-    """Adds arrows of length one along y; returns the length of a newton [m]."""
+    """Add arrows of length one along y, and return the drawn length of one newton [m]."""
     import meshcat.geometry as shapes
 
     largest = max((arrow.largest() for arrow in arrows), default=1.0) or 1.0
@@ -81,7 +83,7 @@ def _moved(along: float) -> Array:
 
 
 def _place(node: Any, arrow: Arrow, motion: Motion, frame: int, scale: float) -> None:
-    """Turns y into a force and stretches it; a force of zero is drawn as a point."""
+    """Rotate y to the direction of a force and scale it; a zero force is drawn as a point."""
     force, place = arrow.values[frame], np.eye(4)
     size = float(np.linalg.norm(force))
     if size > 0.0:

@@ -1,4 +1,4 @@
-"""Modes of elements and contacts over time, and the gaps of contacts."""
+"""Modes of elements and contacts over time, and gaps of contacts."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from .style import CLOSED, OPEN
 if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
 
-# Gaps are taken at no more samples than this.
-MOST_GAPS = 5000
+# Maximum number of samples at which gaps are computed.
+MAX_GAP_SAMPLES = 5000
 
 Bands = list[tuple[float, float, int]]
 
 
 def mode_bands(t: Array, modes: NDArray[np.int8]) -> list[Bands]:
-    """Intervals of constant mode of each element, as (start [s], end [s], mode).
+    """Return the intervals of constant mode of each element, as (start [s], end [s], mode).
 
     Args:
         t: times [s], (nt,).
@@ -38,12 +38,12 @@ def mode_bands(t: Array, modes: NDArray[np.int8]) -> list[Bands]:
 
 
 def bands_of(run: Trajectory) -> list[tuple[str, Bands]]:
-    """Bands by name: of the elements that rub, and of the contacts without friction that open or close.
+    """Return the mode bands by name, for frictional elements and frictionless contacts that open or close.
 
-    Contacts that touch nothing in the whole run have none: two boxes are 160 of them.
+    Contacts that stay open during the whole run are omitted, because two boxes already have 160 of them.
 
     Args:
-        run: the run.
+        run: run of the replay.
     """
     found: list[tuple[str, Bands]] = []
     if run.modes is not None:
@@ -62,24 +62,24 @@ def bands_of(run: Trajectory) -> list[tuple[str, Bands]]:
     return found
 
 
-def opens(run: Trajectory) -> bool:
-    """Whether a contact of the run was ever open.
+def has_open_contact(run: Trajectory) -> bool:
+    """Check if a contact of the run was ever open.
 
     Args:
-        run: the run.
+        run: run of the replay.
     """
     closed = getattr(run, "closed", None)
     return closed is not None and not np.asarray(closed).all()
 
 
 def gaps_of(run: Trajectory) -> tuple[Array, dict[str, Array]]:
-    """Times [s], (k,), and the gap of each contact there by name [m, rad], (k,).
+    """Return times [s], (k,), and the gaps of the contacts at these times by name [m, rad], (k,).
 
     Args:
-        run: the run.
+        run: run of the replay.
     """
     t = np.asarray(run.t)
-    chosen = np.unique(np.linspace(0, len(t) - 1, min(len(t), MOST_GAPS)).astype(int))
+    chosen = np.unique(np.linspace(0, len(t) - 1, min(len(t), MAX_GAP_SAMPLES)).astype(int))
     runner = compiled_scene(run.scene).program.runner()
     residuals = np.array([rows_at(runner, run.q[k], run.v[k], float(t[k]))[2] for k in chosen])
     slices = run.scene.constraint_slices

@@ -1,8 +1,8 @@
-"""What a replay page carries of a run: one header in JSON and the typed arrays that it refers to."""
+"""Data of a replay page: a JSON header and the typed arrays that it refers to."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -11,22 +11,24 @@ import pinocchio as pin
 
 from pin_nonideal.types import Array, Table
 
-from .applied_forces import given_arrows
+from .applied_forces import applied_force_arrows
 from .binary import Payload, Shapes
-from .camera import link_length, treads, upward, view
+from .body_overlays import collisions_of, inertia_box
+from .camera import link_length, pattern_spacings, upward, view
 from .constraint_curves import Guide, guides_of
-from .contact_points import touches_of, touching_marks
-from .contact_surfaces import touched_of
+from .contact_points import contact_point_marks, contact_points
+from .contact_surfaces import contact_surfaces
 from .force_arrows import Arrow, arrows_of
 from .frames import Motion, sample
 from .friction_glyphs import Element, elements_of
 from .joint_tracks import Tracks
 from .markers import Mark, marks_of
 from .mode_timeline import bands_of
-from .resampling import between
-from .signal_list import collisions_of, inertia_box, signals_of
-from .signals import Chosen, Plot, plots_of, usual_plots, wanted
-from .stick_figure import sticks
+from .relations import is_asked, stored_relations
+from .resampling import resample
+from .signal_list import Signal, rounding_of, signals_of, without_rounding
+from .signals import Chosen, Plot, default_plot_names, parse_plots, plots_of
+from .stick_figure import link_bars
 from .style import table
 from .visuals import LINK_COLORS, Visual, joint_axis, visuals_of
 
@@ -34,8 +36,10 @@ if TYPE_CHECKING:
     from pin_nonideal.scene.scene import Scene
     from pin_nonideal.trajectory.trajectory import Trajectory
 
-# Of so many runs curves are plotted; all of them are drawn.
-MOST_PLOTTED = 8
+# Stages of the work on a page, after the motion of each run.
+STAGES = ("shapes", "forces", "curves")
+# Maximum number of runs with plotted curves; all runs are drawn.
+MAX_PLOTTED = 8
 
 
 def packed_runs(
@@ -45,33 +49,46 @@ def packed_runs(
     title: str,
     plots: Chosen | None,
     forces: bool,
+    stage: Callable[[str], object] = len,
 ) -> bytes:
-    """Everything that the page shows of a run, and of others as ghosts beside it.
+    """Return the data of a page that shows a run, and other runs as ghosts beside it.
 
     Args:
-        runs: the run, and those that it is compared with.
-        names: of the runs.
-        fps: frames a second of simulated time; None for frames chosen by the motion.
+        runs: main run, and the runs to compare.
+        names: names of the runs.
+        fps: frames per second of simulated time; None for frames by the motion.
         title: heading of the page.
-        plots: what is plotted, as `signals.plots_of` takes it.
-        forces: whether arrows of forces are shown.
+        plots: plots, as in `signals.plots_of`.
+        forces: whether force arrows are shown.
+        stage: function that is called with the name of each stage at its begin: "motion" for each run, and
+            `STAGES`.
     """
     run, payload = runs[0], Payload()
     scene, marks = run.scene, marks_of(run.scene)
-    motions = [sample(one, fps, share=len(runs)) for one in runs]
-    model, known = scene.model, [between(*pair) for pair in zip(runs, motions, strict=True)][:MOST_PLOTTED]
+    motions = []
+    for one in runs:
+        stage("motion")
+        motions.append(sample(one, fps, share=len(runs)))
+    model, known = scene.model, [resample(*pair) for pair in zip(runs, motions, strict=True)][:MAX_PLOTTED]
     finer, motion = known[0]
+    stage("shapes")
     ends = [(m.joint1, m.point1) for m in marks] + [(m.joint2, m.point2) for m in marks]
     visuals, bare = _drawn(scene, motion, ends)
-    visuals = visuals + touched_of(finer, motion, visuals, upward(model))
+    visuals = visuals + contact_surfaces(finer, motion, visuals, upward(model))
     guides = guides_of(finer, motion)
     shapes = Shapes(payload)
     looking = view(scene, motion, visuals, ends, np.vstack([np.zeros((0, 3)), *(g.points for g in guides)]))
     drawn = shapes.add(visuals)
-    touches = touches_of(finer, motion)
-    arrows = arrows_of(finer, motion, touches, given_arrows(finer, motion, marks)) if forces else []
-    for number, spacing in treads(motion, visuals, _sliding_axes(model)).items():
+    stage("forces")
+    touches = contact_points(finer, motion)
+    arrows = arrows_of(finer, motion, touches, applied_force_arrows(finer, motion, marks)) if forces else []
+    for number, spacing in pattern_spacings(motion, visuals, _sliding_axes(model)).items():
         drawn[number]["wrap"] = spacing
+    stage("curves")
+    items = [] if plots is None else parse_plots("plots", plots)
+    curves = None if plots is None else [item for item in items if not is_asked(run, item)]
+    signals = signals_of(run, finer)
+    rounding = rounding_of((signal.unit, signal.values) for signal in signals)
     header = {
         "title": title,
         "subtitle": _subtitle(run),
@@ -87,12 +104,13 @@ def packed_runs(
             _other(payload, shapes, *other) for other in zip(runs[1:], motions[1:], names[1:], strict=True)
         ],
         "marks": [
-            _stored_mark(payload, motion, mark) for mark in [*marks, *touching_marks(touches, motion, marks)]
+            _stored_mark(payload, motion, mark)
+            for mark in [*marks, *contact_point_marks(touches, motion, marks)]
         ],
         "guides": [_stored_guide(payload, guide) for guide in guides],
         "trails": [{"joint": j, "point": point} for j, point in _trails(model, guides, bare)],
         "arrows": [_stored_arrow(payload, motion, arrow) for arrow in arrows],
-        "plots": _plots(payload, runs, [one for one, _ in known], names, plots),
+        "plots": _plots(payload, runs, [one for one, _ in known], names, curves, rounding),
         "events": _events(payload, run),
         "modes": _modes(payload, run),
         "elements": [
@@ -101,31 +119,29 @@ def packed_runs(
         ],
         "view": _plain(looking),
         "collisions": shapes.add(collisions_of(scene)),
-        "signals": [
-            {"label": s.label, "unit": s.unit, "t": payload.add(s.t, "f8"), "values": payload.add(s.values)}
-            for s in signals_of(run, finer)
-        ],
+        "signals": [_stored_signal(payload, signal, rounding) for signal in signals],
+        "relations": stored_relations(payload, run, finer, [x for x in items if is_asked(run, x)]),
     }
     header["shapes"] = shapes.stored
     return payload.bytes(header)
 
 
 def _drawn(scene: Scene, motion: Motion, ends: list[tuple[int, Array]]) -> tuple[list[Visual], bool]:
-    """What is drawn of a scene, for want of others its shapes for collisions, and whether it has none."""
+    """Return the visuals of a scene or else its collision shapes, and whether it has neither."""
     visuals = visuals_of(scene.visual_model) if scene.visual_model is not None else []
     visuals = visuals or [_colored(shape) for shape in collisions_of(scene)]
     if visuals:
         return visuals, False
-    return sticks(scene.model, ends, link_length(scene.model, ends, motion.size)), True
+    return link_bars(scene.model, ends, link_length(scene.model, ends, motion.size)), True
 
 
 def _colored(visual: Visual) -> Visual:
-    """A shape for collisions, which seldom has a color, in that of its link."""
+    """Return a collision shape, which seldom has a color, in the color of its link."""
     return replace(visual, color=LINK_COLORS[visual.joint % len(LINK_COLORS)])
 
 
 def _other(payload: Payload, shapes: Shapes, run: Trajectory, motion: Motion, name: str) -> Table:
-    """A run as a ghost: its motion and its bodies."""
+    """Return a run as a ghost: its motion and its bodies."""
     marks = marks_of(run.scene)
     ends = [(m.joint1, m.point1) for m in marks] + [(m.joint2, m.point2) for m in marks]
     visuals, _ = _drawn(run.scene, motion, ends)
@@ -138,13 +154,11 @@ def _other(payload: Payload, shapes: Shapes, run: Trajectory, motion: Motion, na
     }
 
 
-def _curves(run: Trajectory, finer: Trajectory, chosen: Chosen | None) -> list[Plot]:
-    """Plots of a run as it is between its samples, but for curves that were given at them."""
-    dense, items = (
-        getattr(run, "dense", None) is not None,
-        wanted("plots", usual_plots(run) if chosen is None else chosen),
-    )
-    smooth = {"q", "v", "energy", "gaps", *run.scene.model.names}  # all else runs straight between samples
+def _curves(run: Trajectory, finer: Trajectory, chosen: list[Any] | None) -> list[Plot]:
+    """Return the plots of a run with interpolated curves; curves of the user have the samples of the run."""
+    dense = getattr(run, "dense", None) is not None
+    items = default_plot_names(run) if chosen is None else chosen
+    smooth = {"q", "v", "energy", "gaps", *run.scene.model.names}  # other curves are linear between samples
     return [
         plot
         for item in items
@@ -157,10 +171,12 @@ def _plots(
     runs: Sequence[Trajectory],
     finer: Sequence[Trajectory],
     names: Sequence[str],
-    chosen: Chosen | None,
+    items: list[Any] | None,
+    rounding: dict[str, float],
 ) -> list[Table]:
-    """Plots of the first run, with the curves of the others that have the same."""
-    each = [[plot.thinned() for plot in _curves(*pair, chosen)] for pair in zip(runs, finer, strict=False)]
+    """Return the plots of the first run, with corresponding curves of the other runs."""
+    pairs = zip(runs, finer, strict=False)
+    each = [[_told(plot.thinned(), rounding) for plot in _curves(*pair, items)] for pair in pairs]
     found = []
     for plot in each[0]:
         stored = _stored_plot(payload, plot)
@@ -174,8 +190,28 @@ def _plots(
     return found
 
 
+def _told(plot: Plot, rounding: dict[str, float]) -> Plot:
+    """A plot with zero in place of rounding; on a logarithmic axis rounding is what is shown."""
+    if plot.log:
+        return plot
+    least = rounding_of((plot.unit, values) for values in plot.curves.values())
+    level = max(rounding.get(plot.unit, 0.0), least.get(plot.unit, 0.0))
+    return replace(plot, curves={k: without_rounding(v, level) for k, v in plot.curves.items()})
+
+
+def _stored_signal(payload: Payload, signal: Signal, rounding: dict[str, float]) -> Table:
+    return {
+        "label": signal.label,
+        "unit": signal.unit,
+        "section": signal.section,
+        "words": signal.words,
+        "t": payload.add(signal.t, "f8"),
+        "values": payload.add(without_rounding(signal.values, rounding[signal.unit])),
+    }
+
+
 def _compared(payload: Payload, plot: Plot, other: Plot, number: int, name: str) -> list[Table]:
-    """Curves of another run that the first has as well."""
+    """Return the curves of another run that the first run also has."""
     t, common = payload.add(other.t, "f8"), {k: v for k, v in other.curves.items() if k in plot.curves}
     return [
         {"label": f"{k}, {name}", "run": number, "of": k, "t": t, "values": payload.curve(v)}
@@ -189,12 +225,12 @@ def _sliding_axes(model: pin.Model) -> dict[int, Array]:
 
 
 def _joints(payload: Payload, model: pin.Model, motion: Motion) -> list[Table]:
-    """How each joint moves, the world first; coordinates that never change once."""
+    """Return the coordinates of each joint, starting with the world; constant coordinates are stored once."""
     found: list[Table] = [{"name": str(model.names[0])}]
     for number, track in Tracks(model).moving():
         values = motion.coordinates[:, track.columns]
         still = np.array_equal(values, np.broadcast_to(values[0], values.shape))
-        exact = float(np.abs(values).max(initial=0.0)) > 16.0  # beyond it 32 bits are too few
+        exact = float(np.abs(values).max(initial=0.0)) > 16.0  # larger values need more than 32 bits
         found.append(
             {
                 "name": str(model.names[number]),
@@ -212,7 +248,7 @@ def _joints(payload: Payload, model: pin.Model, motion: Motion) -> list[Table]:
 
 
 def _trails(model: pin.Model, guides: list[Guide], bare: bool) -> list[tuple[int, list[float]]]:
-    """Points whose paths are drawn: those on guides, and the ends of a model without shapes."""
+    """Return the points with drawn paths: points on guides, and the ends of a model without shapes."""
     found = {guide.joint: guide.point.tolist() for guide in guides}
     for joint in range(1, model.njoints) if bare else ():
         if not len(model.children[joint]):
@@ -233,7 +269,7 @@ def _stored_plot(payload: Payload, plot: Plot) -> Table:
 
 
 def _events(payload: Payload, run: Trajectory) -> Table:
-    """Times of the events with their kinds and elements by number."""
+    """Return the times of the events with indices of their kinds and elements."""
     kinds = sorted({str(event.kind) for event in run.events})
     elements = sorted({str(event.element) for event in run.events})
     return {
@@ -248,33 +284,35 @@ def _events(payload: Payload, run: Trajectory) -> Table:
 
 
 def _impulse(event: Any) -> Array:
-    """Impulse of an impact, in the directions of the contact; zero of other events."""
+    """Return the impulse of an impact, in the directions of the contact; zero for other events."""
     given = getattr(event, "impulse", None)
     return np.zeros(3) if given is None else np.asarray(given, dtype=float)
 
 
 def _plain(item: Any) -> Table:
-    """The fields of a dataclass, arrays as lists."""
+    """Return the fields of a dataclass, with arrays as lists."""
     return {key: v.tolist() if isinstance(v, np.ndarray) else v for key, v in vars(item).items()}
 
 
 def _stored_arrow(payload: Payload, motion: Motion, arrow: Arrow) -> Table:
-    """An arrow whose place is one that its joint carries, one for all frames where it stays there."""
+    """Return an arrow with its origin in the frame of its joint, stored once if it is constant."""
     stored = _plain(arrow)
     stored["values"] = payload.add(arrow.values)
     if arrow.origin is not None:
-        stored["origin"] = payload.add(_once(motion.local(arrow.joint, arrow.origin), motion.size))
+        stored["origin"] = payload.add(
+            _without_repetition(motion.local(arrow.joint, arrow.origin), motion.size)
+        )
     return stored
 
 
-def _once(vectors: Array, size: float) -> Array:
-    """Vectors at all frames, (n, 3), or the one that they all are, (1, 3)."""
+def _without_repetition(vectors: Array, size: float) -> Array:
+    """Return vectors at all frames, (n, 3), or one vector, (1, 3), if they are constant."""
     return vectors[:1] if np.abs(vectors - vectors[0]).max() < 1e-9 * size else vectors
 
 
 def _stored_mark(payload: Payload, motion: Motion, mark: Mark) -> Table:
     stored = _plain(mark)
-    stored["path"] = None if mark.path is None else payload.add(_once(mark.path, motion.size))
+    stored["path"] = None if mark.path is None else payload.add(_without_repetition(mark.path, motion.size))
     stored["closed"] = None if mark.closed is None else payload.add(mark.closed, "u1")
     return stored
 
@@ -282,7 +320,7 @@ def _stored_mark(payload: Payload, motion: Motion, mark: Mark) -> Table:
 def _stored_element(payload: Payload, motion: Motion, element: Element) -> Table:
     stored = _plain(element)
     for key, size in (("point", motion.size), ("axis", 1.0)):
-        stored[key] = payload.add(_once(np.atleast_2d(getattr(element, key)), size))
+        stored[key] = payload.add(_without_repetition(np.atleast_2d(getattr(element, key)), size))
     for key in ("share", "normal"):
         if stored[key] is not None:
             stored[key] = payload.add(getattr(element, key))
@@ -298,7 +336,7 @@ def _stored_guide(payload: Payload, guide: Guide) -> Table:
 
 
 def _modes(payload: Payload, run: Trajectory) -> list[Table]:
-    """Bands of the elements that stick or slip: starts and modes of their pieces, and the end of the last."""
+    """Return the mode bands of the elements: start and mode of each interval."""
     found = []
     for name, pieces in bands_of(run):
         starts, modes = [piece[0] for piece in pieces], [piece[2] for piece in pieces]
@@ -320,7 +358,7 @@ def _counted(count: int, word: str) -> str:
 
 
 def _above(value: float) -> str:
-    """A value rounded up to two digits."""
+    """Return a value rounded up to two digits."""
     if not value > 0.0:
         return "1e-16"
     power = 10.0 ** (np.floor(np.log10(value)) - 1.0)
@@ -328,7 +366,7 @@ def _above(value: float) -> str:
 
 
 def _facts(run: Trajectory, motion: Motion) -> list[tuple[str, str]]:
-    """What the help dialog tells of a run."""
+    """Return the data of a run for the help dialog."""
     model = run.scene.model
     frames = f"{len(motion.times)} frames"
     if motion.held.any():

@@ -1,4 +1,4 @@
-"""A run between its samples: as its steps interpolate it where they were recorded, else along cubics."""
+"""Interpolation of a run between its samples: by the interpolants of its steps, or else by cubics."""
 
 from __future__ import annotations
 
@@ -6,33 +6,34 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
+from pin_nonideal.scene.scene import compiled_scene
 from pin_nonideal.types import Array
 
-from .frames import LEAST_FRAMES, Motion, cubic
+from .between_samples import Cubics
+from .frames import MIN_FRAMES, Motion
 
 if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
 
-# Values of a run at its samples; dictionaries hold them by name.
+# Fields with values at the samples; the fields in `NAMED` are dictionaries by name.
 SAMPLED = ("violation", "violation_rate", "a", "tau", "F_ideal", "F_nonideal", "lam", "lam_ideal", "limits")
 NAMED = ("energy", "power", "law_forces", "reactions", "contact_forces")
 
 
-def between(run: Trajectory, motion: Motion) -> tuple[Trajectory, Motion]:
-    """The run with the frames of its replay as samples, where its own are too few; else as it is.
+def resample(run: Trajectory, motion: Motion) -> tuple[Trajectory, Motion]:
+    """Return the run resampled at the frames of its replay if it has too few samples, else unchanged.
 
-    With record "dense" all values come from the interpolants of the steps.  Without, q and v follow the cubic
-    that is drawn, kinetic and potential energy are those of q and v, and all else runs straight from sample
-    to sample.
+    With record "dense" all values come from the interpolants of the steps. Otherwise q and v follow the drawn
+    cubic, kinetic and potential energy are computed from q and v, and all other values are linear between
+    samples.
 
     Args:
-        run: the run.
-        motion: its motion.
+        run: run of the replay.
+        motion: motion of the run.
     """
-    if len(run.t) >= LEAST_FRAMES or len(motion.times) <= len(run.t):
+    if len(run.t) >= MIN_FRAMES or len(motion.times) <= len(run.t):
         return run, motion
     inner = np.flatnonzero((motion.part > 0.0) & (motion.part < 1.0))
     dense = None
@@ -58,27 +59,25 @@ def between(run: Trajectory, motion: Motion) -> tuple[Trajectory, Motion]:
         if parts is not None:
             exact = getattr(dense, key, None) or {}
             values[key] = {name: at_frames(part, exact.get(name)) for name, part in parts.items()}
-    for key in ("modes", "closed"):  # they hold from a sample to the next
+    for key in ("modes", "closed"):  # constant from a sample to the next
         if getattr(run, key, None) is not None:
             values[key] = np.asarray(getattr(run, key))[motion.before]
     if dense is not None:
         values["v"][inner] = dense.v
     elif values.get("energy") and hasattr(run.scene, "energies"):
-        for k in inner:
-            for name, value in run.scene.energies(values["q"][k], values["v"][k]).items():
-                values["energy"][name][k] = value
-    found = type(run).__new__(type(run))  # not copied, for a copy drops a scene that does not travel
+        runner, q, v = compiled_scene(run.scene).program.runner(), values["q"], values["v"]
+        stored = np.array([runner.energies(q[k], v[k]) for k in inner]).reshape(-1, 2)
+        every = zip(("kinetic", "potential", "total"), [*stored.T, stored.sum(axis=1)], strict=True)
+        for name, energy in every:
+            values["energy"][name][inner] = energy
+    found = type(run).__new__(type(run))  # not copied, because a copy drops a scene that cannot be pickled
     vars(found).update(values)
     count = len(motion.times)
     return found, replace(motion, before=np.arange(count), part=np.zeros(count))
 
 
 def _velocities(run: Trajectory, motion: Motion, inner: NDArray[np.intp]) -> Array:
-    """Velocities of the cubic at the frames between samples, those of the samples at the others, (n, nv)."""
+    """Return the velocities of the cubic at frames between samples, else of the samples, (n, nv)."""
     found = motion.of(run.v)
-    for frame in inner:
-        k, s = int(motion.before[frame]), float(motion.part[frame])
-        xi, rate = cubic(run, k, s)
-        turn = pin.dIntegrate(run.scene.model, run.q[k], xi, pin.ArgumentPosition.ARG1)
-        found[frame] = turn @ rate
+    found[inner] = Cubics(run).velocities(motion.before[inner], motion.part[inner])
     return found

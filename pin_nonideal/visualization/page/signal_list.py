@@ -1,107 +1,233 @@
-"""What a reader of a replay may choose to see: signals to plot, boxes of inertia, collision shapes."""
+"""Signals of a replay: each recorded quantity of a run, for search and plots."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pinocchio as pin
 
-from pin_nonideal.types import Array, Table
+from pin_nonideal.trajectory.columns import column_name, columns
+from pin_nonideal.types import Array
 
 from .coordinates import positions, velocities
-from .mode_timeline import opens
+from .mode_timeline import has_open_contact
 from .signals import Plot
-from .visuals import Visual, visuals_of
+from .visuals import joint_axis
 
 if TYPE_CHECKING:
-    from pin_nonideal.scene.scene import Scene
     from pin_nonideal.trajectory.trajectory import Trajectory
 
-# Points of all signals together, at least and at most so many of each.
+# Number of points of all signals, and minimum and maximum number of points of one signal.
 POINTS, LEAST, MOST = 120_000, 100, 800
-# Collision shapes with more triangles are not carried.
-TRIANGLES = 20_000
+# Sections of the list, in order.
+TORQUES, FRICTION, REACTIONS = "Torques of the actuation", "Friction", "Reactions and loads"
+ENERGY, MOTION, OTHERS = "Energy and power", "Positions, velocities, accelerations", "Violation and states"
+SECTIONS = (TORQUES, FRICTION, REACTIONS, ENERGY, MOTION, OTHERS)
+# Fields with smooth curves between samples; other fields are linear.
+SMOOTH = ("q", "v", "energy")
+FORCES = ("N", "N m", "N, N m")
+WRENCH = ("force x", "force y", "force z", "moment x", "moment y", "moment z")
 
 
 @dataclass(frozen=True)
 class Signal:
-    """A curve that can be plotted.
+    """Curve that can be plotted.
 
     Attributes:
-        label: its name.
-        unit: its unit.
+        label: name of the curve.
+        unit: unit of the curve.
+        section: section of the list.
+        words: further words for the search, such as the name in `Trajectory.columns`.
         t: times [s], (k,).
-        values: (k,).
+        values: values of the curve, (k,).
     """
 
     label: str
     unit: str
+    section: str
+    words: str
     t: Array
     values: Array
 
 
+@dataclass(frozen=True)
+class _Found:
+    """A signal before it is thinned, and whether it is smooth between samples."""
+
+    label: str
+    unit: str
+    section: str
+    words: str
+    values: Array
+    smooth: bool = False
+
+
 def signals_of(run: Trajectory, finer: Trajectory) -> list[Signal]:
-    """All numbers of a run that can be plotted one by one, thinned so that extremes stay.
+    """Return all scalars of a run that can be plotted, thinned with their extremes.
+
+    Every column of `Trajectory.columns` is one of them, or the angle or rate that it holds is.
 
     Args:
-        run: the run.
-        finer: the same with more samples, for what does not run straight between those of the run.
+        run: run of the replay.
+        finer: the same run with more samples, for curves that are not linear between samples.
     """
-    model, found, smooth = run.scene.model, [], []  # found: what runs straight between samples
     if getattr(run, "dense", None) is not None:
         run = finer
-    for item in positions(model, finer.q):
-        smooth.append((f"{item.label}, position", item.unit, item.values))
-    for item in velocities(model, finer.v):
-        smooth.append((f"{item.label}, velocity", item.unit, item.values))
-    for name, values in (run.contact_forces or {}).items() if opens(run) else ():
-        found.append((f"{name}, force", "N", np.linalg.norm(values, axis=1)))
-    if run.a is not None:
-        found += [(f"{x.label}, acceleration", x.unit, x.values) for x in velocities(model, run.a, "/s²")]
-    for name, values in (run.energy or {}).items():
-        found.append((f"energy: {name}", "J", values))
-    for name, values in (run.power or {}).items():
-        found.append((f"power: {name}", "W", values))
-    if run.lam is not None:
-        for name, rows in run.scene.constraint_slices.items():
-            found.append((f"{name}, |lam|", "N, N m", np.linalg.norm(run.lam[:, rows], axis=1)))
-    limits = getattr(run, "limits", None)
-    if limits is not None:
-        found += [(f"{x}, limit", "N, N m", limits[:, k]) for k, x in enumerate(run.element_names)]
-    each = int(np.clip(POINTS // max(len(found) + len(smooth), 1), LEAST, MOST))
+    found = [*_labelled(run, finer), *_loads(run)]
+    known = {word for item in found for word in item.words.split("\n")}
+    fine = columns(finer)
+    names = {column_name(name): name for name in (*run.scene.model.names, *run.rows, *run.element_names)}
+    for name, values in columns(run).items():
+        if name == "t" or name in known:
+            continue
+        item = _Column(run, name, names).signal(values)
+        smooth = item.words.split("\n")[-1] in SMOOTH
+        found.append(replace(item, values=fine[name] if smooth else item.values, smooth=smooth))
+    order = {section: place for place, section in enumerate(SECTIONS)}
+    found.sort(key=lambda item: order[item.section])
+    each = int(np.clip(POINTS // max(len(found), 1), LEAST, MOST))
     return [
-        _thinned(label, unit, values, np.asarray(source.t, dtype=float), each)
-        for source, items in ((finer, smooth), (run, found))
-        for label, unit, values in items
+        _thinned(item, np.asarray((finer if item.smooth else run).t, dtype=float), each) for item in found
     ]
 
 
-def _thinned(label: str, unit: str, values: Array, t: Array, points: int) -> Signal:
-    plot = Plot(label, unit, t, {label: values}).thinned(points // 2)
-    return Signal(label, unit, plot.t, plot.curves[label])
+def _labelled(run: Trajectory, finer: Trajectory) -> Iterator[_Found]:
+    """Return positions, velocities and accelerations by the names of their components."""
+    model = run.scene.model
+    for kind, field, own, items in (
+        ("position", "q", True, positions(model, finer.q)),
+        ("velocity", "v", True, velocities(model, finer.v)),
+        ("acceleration", "a", False, [] if run.a is None else velocities(model, run.a, "/s²")),
+    ):
+        counts: dict[str, int] = {}
+        for item in items:
+            joint = model.joints[model.getJointId(item.joint)]
+            place = counts[item.joint] = counts.get(item.joint, -1) + 1
+            column = f"{column_name(item.joint)}.{field}" + (f".{place}" if joint.nv > 1 else "")
+            if field == "q" and joint.nv > 1 and place > 2:  # the angle of a planar joint has another column
+                column = f"{item.joint} angle"
+            yield _Found(f"{item.label}, {kind}", item.unit, MOTION, f"{column}\n{field}", item.values, own)
 
 
-def inertia_box(inertia: pin.Inertia) -> Table:
-    """The even box of the same mass and inertia: edges [m] and orientation (x, y, z, w) in its frame."""
-    moments, axes = np.linalg.eigh(np.asarray(inertia.inertia))
-    if np.linalg.det(axes) < 0.0:
-        axes[:, 0] *= -1.0
-    squares = 6.0 * (moments.sum() - 2.0 * moments) / (inertia.mass or 1.0)
-    return {
-        "edges": np.sqrt(np.maximum(squares, 0.0)).tolist(),
-        "turn": pin.Quaternion(axes).coeffs().tolist(),
-    }
+def _loads(run: Trajectory) -> Iterator[_Found]:
+    """Return sizes of forces: multipliers of constraints, forces of contacts, loads of bearings."""
+    if run.lam is not None:
+        for name, rows in run.scene.constraint_slices.items():
+            size = np.linalg.norm(run.lam[:, rows], axis=1)
+            yield _Found(f"{name}, |lam|", "N, N m", REACTIONS, "reaction load multipliers", size)
+    for name, values in (run.contact_forces or {}).items() if has_open_contact(run) else ():
+        size = np.linalg.norm(values, axis=1)
+        yield _Found(f"{name}, force", "N", REACTIONS, "contact reaction load", size)
+    for name, wrench in (getattr(run, "reactions", None) or {}).items():
+        for what, unit, part in (("force", "N", wrench[:, :3]), ("moment", "N m", wrench[:, 3:6])):
+            size = np.linalg.norm(part, axis=1)
+            yield _Found(f"{name}, load, |{what}|", unit, REACTIONS, "reaction bearing wrench", size)
 
 
-def collisions_of(scene: Scene) -> list[Visual]:
-    """Collision shapes, without those of too many triangles in all."""
-    if scene.collision_model is None:
-        return []
-    found, room = [], TRIANGLES
-    for visual in visuals_of(scene.collision_model):
-        if visual.shape.kind != "plane" and len(visual.shape.triangles) <= room:
-            room -= len(visual.shape.triangles)
-            found.append(visual)
-    return found
+class _Column:
+    """Content of a column of a run.
+
+    Args:
+        run: run of the replay.
+        name: name of the column.
+        names: names of joints, constraints and elements by their names in columns.
+    """
+
+    def __init__(self, run: Trajectory, name: str, names: Mapping[str, str]) -> None:
+        self.run, self.name, self.names = run, name, names
+
+    def signal(self, values: Array) -> _Found:
+        """Return the signal of the column; its words end with the field."""
+        for field, unit, words in (("energy", "J", "work"), ("power", "W", "")):
+            for own in getattr(self.run, field, None) or {}:
+                if self.name == column_name(f"{field}.{own}"):
+                    return self._found(f"{field}: {own}", unit, ENERGY, words, field, values)
+        for law in getattr(self.run, "law_forces", None) or {}:
+            owner, _, number = self.name.partition(f".C.{column_name(law)}")
+            if owner != self.name and (not number or number[0] == "."):
+                owner = self.names.get(owner, owner)
+                label, unit = f"{law}, on {owner}{number.replace('.', ' ')}", self._unit(owner, number)
+                return self._found(label, unit, FRICTION, "friction force law torque", "C", values)
+        number = (re.search(r"\.\d+$", self.name) or [""])[0]
+        owner, _, field = self.name.removesuffix(number).rpartition(".")
+        return self._of_field(self.names.get(owner, owner), field, number, values)
+
+    def _of_field(self, owner: str, field: str, number: str, values: Array) -> _Found:
+        part, unit = number.replace(".", " "), self._unit(owner, number)
+        if field == "reaction":
+            place = int(number[1:])
+            unit = "N" if place < 3 else "N m"
+            label = f"{owner}, reaction, {WRENCH[place]}"
+            return self._found(label, unit, REACTIONS, "load bearing wrench component", field, values)
+        known = {
+            "q": (f"{owner}, q{part}", "", MOTION, "position configuration"),
+            "v": (f"{owner}, v{part}", "", MOTION, "velocity"),
+            "a": (f"{owner}, a{part}", "", MOTION, "acceleration"),
+            "tau": (f"{owner}, torque, tau{part}", unit, TORQUES, "motor drive actuation force"),
+            "F_ideal": (f"{owner}, ideal force, F_ideal{part}", unit, REACTIONS, "constraint torque"),
+            "F_nonideal": (f"{owner}, friction, F_nonideal{part}", unit, FRICTION, "nonideal force torque"),
+            "lam": (f"{owner}, lam{part}", "N, N m", REACTIONS, "reaction load multiplier component"),
+            "lam_ideal": (f"{owner}, lam_ideal{part}", "N, N m", REACTIONS, "reaction multiplier component"),
+            "mode": (f"{owner}, mode", "1 and -1 slip, 0 sticks", FRICTION, "friction stick slip"),
+            "limit": (f"{owner}, limit", "N, N m", FRICTION, "friction"),
+        }
+        if field in known and owner:
+            label, unit, section, words = known[field]
+            return self._found(label, unit, section, words, field, values)
+        rates = {"violation": "m, rad", "violation_rate": "m/s, rad/s"}
+        return self._found(self.name.replace("_", " "), rates.get(self.name, ""), OTHERS, "", field, values)
+
+    def _found(self, label: str, unit: str, section: str, words: str, field: str, values: Array) -> _Found:
+        return _Found(label, unit, section, f"{self.name}\n{words}\n{field}", np.asarray(values, dtype=float))
+
+    def _unit(self, joint: str, number: str) -> str:
+        """Return the unit of a generalized force in a joint, or of one component."""
+        model = self.run.scene.model
+        if not model.existJointName(joint):
+            return "N, N m"
+        index = model.getJointId(joint)
+        if model.joints[index].nv == 1:
+            return "N m" if joint_axis(model, index)[1] else "N"
+        kind = model.joints[index].shortname()
+        if kind == "JointModelFreeFlyer" and number:
+            return "N" if int(number[1:]) < 3 else "N m"
+        return {"JointModelTranslation": "N"}.get(kind, "N m" if "Spherical" in kind else "N, N m")
+
+
+def _thinned(item: _Found, t: Array, points: int) -> Signal:
+    """Return the signal with few points; two points if its value is constant."""
+    values, label = item.values, item.label
+    if len(t) > 2 and (values == values[0]).all():
+        t, values = t[[0, -1]], values[[0, -1]]
+    plot = Plot(label, item.unit, t, {label: values}).thinned(points // 2)
+    words = item.words.replace("\n", " ")
+    return Signal(label, item.unit, item.section, words, plot.t, plot.curves[label])
+
+
+def rounding_of(pairs: Iterator[tuple[str, Array]]) -> dict[str, float]:
+    """Return the size of rounding for each unit.
+
+    Args:
+        pairs: units and values in them.
+
+    Returns:
+        By unit 1e-9 of the largest value of forces and moments, and 1e-12 of other largest values.
+    """
+    largest: dict[str, float] = {}
+    for unit, values in pairs:
+        size = np.abs(values[np.isfinite(values)]).max(initial=0.0)
+        largest[unit] = max(largest.get(unit, 0.0), float(size))
+    return {unit: (1e-9 if unit in FORCES else 1e-12) * size for unit, size in largest.items()}
+
+
+def without_rounding(values: Array, level: float) -> Array:
+    """Return values with zeros in place of values below a level.
+
+    Args:
+        values: values of a curve.
+        level: size of rounding, see `rounding_of`.
+    """
+    return np.where(np.abs(values) < level, 0.0, values)

@@ -1,4 +1,4 @@
-"""Curves, events and modes of a run, as the replay and the figures show them."""
+"""Curves, events and modes of a run for the replay and for figures."""
 
 from __future__ import annotations
 
@@ -8,26 +8,28 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
-from pin_nonideal.errors import InputError, UnknownNameError, nearest
+from pin_nonideal.errors import InputError, UnknownNameError, nearest, short_repr
 from pin_nonideal.types import Array
 from pin_nonideal.validation import sequence
 
 from .coordinates import Coordinate, positions, velocities
-from .mode_timeline import gaps_of, opens
+from .mode_timeline import gaps_of, has_open_contact
 from .visuals import joint_axis
 
 if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
 
 
-# Plots by name, or by a title "what [unit]" and curves by label, (nt,) each.
+# Plots by name, or by a title "name [unit]" and curves by label, (nt,) each.
 Chosen = str | Sequence[str | tuple[str, Mapping[str, Array]]]
 
-# Curves of one plot when joints are not chosen: as many as can be told apart.
+# Maximum number of curves of one plot without a selection of joints, so that they can be distinguished.
 MAX_CURVES = 8
-# A plot of the replay keeps the extremes of every curve in so many intervals of time.
+# Number of time intervals in which a plot of the replay keeps the extremes of every curve.
 INTERVALS = 600
+RATES_AND_FORCES = ("tau", "F_nonideal", "q", "v", "a")
 STORED_ENERGY = ("kinetic", "potential", "total")
 
 
@@ -36,12 +38,12 @@ class Plot:
     """Curves on one axis.
 
     Attributes:
-        title: what is shown.
+        title: title of the plot.
         unit: unit of all curves.
         t: times [s], (k,).
         curves: values by label, (k,) each.
         log: whether the axis is logarithmic.
-        note: what the reader must know of the choice of curves.
+        note: note on the selection of the curves.
     """
 
     title: str
@@ -52,28 +54,37 @@ class Plot:
     note: str = ""
 
     def thinned(self, intervals: int = INTERVALS) -> Plot:
-        """The same plot with the extremes of each curve in some intervals of time, ends included."""
+        """Return the plot with the extremes of each curve in intervals of time, and with both ends."""
         count = len(self.t)
         if count <= 2 * intervals:
             return self
         starts = np.linspace(0, count, intervals, endpoint=False).astype(int)
-        kept = {0, count - 1}
+        kept = np.zeros(count, dtype=bool)
+        kept[[0, -1]] = True
         for values in self.curves.values():
-            for start, piece in zip(starts, np.split(values, starts[1:]), strict=True):
-                kept.update((int(start + np.argmin(piece)), int(start + np.argmax(piece))))
-        index = np.array(sorted(kept))
+            for extreme in (np.minimum, np.maximum):
+                kept[_first_of(values, extreme.reduceat(values, starts), starts)] = True
+        index = np.flatnonzero(kept)
         return replace(self, t=self.t[index], curves={k: v[index] for k, v in self.curves.items()})
 
 
-def wanted(what: str, chosen: Any) -> list[Any]:
-    """Plots asked for, as a list of names and of pairs of a title and curves by label.
+def _first_of(values: Array, wanted: Array, starts: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return the first index of a value in each interval, or of the first NaN if the value is NaN."""
+    piece = np.repeat(np.arange(len(starts)), np.diff(np.append(starts, len(values))))
+    places = np.flatnonzero((values == wanted[piece]) | np.isnan(values))
+    _, first = np.unique(piece[places], return_index=True)
+    return np.asarray(places[first])
+
+
+def parse_plots(what: str, chosen: Any) -> list[Any]:
+    """Return the requested plots, as a list of names and of pairs of a title and curves by label.
 
     Args:
-        what: words for messages.
+        what: prefix of error messages.
         chosen: one name, or a list.
 
     Raises:
-        InputError: something else.
+        InputError: the value has another form.
     """
     items = [chosen] if isinstance(chosen, str) else list(sequence(what, chosen))
     for item in items:
@@ -82,44 +93,49 @@ def wanted(what: str, chosen: Any) -> list[Any]:
             isinstance(item, str) or (pair and isinstance(item[0], str) and isinstance(item[1], Mapping))
         ):
             raise InputError(
-                f"{what} must hold names, and pairs of a title and curves by label; got {item!r}"
+                f"{what} must hold names, and pairs of a title and curves by label; got {short_repr(item)}"
             )
     return items
 
 
 def plots_of(run: Trajectory, chosen: Chosen | None) -> list[Plot]:
-    """Plots by name.
+    """Return plots by name.
 
     Args:
-        run: the run.
-        chosen: "energy", "work", "power", "violation", "reactions", "contacts" (normal forces), "gaps" (of
-            contacts that open), "tau", "q", "v", "a", the name of a joint (its position and its velocity), or
-            a pair of a title "what [unit]" and curves by label, (nt,) each. None: energy, gaps, violation,
-            reactions and q, as far as the run has them.
+        run: run of the replay.
+        chosen: names of plots: "energy", "work", "power", "violation", "reactions", "contacts" (normal
+            forces), "gaps" (of unilateral contacts), "tau", "F_nonideal" (of joints), "q", "v", "a", the name
+            of a joint (position and velocity), or a pair of a title "name [unit]" and curves by label, (nt,)
+            each. None selects tau and F_nonideal of a driven run, then energy, gaps, violation, reactions and
+            q, if the run recorded them.
 
     Raises:
         UnknownNameError: no plot and no joint has that name.
-        InputError: the run did not record what a plot shows, a curve has a wrong length, or `chosen` is
-            something else.
+        InputError: the run did not record the values of a plot, a curve has a wrong length, or `chosen` is
+            invalid.
     """
     plots: list[Plot] = []
-    for item in wanted("plots", usual_plots(run) if chosen is None else chosen):
+    for item in parse_plots("plots", default_plot_names(run) if chosen is None else chosen):
         plots += _plot(run, item) if isinstance(item, str) else [_given(run, *item)]
     return plots
 
 
-def usual_plots(run: Trajectory) -> list[str]:
-    """Names of the plots of a replay when none are asked for.
+def default_plot_names(run: Trajectory) -> list[str]:
+    """Return the names of the default plots of a replay.
 
     Args:
-        run: the run.
+        run: run of the replay.
     """
-    return [name for name in ("energy", "gaps", "violation", "reactions", "q") if _recorded(run, name)]
+    driven = getattr(run, "tau", None) is not None and bool(np.any(run.tau))
+    first = ("tau", "F_nonideal") if driven else ()
+    return [
+        name for name in (*first, "energy", "gaps", "violation", "reactions", "q") if _recorded(run, name)
+    ]
 
 
 def _recorded(run: Trajectory, name: str) -> bool:
-    if name in ("energy", "work"):
-        return bool(run.energy)
+    if name in ("energy", "work", "power"):
+        return bool(getattr(run, name.replace("work", "energy"), None))
     if name == "violation":
         return bool(run.scene.constraint_slices)
     if name == "reactions":
@@ -127,16 +143,18 @@ def _recorded(run: Trajectory, name: str) -> bool:
     if name == "contacts":
         return run.lam is not None and bool(run.scene.contacts)
     if name == "gaps":
-        return opens(run)
-    if name in ("a", "tau", "power"):
+        return has_open_contact(run)
+    if name == "F_nonideal":
+        return run.F_nonideal is not None and bool(np.any(run.F_nonideal))
+    if name in ("a", "tau"):
         return getattr(run, name, None) is not None
     return True
 
 
 def _plot(run: Trajectory, name: str) -> list[Plot]:
-    """The plots of one name."""
+    """Return the plots of one name."""
     model, t = run.scene.model, np.asarray(run.t)
-    names = ("energy", "work", "power", "violation", "reactions", "contacts", "gaps", "tau", "q", "v", "a")
+    names = ("energy", "work", "power", "violation", "reactions", "contacts", "gaps", *RATES_AND_FORCES)
     joints = [str(joint) for joint in model.names[1:]]
     if name not in names and name not in joints:
         raise UnknownNameError(f'no plot and no joint "{name}"{nearest(name, [*names, *joints])}')
@@ -147,8 +165,10 @@ def _plot(run: Trajectory, name: str) -> list[Plot]:
             raise InputError('plot "contacts" needs a contact, and this scene has none')
         if name == "gaps":
             raise InputError('plot "gaps" needs a contact that opens, and this run has none')
+        if name == "F_nonideal" and run.F_nonideal is not None:
+            raise InputError('plot "F_nonideal" needs a nonideal force, and this run has none')
         record = {"a": "a", "tau": "tau", "power": "power"}.get(name, "energy")
-        record = "forces" if name in ("reactions", "contacts") else record
+        record = "forces" if name in ("reactions", "contacts", "F_nonideal") else record
         raise InputError(f'plot "{name}" must be recorded: pass record=("{record}",) to simulate')
     energy = run.energy or {}
     if name == "energy":
@@ -159,18 +179,20 @@ def _plot(run: Trajectory, name: str) -> list[Plot]:
         return [Plot("Constraint violation", "m, rad", t, {"largest residual": run.violation}, log=True)]
     if name == "reactions" and run.lam is not None:
         size = {k: np.linalg.norm(run.lam[:, s], axis=1) for k, s in run.scene.constraint_slices.items()}
-        return [Plot("Reactions, |lam|", "N, N m", t, _largest(size), note=left_out(len(size)))]
+        return [Plot("Reactions, |lam|", "N, N m", t, _largest(size), note=omission_note(len(size)))]
     if name == "power":
-        return [Plot("Power", "W", t, _largest(run.power or {}), note=left_out(len(run.power or {})))]
+        return [Plot("Power", "W", t, _largest(run.power or {}), note=omission_note(len(run.power or {})))]
     if name == "contacts" and run.lam is not None:
         slices = list(run.scene.constraint_slices.items())[len(run.scene.constraints) :]
         normal = {key: run.lam[:, rows.stop - 1] for key, rows in slices}
-        return [Plot("Normal force", "N", t, _largest(normal), note=left_out(len(normal)))]
+        return [Plot("Normal force", "N", t, _largest(normal), note=omission_note(len(normal)))]
     if name == "gaps":
         times, gaps = gaps_of(run)
-        return [Plot("Gaps", "m, rad", times, _largest(gaps), note=left_out(len(gaps)))]
+        return [Plot("Gaps", "m, rad", times, _largest(gaps), note=omission_note(len(gaps)))]
     if name == "tau":
-        return _torques(model, t, np.asarray(run.tau))
+        return _in_joints("Actuation", model, t, np.asarray(run.tau))
+    if name == "F_nonideal":
+        return _in_joints("Friction, F_nonideal", model, t, np.asarray(run.F_nonideal))
     if name == "q":
         return _by_unit("Position", t, positions(model, run.q))
     if name == "v":
@@ -182,18 +204,18 @@ def _plot(run: Trajectory, name: str) -> list[Plot]:
     return _by_unit(name, t, place) + _by_unit(f"{name}, velocity", t, rate)
 
 
-def _torques(model: pin.Model, t: Array, tau: Array) -> list[Plot]:
-    """Torques and forces of the actuation in joints of one degree of freedom."""
+def _in_joints(title: str, model: pin.Model, t: Array, tau: Array) -> list[Plot]:
+    """Return plots of torques and forces in joints of one degree of freedom."""
     found = []
     for joint in range(1, model.njoints):
         if model.joints[joint].nv == 1:
             name, unit = str(model.names[joint]), "N m" if joint_axis(model, joint)[1] else "N"
             found.append(Coordinate(name, name, unit, tau[:, model.joints[joint].idx_v]))
-    return _by_unit("Actuation", t, found)
+    return _by_unit(title, t, found)
 
 
 def _given(run: Trajectory, title: str, curves: Mapping[str, Array]) -> Plot:
-    """A plot of the user's own curves."""
+    """Return a plot of curves of the user."""
     what, _, unit = title.partition("[")
     values = {}
     for label, curve in curves.items():
@@ -203,7 +225,7 @@ def _given(run: Trajectory, title: str, curves: Mapping[str, Array]) -> Plot:
         except ValueError:  # lists of unequal length
             given = np.asarray(None)
         if given.dtype.kind not in "fiub":
-            raise InputError(f"{where} must hold numbers; got {curve!r}")
+            raise InputError(f"{where} must hold numbers; got {short_repr(curve)}")
         values[str(label)] = given.astype(np.float64)
         if given.shape != (len(run.t),):
             raise InputError(
@@ -213,39 +235,39 @@ def _given(run: Trajectory, title: str, curves: Mapping[str, Array]) -> Plot:
 
 
 def _by_unit(title: str, t: Array, coordinates: list[Coordinate]) -> list[Plot]:
-    """One plot for each unit, with the curves that move most."""
+    """Return one plot for each unit, with the curves of the largest range."""
     plots = []
     for unit in dict.fromkeys(c.unit for c in coordinates):
         every = {c.label: c.values for c in coordinates if c.unit == unit}
-        plots.append(Plot(title, unit, t, _largest(every), note=left_out(len(every))))
+        plots.append(Plot(title, unit, t, _largest(every), note=omission_note(len(every))))
     return plots
 
 
-def left_out(count: int) -> str:
-    """What a plot of so many curves says of those that it does not show.
+def omission_note(count: int) -> str:
+    """Return the note of a plot on the curves that it omits.
 
     Args:
-        count: of curves.
+        count: number of curves.
     """
     return f"{MAX_CURVES} of {count}, those that move most" if count > MAX_CURVES else ""
 
 
 def _largest(curves: dict[str, Array]) -> dict[str, Array]:
-    """The curves with the largest range, in the given order."""
+    """Return the curves with the largest range, in the given order."""
     rank = sorted(curves, key=lambda label: -float(np.ptp(curves[label])))[:MAX_CURVES]
     return {label: values for label, values in curves.items() if label in rank}
 
 
-def several(run: Any, names: Sequence[str] | None, what: str) -> tuple[list[Trajectory], list[str]]:
-    """Runs and their names.
+def runs_and_names(run: Any, names: Sequence[str] | None, what: str) -> tuple[list[Trajectory], list[str]]:
+    """Return runs and their names.
 
     Args:
-        run: one run, or a list of them.
-        names: of several; None for numbers.
-        what: that shows them, for messages.
+        run: one run, or a list of runs.
+        names: names of several runs; None for numbers.
+        what: name of the caller, for messages.
 
     Raises:
-        InputError: there is none, one is no run or has no scene, or there are more or fewer names.
+        InputError: there is no run, an entry is not a run or has no scene, or the number of names is wrong.
     """
     runs = list(run) if isinstance(run, (list, tuple)) else [run]
     if not runs:
@@ -261,14 +283,14 @@ def several(run: Any, names: Sequence[str] | None, what: str) -> tuple[list[Traj
 
 
 def check_scene(run: Trajectory, what: str) -> None:
-    """Refuses what is no run, and a run without its scene.
+    """Check that a value is a run with its scene.
 
     Args:
-        run: the run.
-        what: what needs the scene, for the message.
+        run: candidate.
+        what: name of the caller, for messages.
 
     Raises:
-        InputError: it is no run, or it has no scene, or one that does not fit.
+        InputError: the value is not a run, or its scene is missing or does not fit.
     """
     if not all(hasattr(run, name) for name in ("t", "q", "v", "scene")):
         raise InputError(f"{what} shows a Trajectory, what `simulate` returns; got {type(run).__name__}")

@@ -1,4 +1,4 @@
-"""Shapes for a model that has none: bars from joint to joint, and solids whose corners touch something."""
+"""Shapes for a model without geometry: bars between joints, and hulls of end points on bodies."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from pin_nonideal.types import Array
 from .visuals import JOINT_COLOR, LINK_COLORS, Shape, Visual, joint_axis
 
 
-def sticks(model: pin.Model, ends: list[tuple[int, Array]], size: float) -> list[Visual]:
-    """Visuals for a model without geometry: bars from joint to joint, hubs at joints, balls for point masses.
+def link_bars(model: pin.Model, ends: list[tuple[int, Array]], size: float) -> list[Visual]:
+    """Return visuals for a model without geometry: bars between joints, hubs at joints, point masses.
 
     Args:
         model: the model.
-        ends: points on bodies that bars lead to as well, as joint index and position in its frame [m], (3,).
-        size: typical length of a link, which sets the thickness [m].
+        ends: additional end points of bars on bodies, as joint index and position in its frame [m], (3,).
+        size: typical length of a link, which determines the thickness [m].
     """
     radius = 0.02 * size
     points: list[list[Array]] = [[] for _ in range(model.njoints)]
@@ -44,7 +44,7 @@ def sticks(model: pin.Model, ends: list[tuple[int, Array]], size: float) -> list
         ]
         reach = [point for point in reach if np.linalg.norm(point) > radius]
         if not reach and np.linalg.norm(lever) > radius:
-            reach = [2.0 * lever]  # a uniform bar ends at twice the distance of its center of mass
+            reach = [2.0 * lever]  # a uniform bar is twice as long as the distance of its center of mass
         for number, point in enumerate(reach):
             visuals.append(Visual(f"{name} bar {number}", joint, *_bar(point, radius), color))
         if not reach and mass > 0.0:
@@ -56,15 +56,15 @@ def sticks(model: pin.Model, ends: list[tuple[int, Array]], size: float) -> list
 
 
 def _solid(joint: int, ends: list[tuple[int, Array]]) -> Shape | None:
-    """The hull of the points of a body that touch or hold something, where they span a solid."""
+    """Return the convex hull of the given points of a body, or None if they span no solid."""
     own = np.array([point for other, point in ends if other == joint]).reshape(-1, 3)
     if len(own) < 4:
         return None
-    from scipy.spatial import ConvexHull, QhullError  # for a solid only: its import takes long
+    from scipy.spatial import ConvexHull, QhullError  # imported for solids only, because the import is slow
 
     try:
         hull = ConvexHull(own)
-    except QhullError:  # they lie in a plane
+    except QhullError:  # coplanar points
         return None
     number = {old: new for new, old in enumerate(hull.vertices)}
     corners = own[hull.vertices]
@@ -76,13 +76,13 @@ def _solid(joint: int, ends: list[tuple[int, Array]]) -> Shape | None:
 
 
 def _bar(end: Array, radius: float) -> tuple[pin.SE3, Shape]:
-    """A rounded bar from the origin to a point."""
+    """Return a rounded bar from the origin to a point."""
     turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), end).matrix()
     return pin.SE3(turn, end / 2.0), Shape("capsule", (radius, float(np.linalg.norm(end))))
 
 
 def _hub(model: pin.Model, joint: int, radius: float) -> Visual:
-    """The mark of a joint: a drum along a revolute axis, a block on a prismatic one, else a ball."""
+    """Return the shape of a joint: a drum along a revolute axis, a block on a prismatic one, else a ball."""
     name = f"{model.names[joint]} joint"
     axis, turning = joint_axis(model, joint)
     if axis is None:

@@ -1,8 +1,8 @@
-"""Colors and words of what a replay and a figure tell apart: one table for the page and for matplotlib."""
+"""Colors and descriptions of events, modes and forces, shared by the replay page and matplotlib."""
 
 from __future__ import annotations
 
-# Kinds of events, in the order of their legend; whatever else comes is drawn like the last.
+# Kinds of events in the order of their legend; unknown kinds are drawn as "other".
 EVENTS = {
     "stick": ("#475569", "begins to stick"),
     "slip": ("#0f766e", "begins to slip"),
@@ -31,7 +31,7 @@ MODES = {
 }
 OPEN, CLOSED = 2, 3
 UNKNOWN_MODE = ("#f1f5f9", "no mode")
-# Parts of the force of constraint, Eq. (39), and what else acts.
+# Parts of the constraint force, Eq. (39), and other forces.
 FORCES = {
     "ideal": "#2563eb",
     "nonideal": "#ea580c",
@@ -42,20 +42,20 @@ FORCES = {
     "given": "#57534e",
 }
 MARKS = {"anchor": "#d97706", "rod": "#d97706", "spring": "#64748b", "contact": "#475569", "guide": "#a8763e"}
-CURVES = ("#1d4ed8", "#b45309", "#0f766e", "#be123c", "#6d28d9", "#4d7c0f", "#0369a1", "#57534e")
+CURVES = ("#1d4ed8", "#b45309", "#0f766e", "#be123c", "#6d28d9", "#4d7c0f", "#c026d3", "#57534e")
 
 
 def event_color(kind: str) -> str:
-    """Color of a kind of event.
+    """Return the color of a kind of event.
 
     Args:
-        kind: as `Event.kind` has it.
+        kind: kind as in `Event.kind`.
     """
     return EVENTS.get(kind, EVENTS["other"])[0]
 
 
 def table() -> dict[str, object]:
-    """All of it, as the page reads it."""
+    """Return all colors and descriptions in the format of the page."""
     return {
         "events": {kind: {"color": color, "means": means} for kind, (color, means) in EVENTS.items()},
         "modes": {str(mode): {"color": color, "name": name} for mode, (color, name) in MODES.items()},

@@ -1,8 +1,8 @@
-"""What the replay draws: shapes on joints, from Pinocchio's geometry or, when there is none, from the joints.
+"""Shapes of the replay on joints, from Pinocchio's geometry or, without geometry, from the joints.
 
-A shape is a primitive with its dimensions or a triangle mesh.  Triangles come from coal, which has already
-read every mesh format that Pinocchio reads; COLLADA files are opened once more for the colors of their parts,
-which coal does not keep.
+A shape is a primitive with its dimensions or a triangle mesh. Triangles come from coal, which has read every
+mesh format that Pinocchio supports. COLLADA files are read again for the colors of their parts, which coal
+does not store.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from pin_nonideal.types import Array, GeometryObject
 Indices = NDArray[np.int64]
 Color = tuple[float, float, float, float]
 
-# Vertices closer than this part of the mesh's diagonal are one vertex: STL files repeat each of them.
+# Tolerance of equal vertices relative to the mesh's diagonal; STL files repeat all vertices.
 WELD = 1e-5
 COLLADA = "{http://www.collada.org/2005/11/COLLADASchema}"
 
-# Colors of drawn links, taken in turn, and of the joints between them.
+# Colors of links, used cyclically, and color of the joints between them.
 LINK_COLORS: tuple[Color, ...] = (
     (0.31, 0.47, 0.65, 1.0),
     (0.93, 0.58, 0.25, 1.0),
@@ -40,15 +40,16 @@ JOINT_COLOR: Color = (0.27, 0.30, 0.35, 1.0)
 
 @dataclass(frozen=True)
 class Shape:
-    """A primitive or a mesh in its own axes.
+    """Primitive or mesh in its own axes.
 
     Attributes:
         kind: "box", "ellipsoid", "cylinder", "capsule", "cone", "plane" or "mesh".
         size: dimensions [m]. Box: three edges. Ellipsoid: three radii. Cylinder, cone and capsule: radius and
-            length along z (the capsule's without its caps). Plane: empty, it is the plane z = 0. Mesh: empty.
-        vertices: corners of a mesh [m], (nv, 3).
-        triangles: indices of a mesh, (nf, 3).
-        parts: number of triangles and color of consecutive parts of a mesh; None is the visual's own color.
+            length along z (the capsule's without its caps). Plane z = 0 and mesh: empty.
+        vertices: vertices of a mesh [m], (nv, 3).
+        triangles: vertex indices of a mesh, (nf, 3).
+        parts: number of triangles and color of consecutive parts of a mesh; None selects the color of the
+            visual.
     """
 
     kind: str
@@ -58,7 +59,7 @@ class Shape:
     parts: tuple[tuple[int, Color | None], ...] = ()
 
     def half_extent(self) -> tuple[Array, Array]:
-        """Center and half edges of the bounding box in the shape's axes [m], (3,) each; zero for a plane."""
+        """Return center and half edges of the bounding box in the shape's axes [m], (3,); zero for planes."""
         if self.kind == "mesh":
             low, high = self.vertices.min(axis=0), self.vertices.max(axis=0)
             return (low + high) / 2.0, (high - low) / 2.0
@@ -75,13 +76,13 @@ class Shape:
 
 @dataclass(frozen=True)
 class Visual:
-    """A shape fixed to a joint.
+    """Shape fixed to a joint.
 
     Attributes:
-        name: name of the geometry object or of what is drawn in its place.
+        name: name of the geometry object, or of the shape that replaces it.
         joint: index of the joint that carries it, 0 for the world.
         placement: placement of the shape in the joint's frame.
-        shape: what is drawn.
+        shape: shape of the visual.
         color: red, green, blue and opacity, 0 to 1.
     """
 
@@ -92,10 +93,17 @@ class Visual:
     color: Color
 
 
-def visuals_of(geometry_model: pin.GeometryModel) -> list[Visual]:
-    """One visual for each object of a geometry model."""
+def visuals_of(geometry_model: pin.GeometryModel, most: int | None = None) -> list[Visual]:
+    """Return one visual for each object of a geometry model.
+
+    Args:
+        geometry_model: model of the shapes.
+        most: maximum number of triangles of an object; larger objects are omitted. None sets no limit.
+    """
     visuals = []
     for item in geometry_model.geometryObjects:
+        if most is not None and getattr(item.geometry, "num_tris", 0) > most:
+            continue
         shape, offset = shape_of(item.geometry, None if item.overrideMaterial else item.meshPath)
         red, green, blue, opacity = (float(value) for value in item.meshColor)
         color = (red, green, blue, opacity)
@@ -104,11 +112,11 @@ def visuals_of(geometry_model: pin.GeometryModel) -> list[Visual]:
 
 
 def shape_of(geometry: GeometryObject, mesh_path: str | None = None) -> tuple[Shape, pin.SE3]:
-    """The shape of a coal geometry, with the placement of the shape's axes in the geometry's.
+    """Return the shape of a coal geometry, with the placement of the shape's axes in those of the geometry.
 
     Args:
-        geometry: any coal geometry; one without a drawing of its own (octree) becomes its bounding box.
-        mesh_path: file that a mesh was read from, for the colors of its parts.
+        geometry: coal geometry; unsupported kinds (octree) become their bounding box.
+        mesh_path: file of a mesh, for the colors of its parts.
     """
     kind = type(geometry).__name__
     here = pin.SE3.Identity()
@@ -141,7 +149,7 @@ def _tuple(values: Any) -> tuple[float, ...]:
 
 
 def _mesh(vertices: Array, triangles: Indices, path: str | None = None) -> Shape:
-    """A mesh with equal vertices welded and flat triangles dropped; parts keep their colors."""
+    """Return a mesh with merged equal vertices and without degenerate triangles; parts keep their colors."""
     vertices = np.asarray(vertices, dtype=np.float64)
     colors = collada_parts(Path(path)) if path and path.lower().endswith(".dae") else []
     if sum(count for count, _ in colors) != len(triangles):
@@ -161,10 +169,10 @@ def _mesh(vertices: Array, triangles: Indices, path: str | None = None) -> Shape
 
 
 def collada_parts(path: Path) -> list[tuple[int, Color | None]]:
-    """Number of triangles and color of each part of a COLLADA file, in the order of its scene.
+    """Return the number of triangles and the color of each part of a COLLADA file, in the order of its scene.
 
-    A part with a texture or without a material has color None. Triangles with two equal corners do not count:
-    the mesh reader drops them. A file that cannot be read has no parts.
+    A part with a texture or without a material has color None. Triangles with two equal corners do not count,
+    because the mesh reader drops them. An unreadable file has no parts.
     """
     try:
         root = ElementTree.parse(path).getroot()
@@ -187,14 +195,14 @@ def collada_parts(path: Path) -> list[tuple[int, Color | None]]:
 
 
 def _instances(node: ElementTree.Element) -> Iterator[ElementTree.Element]:
-    """Geometries of a node, then of its children."""
+    """Yield the geometries of a node, then of its children."""
     yield from node.findall(COLLADA + "instance_geometry")
     for child in node.findall(COLLADA + "node"):
         yield from _instances(child)
 
 
 def _triangle_counts(mesh: Any) -> Iterator[tuple[int, str | None]]:
-    """Triangles that are not flat, and material symbol, of each group of a COLLADA mesh."""
+    """Yield the number of nondegenerate triangles, and the material, of each group of a COLLADA mesh."""
     sources = {item.get("id"): item for item in mesh.findall(COLLADA + "source")}
     vertices = {item.get("id"): item.find(COLLADA + "input") for item in mesh.findall(COLLADA + "vertices")}
     for group in mesh.findall(COLLADA + "triangles"):
@@ -211,7 +219,7 @@ def _triangle_counts(mesh: Any) -> Iterator[tuple[int, str | None]]:
 
 
 def _material_colors(root: ElementTree.Element) -> dict[str, Color]:
-    """Diffuse color of each material of a COLLADA file that has one."""
+    """Return the diffuse color of each material of a COLLADA file with such a color."""
     effects: dict[str, Color] = {}
     for effect in root.iter(COLLADA + "effect"):
         color = effect.find(f".//{COLLADA}diffuse/{COLLADA}color")
@@ -228,7 +236,7 @@ def _material_colors(root: ElementTree.Element) -> dict[str, Color]:
 
 
 def joint_axis(model: pin.Model, joint: int) -> tuple[Array | None, bool]:
-    """Axis of a joint of one degree of freedom in its own frame, (3,), and whether it turns; else None."""
+    """Return the axis of a one-degree-of-freedom joint, (3,) or None, and whether the joint rotates."""
     if model.joints[joint].nv != 1:
         return None, False
     data = model.joints[joint].createData()

@@ -1,4 +1,4 @@
-"""One quantity of a run over another: phase planes, friction over slip velocity and load, with its law."""
+"""Plots of one quantity over another: phase planes, and friction over slip velocity or load."""
 
 from __future__ import annotations
 
@@ -11,12 +11,14 @@ from pin_nonideal.errors import InputError, UnknownNameError, nearest
 from pin_nonideal.types import Array
 
 from .coordinates import positions, velocities
-from .signals import MAX_CURVES, left_out
+from .signals import MAX_CURVES, omission_note
 
 if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
 
 KINDS = ("phase", "friction", "load")
+# Of so many joints and laws a page carries relations.
+MOST = 16
 
 
 @dataclass(frozen=True)
@@ -24,12 +26,12 @@ class Relation:
     """Curves of one quantity over another.
 
     Attributes:
-        title: what is shown.
+        title: title of the plot.
         x: label of the horizontal axis, with its unit.
         y: label of the vertical axis, with its unit.
         curves: pairs (x, y) by label, (nt,) each.
-        bounds: what the law allows at the samples, pairs (x, largest |y|) by label, (nt,) each.
-        note: what the reader must know of the choice of curves.
+        bounds: limits of the law at the samples, pairs (x, largest |y|) by label, (nt,) each.
+        note: note on the selection of the curves.
     """
 
     title: str
@@ -40,22 +42,41 @@ class Relation:
     note: str = ""
 
 
+def available(run: Trajectory) -> list[str]:
+    """Names of the relations that a run has, one joint or law each, those that move most of each kind.
+
+    Args:
+        run: the run.
+    """
+    model = run.scene.model
+    joints = [joint for joint in range(1, model.njoints) if model.joints[joint].nv == 1]
+    joints = sorted(joints, key=lambda joint: -_spread(run, joint))[:MOST]
+    found = []
+    if run.law_forces:
+        known = friction_joints(run)
+        laws = sorted(known, key=lambda law: -_spread(run, known[law]))[:MOST]
+        kinds = ("friction", "load") if run.reactions else ("friction",)
+        found = [f"{kind} {law}" for kind in kinds for law in laws if law in run.law_forces]
+    return found + [f"phase {model.names[joint]}" for joint in sorted(joints)]
+
+
 def is_relation(item: Any) -> bool:
-    """Whether a name asks for one: "phase", "friction" or "load", alone or before a name."""
+    """Check if a name is that of a relation: "phase", "friction" or "load", alone or before a name."""
     return isinstance(item, str) and item.split(" ", 1)[0] in KINDS
 
 
 def relations_of(run: Trajectory, item: str) -> list[Relation]:
-    """The relations of one name.
+    """Return the relations of one name.
 
     Args:
-        run: the run.
-        item: "phase" of all joints, or "phase JOINT"; "friction" over slip velocity and "load" (friction over
-            what the bearing carries) of all laws in joints of one degree of freedom, or of one law by name.
+        run: run of the plot.
+        item: "phase" for all joints, or "phase JOINT"; "friction" (over slip velocity) and "load" (friction
+            over the load of the bearing) for all laws in joints of one degree of freedom, or for one law by
+            name.
 
     Raises:
         UnknownNameError: no joint or law has that name.
-        InputError: the run did not record it.
+        InputError: the run did not record the values.
     """
     kind, _, name = item.partition(" ")
     if kind == "phase":
@@ -64,7 +85,7 @@ def relations_of(run: Trajectory, item: str) -> list[Relation]:
 
 
 def _phases(run: Trajectory, name: str) -> list[Relation]:
-    """Velocity over position, one plot for each unit."""
+    """Return plots of velocity over position, one for each unit."""
     model = run.scene.model
     names = [str(joint) for joint in model.names[1:]]
     if name and name not in names:
@@ -83,13 +104,15 @@ def _phases(run: Trajectory, name: str) -> list[Relation]:
         kept = {label: pair for label, pair in curves.items() if label in rank}
         title = "Phase plane" if len(kept) > 1 else next(iter(kept))
         relations.append(
-            Relation(title, f"position [{unit}]", f"velocity [{unit}/s]", kept, note=left_out(len(curves)))
+            Relation(
+                title, f"position [{unit}]", f"velocity [{unit}/s]", kept, note=omission_note(len(curves))
+            )
         )
     return relations
 
 
 def friction_joints(run: Trajectory) -> dict[str, int]:
-    """Laws that rub in a joint of one degree of freedom, with the index of the joint."""
+    """Return the friction laws in joints of one degree of freedom, with the index of the joint."""
     model, found = run.scene.model, {}
     names = {str(joint): index for index, joint in enumerate(model.names) if index}
     for law in run.scene.laws:
@@ -103,7 +126,7 @@ def friction_joints(run: Trajectory) -> dict[str, int]:
 
 
 def _frictions(run: Trajectory, name: str, over_load: bool) -> list[Relation]:
-    """Friction of laws in joints over the slip velocity, or over the load of the bearing."""
+    """Return friction of laws in joints over the slip velocity, or over the load of the bearing."""
     kind, known = "load" if over_load else "friction", friction_joints(run)
     if name and name not in known:
         raise UnknownNameError(
@@ -112,9 +135,9 @@ def _frictions(run: Trajectory, name: str, over_load: bool) -> list[Relation]:
         )
     if not known:
         raise InputError(f'plot "{kind}" needs a law in a joint of one degree of freedom, and here is none')
-    if run.law_forces is None:
+    if not run.law_forces:
         raise InputError(f'plot "{kind}" must be recorded: pass record=("laws",) to simulate')
-    if over_load and run.reactions is None:
+    if over_load and not run.reactions:
         raise InputError('plot "load" must be recorded: pass record=("laws", "reactions") to simulate')
     chosen = [name] if name else sorted(known, key=lambda law: -_spread(run, known[law]))[:MAX_CURVES]
     by_unit: dict[str, Relation] = {}
@@ -132,7 +155,7 @@ def _frictions(run: Trajectory, name: str, over_load: bool) -> list[Relation]:
 
 
 def _broken(x: Array, y: Array, mode: Any) -> tuple[Array, Array]:
-    """A curve with a gap wherever the mode changes: between stick and slip nothing leads across."""
+    """Return a curve with a gap at each change of mode, because friction is discontinuous there."""
     if mode is None:
         return x, y
     at = np.flatnonzero(np.diff(np.asarray(mode).reshape(len(x), -1)[:, 0])) + 1
@@ -144,7 +167,7 @@ def _spread(run: Trajectory, joint: int) -> float:
 
 
 def _abscissa(run: Trajectory, joint: int, over_load: bool) -> tuple[str, Array, str]:
-    """Unit of the friction, what it is drawn over, and the label of that axis."""
+    """Return the unit of the friction, the values of the horizontal axis, and its label."""
     from .visuals import joint_axis
 
     axis, turning = joint_axis(run.scene.model, joint)

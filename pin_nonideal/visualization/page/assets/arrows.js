@@ -26,7 +26,7 @@ class Arrows {
     this.measure();
   }
 
-  /** Lengths: the largest values but for the one percent that a peak may hold. */
+  /** Sets the scale of lengths to the largest value without the top percent, which may be a peak. */
   measure() {
     this.largest = {};
     for (const unit of ["N", "N m"]) {
@@ -38,7 +38,7 @@ class Arrows {
     }
   }
 
-  /** Values and places at a time, before they are drawn. */
+  /** Computes values and positions at a time, before drawing. */
   place(at) {
     for (const arrow of this.items) {
       const world = this.kinematics.drawn(arrow.joint);
@@ -56,7 +56,7 @@ class Arrows {
     }
   }
 
-  /** Draws all: the largest as long as `reach` [m], shafts as thick as `thick` [m]. */
+  /** Draws all arrows: `reach` [m] is the length of the largest, `thick` [m] the thickness of the shafts. */
   update(reach, thick) {
     for (const arrow of this.items) {
       if (!arrow.drawn) {
@@ -76,7 +76,7 @@ class Arrows {
     this.heads.set(arrow.head, matrix.compose(arrow.place.clone().addScaledVector(arrow.along, length - 7 * wide), turn, new THREE.Vector3(wide, wide, wide)));
   }
 
-  /** An arc about the moment, opened up to 300 degrees by its size. */
+  /** Draws an arc about the moment; its angle is proportional to the moment, up to 300 degrees. */
   drawArc(arrow, radius, thick) {
     const { THREE } = this, matrix = new THREE.Matrix4(), z = new THREE.Vector3(0, 0, 1), wide = Math.min(thick, radius / 9);
     const axis = arrow.vector.clone().normalize(), opened = Math.min(arrow.share * Math.min(this.scale, 1), 1) * ARC.sweep;
@@ -94,7 +94,7 @@ class Arrows {
     arrow.tip.copy(from).addScaledVector(arrow.along, 7 * small);
   }
 
-  /** Numbers beyond the tips, or beside or before them where those are covered, the larger ones first; one without room is left out. */
+  /** Places numbers beyond the tips, or beside or before covered tips, larger ones first; numbers without space are hidden. */
   placeLabels(onScreen) {
     const drawn = this.items.filter((arrow) => arrow.drawn).sort((a, b) => b.share - a.share), taken = [];
     const ends = drawn.map((arrow) => [onScreen(arrow.place), onScreen(arrow.tip)]), spots = ends.flat().filter(Boolean);

@@ -1,4 +1,4 @@
-// Axes: round steps, canvases, the span of time that is shown, and what the pointer does on a time axis.
+// Axes: round steps, canvases, the visible time span, and pointer events of a time axis.
 
 /** Round steps that divide a range into about `count` parts. */
 function roundSteps(low, high, count) {
@@ -21,17 +21,17 @@ function decades(low, high) {
   return { step, steps };
 }
 
-/** A color of the page's style, as it is in the browser's light or dark setting. */
+/** Color of the page's style in the light or dark setting of the browser. */
 const ink = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 
-/** A color of a curve, lighter in the browser's dark setting. */
+/** Color of a curve, lighter in the dark setting of the browser. */
 function onPaper(color) {
   if (!matchMedia("(prefers-color-scheme: dark)").matches) return color;
   const mixed = [1, 3, 5].map((i) => Math.round(0.55 * parseInt(color.slice(i, i + 2), 16) + 0.45 * 255));
   return `rgb(${mixed.join()})`;
 }
 
-/** A canvas in device pixels, with its context scaled to CSS pixels. */
+/** Resizes a canvas to device pixels, with its context scaled to CSS pixels. */
 function fitCanvas(canvas) {
   const ratio = window.devicePixelRatio || 1, width = canvas.clientWidth, height = canvas.clientHeight;
   canvas.width = Math.round(width * ratio); canvas.height = Math.round(height * ratio);
@@ -41,7 +41,7 @@ function fitCanvas(canvas) {
   return { context, width, height };
 }
 
-/** The part of the run that the time axes show; all of them follow it. */
+/** Visible part of the run, shared by all time axes. */
 class Span {
   constructor(start, end) { Object.assign(this, { full: [start, end], start, end, changed: () => {} }); }
 
@@ -56,7 +56,7 @@ class Span {
   pan(by) { this.set(this.start + by, this.end + by); }
   reset() { this.set(...this.full); }
 
-  /** Moves on so that a time is in view. */
+  /** Moves the span so that a time is visible. */
   show(time) {
     if (time >= this.start && time <= this.end) return;
     const length = this.end - this.start;
@@ -64,7 +64,7 @@ class Span {
   }
 }
 
-/** The horizontal axis of a canvas; seek(t), hover(t or null, event) tell what the pointer does; wheel and shift move the span. */
+/** Horizontal axis of a canvas. The callbacks seek(t) and hover(t or null, event) report the pointer; wheel and shift move the span. */
 class TimeAxis {
   constructor(span, canvas, seek, hover) {
     Object.assign(this, { span, left: 8, right: 8 });
@@ -98,7 +98,7 @@ class TimeAxis {
     return start + ((x - this.left) / Math.max(this.right - this.left, 1)) * (end - start);
   }
 
-  /** Labels of round times, or those and lines down to `bottom`. */
+  /** Draws labels of round times, with lines down to `bottom` if given. */
   draw(c, top, width, lines = null) {
     const { start, end } = this.span, rows = end > start ? roundSteps(start, end, Math.max(2, Math.min(12, (this.right - this.left) / 90))) : { steps: [start], step: 1 };
     c.textBaseline = "top"; c.textAlign = "center";
@@ -112,7 +112,7 @@ class TimeAxis {
   }
 }
 
-/** Puts the tip at a place in the window, inside its edges. */
+/** Places the tip at a position in the window, inside its edges. */
 function placeTip(tip, clientX, clientY) {
   const stage = tip.parentElement.getBoundingClientRect();
   const left = Math.max(4, Math.min(stage.width - tip.offsetWidth - 4, clientX - stage.left - tip.offsetWidth / 2));

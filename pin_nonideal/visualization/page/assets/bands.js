@@ -1,7 +1,9 @@
-// A band for each element that sticks or slips, colored by its mode; pieces thinner than a pixel are drawn by their shares.
+// Band for each frictional element, colored by its mode; intervals shorter than a pixel are drawn by their shares.
 
-const OPEN = 2; // the mode of a contact without a force
+const OPEN = 2; // mode of an open contact
 const BAND = 13; // height of a band with its gap [pixels]
+// Where the bar of a mode begins below the top of its band, and how tall it is: slip + is above, slip - below, stick between them.
+const SHAPES = { 1: [0, 0.5], [-1]: [0.5, 0.5], 0: [0.3, 0.4], 2: [0.45, 0.1], 3: [0, 1] };
 
 class Bands {
   constructor(run, span, canvas, tip, seek, hover) {
@@ -30,7 +32,7 @@ class Bands {
     placeTip(this.tip, event.clientX, this.canvas.parentElement.getBoundingClientRect().top - 8 - this.tip.offsetHeight);
   }
 
-  /** Room that the names take at the left. */
+  /** Width of the names at the left. */
   margin() {
     if (!this.bands.length) return 8;
     const c = this.canvas.getContext("2d");
@@ -61,8 +63,8 @@ class Bands {
     const first = lastBelow(band.starts, axis.span.start);
     for (let k = first; k < band.starts.length && (k === first || band.starts[k] <= axis.span.end); k++) {
       const from = Math.max(axis.x(band.starts[k]), axis.left), to = Math.min(axis.x(k + 1 < band.starts.length ? band.starts[k + 1] : this.end), axis.right);
-      const { color } = this.look(band.modes[k]);
-      if (to - from >= 1.5) { c.fillStyle = color; c.fillRect(from, top + 1, to - from, tall); continue; }
+      const { color } = this.look(band.modes[k]), [rise, part] = SHAPES[band.modes[k]] || [0, 1];
+      if (to - from >= 1.5) { c.fillStyle = color; c.fillRect(from, top + 1 + rise * tall, to - from, part * tall); continue; }
       const column = Math.floor((from + to) / 2), own = shares.get(column) || new Map();
       own.set(color, (own.get(color) || 0) + Math.max(to - from, 1e-4));
       shares.set(column, own);

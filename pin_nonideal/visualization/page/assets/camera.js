@@ -1,4 +1,4 @@
-// The camera: it circles around a target, with the world's up direction kept upright.
+// Camera that orbits a target and keeps the up direction of the world upright.
 
 class Orbit {
   /** changed() is called after every move of the camera. */
@@ -12,7 +12,7 @@ class Orbit {
     this.target = new THREE.Vector3();
     this.azimuth = 0; this.elevation = 0.4; this.distance = 1;
     this.pointers = new Map();
-    this.moved = false; // by hand: then the view is not framed anew
+    this.moved = false; // moved by hand; such a view is not framed again
     camera.up.copy(this.up);
     element.addEventListener("pointerdown", (e) => { element.setPointerCapture(e.pointerId); this.pointers.set(e.pointerId, e); });
     for (const name of ["pointerup", "pointercancel"])
@@ -43,7 +43,7 @@ class Orbit {
     this.changed();
   }
 
-  /** Looks along a direction so that all of some points just fit into what is not covered of the view, by parts of its width and height. */
+  /** Sets a direction and fits all points into the uncovered part of the view; margins are fractions of its width and height. */
   frame(points, direction, { right: beside, top: above, bottom: below }) {
     const away = (this.away = direction.clone().normalize());
     this.elevation = Math.asin(Math.max(-0.999, Math.min(0.999, away.dot(this.up))));

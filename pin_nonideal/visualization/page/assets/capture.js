@@ -1,4 +1,4 @@
-// The view taken away: a picture, or a video of it while it plays.
+// Capture of the view: a picture, or a video during playback.
 
 class Capture {
   constructor(player) {
@@ -8,11 +8,11 @@ class Capture {
     element("video").addEventListener("click", () => (this.recorder ? this.recorder.stop() : this.record().then((blob) => this.save(blob, "webm"))));
   }
 
-  /** The view with its background, numbers, title and time on one canvas. */
+  /** Draws the view with its background, numbers, title and time on one canvas. */
   canvas(into = document.createElement("canvas")) {
     const { stage, run } = this.player, { canvas } = stage, ratio = canvas.width / Math.max(canvas.clientWidth, 1), c = into.getContext("2d", { willReadFrequently: true });
     stage.dirty = true;
-    stage.render(); // what WebGL has drawn lasts until the end of this task
+    stage.render(); // WebGL keeps the drawn image until the end of this task
     if (into.width !== canvas.width || into.height !== canvas.height) { into.width = canvas.width; into.height = canvas.height; }
     c.putImageData(this.pixels(into), 0, 0);
     c.setTransform(ratio, 0, 0, ratio, 0, 0);
@@ -27,7 +27,7 @@ class Capture {
     return into;
   }
 
-  /** What WebGL has drawn, read back at once, over the background: a 2D canvas takes ten times as long to fetch it. */
+  /** Reads the WebGL image and blends it over the background; reading through a 2D canvas is ten times slower. */
   pixels({ width, height }) {
     const gl = this.player.stage.renderer.getContext();
     if (!this.image || this.image.width !== width || this.image.height !== height) {
@@ -47,7 +47,7 @@ class Capture {
     return this.image;
   }
 
-  /** The background, a pixel wide. */
+  /** Background, one pixel wide. */
   sky(height) {
     const colors = [0, 1, 2].map((i) => ink(`sky${i}`)), key = [height, ...colors].join();
     if (this.skyOf !== key) {
@@ -61,10 +61,10 @@ class Capture {
     return this.skyColumn;
   }
 
-  /** The same, on one canvas for all. */
+  /** Draws the view on a canvas that is reused. */
   still() { return this.canvas((this.page = this.page || document.createElement("canvas"))); }
 
-  /** A video of the whole run, or of the part that is repeated, at the chosen speed. */
+  /** Records a video of the whole run, or of the repeated part, at the current speed. */
   record(rate = 30) {
     const { player } = this, into = this.canvas(), [from, to] = player.loop || [player.start, player.end], parts = [];
     const type = ["video/webm;codecs=vp9", "video/webm;codecs=vp8", "video/webm"].find((one) => MediaRecorder.isTypeSupported(one));
@@ -100,7 +100,7 @@ class Capture {
   }
 }
 
-/** A part of a color over another one, of which `left` of 255 is seen. */
+/** Blends a color component over another one, which is visible by `left` of 255. */
 function from8(over, under, left) { return over + (under * left) / 255; }
 
 /** Bytes as base64 text. */

@@ -1,7 +1,8 @@
-// Friction where it acts: rings colored by mode, filled as far as the limit is used; cones of contacts; flashes of impacts.
+// Friction at its position: rings with the color of the mode and the used part of the limit, cones of contacts, flashes of impacts.
 
-const RING = 24; // pieces of a ring
+const RING = 24; // segments of a ring
 const FLASHES = 24;
+const SLIPPING = 0.12, STUCK = 0.26; // thickness of a ring, by its radius
 
 class Elements {
   constructor(THREE, run, world, groups, marks) {
@@ -32,7 +33,7 @@ class Elements {
       const axis = new THREE.Vector3(...threeAt(item.axis, at)).transformDirection(this.groups[item.axis_joint].matrixWorld);
       const shown = item.shown && (item.stays || mode !== 2);
       const turn = new THREE.Quaternion().setFromUnitVectors(z, axis), filled = item.share ? Math.max(blend(item.share), 1 / RING) : 1;
-      this.drawRing(i, shown, place, turn, radius, (k) => ((k + 0.5) / RING < filled ? color : rest));
+      this.drawRing(i, shown, place, turn, radius, mode === 0 ? STUCK : SLIPPING, (k) => ((k + 0.5) / RING < filled ? color : rest));
       const height = item.normal && item.mu && arrows.shown ? reach * arrows.scale * Math.min(Math.max(blend(item.normal), 0) / (arrows.largest.N || 1), 1.6) : 0;
       if (!shown || !(height > 0) || mode === 2) { this.cones.hide(i); return; }
       this.cones.color(i, color);
@@ -41,24 +42,24 @@ class Elements {
     this.drawFlashes(time, radius);
   }
 
-  drawRing(i, shown, place, turn, radius, colorOf) {
+  drawRing(i, shown, place, turn, radius, thick, colorOf) {
     const { THREE } = this, matrix = new THREE.Matrix4(), z = new THREE.Vector3(0, 0, 1);
     const point = (k) => new THREE.Vector3(Math.cos((2 * Math.PI * k) / RING), Math.sin((2 * Math.PI * k) / RING), 0).multiplyScalar(radius).applyQuaternion(turn).add(place);
     for (let k = 0; k < RING; k++) {
       if (!shown) { this.rings.hide(RING * i + k); continue; }
       const from = point(k), way = point(k + 1).sub(from), length = way.length() || 1e-12;
       this.rings.color(RING * i + k, colorOf(k));
-      this.rings.set(RING * i + k, matrix.compose(from, new THREE.Quaternion().setFromUnitVectors(z, way.divideScalar(length)), new THREE.Vector3(0.16 * radius, 0.16 * radius, 1.05 * length)));
+      this.rings.set(RING * i + k, matrix.compose(from, new THREE.Quaternion().setFromUnitVectors(z, way.divideScalar(length)), new THREE.Vector3(thick * radius, thick * radius, 1.05 * length)));
     }
   }
 
-  /** Colors of the pieces of a ring, as in the style. */
+  /** Colors of the segments of a ring, in the notation of the style. */
   ringColors(i) {
     const color = new this.THREE.Color();
     return Array.from({ length: RING }, (_, k) => { this.rings.mesh.getColorAt(RING * i + k, color); return `#${color.convertLinearToSRGB().getHexString()}`; });
   }
 
-  /** Impacts of the last instants as spheres that shrink, the harder the larger. */
+  /** Draws recent impacts as shrinking spheres with a size by the impulse. */
   drawFlashes(time, radius) {
     this.flashing = 0;
     if (!this.flashes.count) return;

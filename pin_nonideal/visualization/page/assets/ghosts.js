@@ -1,6 +1,6 @@
-// Other runs beside the first: ghosts over it, or the same side by side, on one time line.
+// Other runs: ghosts over the first run, or beside it, on one time axis.
 
-const MANY = 4; // more ghosts than this are fainter
+const MANY = 4; // a larger number of ghosts is fainter
 
 class Ghosts {
   constructor(THREE, run, world) {
@@ -13,12 +13,12 @@ class Ghosts {
     });
   }
 
-  /** What `Bodies` draws of them. */
+  /** Entries of the ghosts for `Bodies`. */
   entries() {
     return this.items.flatMap(({ run, kinematics, tint }, i) => run.visuals.map((visual) => ({ visual, kinematics, tint, run: i + 1 })));
   }
 
-  /** A run that has ended stays where it ended. */
+  /** Poses all ghosts; a run that has ended keeps its last pose. */
   pose(time) {
     for (const { kinematics } of this.items) kinematics.pose(kinematics.at(time));
   }
@@ -32,10 +32,10 @@ class Ghosts {
     this.items.forEach((item, i) => item.root.position.copy(right).multiplyScalar(apart ? (i + 1) * step : 0));
   }
 
-  /** How far the runs stand beside the first. */
+  /** Displacements of the runs beside the first. */
   offsets() { return this.apart ? this.items.map((item) => item.root.position) : []; }
 
-  /** Places of the joints of all runs at some times, for the framing. */
+  /** Positions of the joints of all runs at some times, for framing. */
   outline() {
     const places = [];
     for (const { kinematics } of this.items)

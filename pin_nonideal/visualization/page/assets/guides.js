@@ -1,6 +1,6 @@
-// What constraints of a user keep a point on: a curve, a surface, or the disk of allowed directions; and trails.
+// Geometry of user constraints on a point: a curve, a surface, or the disk of allowed directions; and trails.
 
-/** Whether half of the pieces of a path turn by more than 0.6 rad: frames too far apart for its curve. */
+/** Checks if more than half of the corners of a path exceed 0.6 rad, because its frames are too far apart. */
 function ragged(places) {
   const count = places.length / 3 - 2, step = (k) => [0, 1, 2].map((c) => places[3 * k + 3 + c] - places[3 * k + c]);
   let turned = 0;
@@ -25,7 +25,7 @@ class Guides {
     for (const trail of run.trails.slice(0, 12)) this.addTrail(trail.joint, trail.point);
   }
 
-  /** The path of a point on a joint: bold where it has been, faint where it will be; none where even all frames are too few to tell it. */
+  /** Adds the path of a point on a joint, bold for the past and faint for the future; no path if all frames are too few. */
   addTrail(joint, point) {
     const { places, times } = [3000, 20000].map((most) => this.kinematics.path(joint, point, most)).find((path) => !ragged(path.places)) || {};
     if (!places) return;

@@ -1,6 +1,6 @@
-// Many alike in one draw call: bodies of one shape, balls, cylinders, cones.
+// Many equal objects in one draw call: bodies of one shape, balls, cylinders, cones.
 
-/** One shape drawn many times; a ghost shines faintly through what hides it. */
+/** One shape drawn many times; with a ghost it is faintly visible behind other bodies. */
 class Pool {
   constructor(THREE, world, geometry, material, count, ghost = 0) {
     this.count = count;
@@ -22,7 +22,7 @@ class Pool {
   color(i, color) { this.mesh.setColorAt(i, color); this.mesh.instanceColor.needsUpdate = true; }
 }
 
-/** Bodies of some runs: visuals of one shape and opacity are one draw call. */
+/** Bodies of some runs; visuals of one shape and opacity are one draw call. */
 class Bodies {
   /** entries: {visual, kinematics, tint, run} each; tint colors the ghosts of other runs. */
   constructor(THREE, shapes, entries, world, size) {
@@ -50,7 +50,7 @@ class Bodies {
     });
   }
 
-  /** Where an item is, or is drawn. */
+  /** World matrix of an item, or of its drawn position. */
   place({ kinematics, joint, matrix, wrap }, drawn = true) {
     return new this.THREE.Matrix4().multiplyMatrices(drawn && wrap ? kinematics.drawn(joint) : kinematics.groups[joint].matrixWorld, matrix);
   }
@@ -59,7 +59,7 @@ class Bodies {
     for (const item of this.items) if (item.shown) item.pool.set(item.at, this.place(item)); else item.pool.hide(item.at);
   }
 
-  /** All bodies half transparent, or as they are. */
+  /** Multiplies the opacity of all bodies by a factor. */
   fade(opacity) {
     for (const { mesh } of this.pools) {
       const own = (mesh.userData.opacity = mesh.userData.opacity ?? mesh.material.opacity);

@@ -1,6 +1,6 @@
-// How the bodies move: one group a joint, nested as the tree, posed by coordinates blended between the frames.
+// Kinematics of the bodies: one group for each joint, nested as the tree, posed by coordinates interpolated between the frames.
 
-/** Weights of the frames k - 1, k, k + 1, k + 2 at a part of the interval [k, k + 1]: Hermite's cubic with the slopes of parabolas. */
+/** Weights of the frames k - 1, k, k + 1, k + 2 at a part of the interval [k, k + 1]: cubic Hermite interpolation with slopes of parabolas. */
 function blendWeights(times, k, part) {
   const h = times[k + 1] - times[k], before = k > 0 ? times[k] - times[k - 1] : 0, after = k + 2 < times.length ? times[k + 2] - times[k + 1] : 0;
   const chord = [0, -1, 1, 0]; // slopes times h
@@ -35,7 +35,7 @@ class Kinematics {
     this.one = new THREE.Vector3(1, 1, 1);
   }
 
-  /** The frames around a time, and how they are blended. */
+  /** Returns the frames around a time, and their interpolation weights. */
   at(time) {
     const found = bracket(this.times, time);
     if (this.run.held && this.run.held[found.k] && found.part < 1) found.part = 0;
@@ -53,7 +53,7 @@ class Kinematics {
     return sum;
   }
 
-  /** Placement of a joint's frame in the one before it. */
+  /** Placement of a joint's frame in the frame of its parent. */
   local(joint, at, into) {
     const { THREE } = this, place = new THREE.Vector3(), turn = new THREE.Quaternion();
     if (joint.axis) {
@@ -72,7 +72,7 @@ class Kinematics {
     this.groups[0].parent.updateMatrixWorld(true);
   }
 
-  /** Placement of what a joint carries as it is drawn: a belt whose pattern repeats stays within one rib of where it started. */
+  /** Drawn placement of a joint: a belt with a repeated pattern stays within one rib of its start. */
   drawn(joint) {
     const world = this.groups[joint].matrixWorld, wrap = this.wraps.get(joint);
     if (!wrap) return world;
@@ -84,7 +84,7 @@ class Kinematics {
   /** Placements of all joints in the world, by name. */
   poses() { return Object.fromEntries(this.groups.map((group) => [group.name, matrixRows(group.matrixWorld)])); }
 
-  /** Path of a point on a joint over all frames, at most `most` of them, as a flat array and the frames taken. */
+  /** Path of a point on a joint over at most `most` frames, as a flat array, with the times of these frames. */
   path(joint, point, most) {
     const { THREE, run } = this, count = this.times.length, stride = Math.max(1, Math.ceil(count / most));
     const chain = [], frames = [], places = [], matrix = new THREE.Matrix4(), step = new THREE.Matrix4(), place = new THREE.Vector3();
@@ -100,7 +100,7 @@ class Kinematics {
     return { places, times: frames.map((k) => this.times[k]) };
   }
 
-  /** Center of mass of the joints that stay in view, or the origin of one joint. */
+  /** Center of mass of the joints in view, or the origin of one joint. */
   center(joint) {
     const { THREE, run } = this, sum = new THREE.Vector3(), place = new THREE.Vector3();
     if (joint) return sum.setFromMatrixPosition(this.groups[joint].matrixWorld);

@@ -1,4 +1,4 @@
-// Where constraints and springs act: balls at anchors and contacts, rods, coils.
+// Marks of constraints and springs: balls at anchors and contacts, rods, coils.
 
 class Marks {
   constructor(THREE, run, world, groups, looks) {
@@ -21,7 +21,7 @@ class Marks {
     });
   }
 
-  /** Places of both ends of all marks between two frames, and which of them mean nothing there. */
+  /** Computes the end points of all marks between two frames, and hides undefined ones. */
   place(at) {
     for (const item of this.items) {
       const { joint1, joint2, points, places, path, closed } = item;
@@ -32,7 +32,7 @@ class Marks {
     }
   }
 
-  /** The largest distance between the two points of an anchor, along the axes that it holds [m]; null without anchors. */
+  /** Largest distance between the two points of an anchor, along its constrained axes [m]; null without anchors. */
   gap() {
     const tied = this.items.filter((item) => item.axes.length), axis = new this.THREE.Vector3();
     const gaps = tied.map(({ axes, joint2, places: [a, b] }) => {
@@ -42,7 +42,7 @@ class Marks {
     return gaps.length ? Math.max(...gaps) : null;
   }
 
-  /** Draws them, balls with a radius [m]. */
+  /** Draws the marks; balls have the given radius [m]. */
   update(radius) {
     const { THREE } = this, flat = new THREE.Quaternion(), matrix = new THREE.Matrix4(), z = new THREE.Vector3(0, 0, 1);
     this.items.forEach((item, i) => {

@@ -1,6 +1,6 @@
-// Numbers for a reader, and places in ascending lists.
+// Formatted numbers, and searches in ascending arrays.
 
-/** A number for a reader: four digits, and a power of ten when it is very small or large. */
+/** Number with four digits, and with a power of ten if it is very small or large. */
 function readable(x) {
   if (!Number.isFinite(x)) return String(x);
   const size = Math.abs(x);
@@ -9,7 +9,7 @@ function readable(x) {
   return String(+x.toPrecision(4));
 }
 
-/** The same with all four digits, so that a changing number keeps its width. */
+/** Number with all four digits, so that a changing number keeps its width. */
 function steady(x) {
   const size = Math.abs(x);
   return size >= 1e-3 && size < 1e4 ? x.toPrecision(4) : readable(x);
@@ -25,20 +25,20 @@ function lastBelow(values, x) {
   return low;
 }
 
-/** The interval [k, k + 1] of an ascending array around x, and how far x lies in it: 0 to 1. */
+/** Interval [k, k + 1] of an ascending array around x, and the relative position of x in it, 0 to 1. */
 function bracket(values, x) {
   const k = Math.min(lastBelow(values, x), Math.max(values.length - 2, 0));
   const next = Math.min(k + 1, values.length - 1), length = values[next] - values[k];
   return { k, next, part: length > 0 ? Math.min(Math.max((x - values[k]) / length, 0), 1) : 0 };
 }
 
-/** Three numbers between two frames, of an array that holds them for each frame, or once for all. */
+/** Three numbers between two frames, from an array with values for each frame, or with one value. */
 function threeAt(values, at) {
   if (values.length === 3) return values;
   return [0, 1, 2].map((i) => (1 - at.part) * values[3 * at.k + i] + at.part * values[3 * at.next + i]);
 }
 
-/** Fixed digits that tell a thousandth part of a span. */
+/** Number of digits that resolve a thousandth of a span. */
 function digitsFor(span) {
   return span > 0 ? Math.max(0, Math.min(9, Math.ceil(3 - Math.log10(span)))) : 3;
 }

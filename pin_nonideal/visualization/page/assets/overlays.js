@@ -1,4 +1,4 @@
-// What can be drawn on top of the bodies: axes of joints, centers of mass, boxes of inertia, collision shapes.
+// Optional overlays on the bodies: axes of joints, centers of mass, boxes of inertia, collision shapes.
 
 const AXIS_COLORS = ["#dc2626", "#16a34a", "#2563eb"];
 
@@ -20,7 +20,7 @@ class Overlays {
     this.bodies = bodies;
   }
 
-  /** Draws what is on: axes as long as `reach` [m], balls with a radius [m]. */
+  /** Draws the enabled overlays: axes of length `reach` [m], balls with a radius [m]. */
   update(reach, radius) {
     const { THREE, on } = this, matrix = new THREE.Matrix4(), place = new THREE.Vector3(), turn = new THREE.Quaternion(), unit = new THREE.Vector3();
     this.bodies.forEach(({ i }, b) => {

@@ -1,10 +1,10 @@
-// The panel: what is in the scene, to be searched, shown, hidden, isolated and followed; signals to be plotted; views.
+// Panel: content of the scene, to search, show, hide, isolate and follow; signals to plot; views.
 
 const VIEWS = { usual: null, front: [0, -1, 0.15], side: [1, 0, 0.15], top: [0, -0.02, 1] };
 
 class Panel {
   constructor(player) {
-    Object.assign(this, { player, stage: player.stage, box: element("panel"), rows: [], chosen: new Map() });
+    Object.assign(this, { player, stage: player.stage, box: element("panel"), rows: [], chosen: new Map(), sections: new Map(), opened: null });
     this.fill();
     element("search").addEventListener("input", (event) => this.search(event.target.value));
     element("panel-toggle").addEventListener("click", () => this.toggle());
@@ -21,10 +21,12 @@ class Panel {
   toggle() {
     this.box.hidden = !this.box.hidden;
     element("panel-toggle").setAttribute("aria-expanded", String(!this.box.hidden));
+    document.querySelector("main").classList.toggle("panel-open", !this.box.hidden);
+    this.player.resize();
     if (!this.box.hidden) element("search").focus();
   }
 
-  /** A direction given for z upwards, where something else is up. */
+  /** Rotates a direction given for z upwards to the up direction of the scene. */
   upright(direction) {
     const { THREE, up } = this.stage, turn = new THREE.Quaternion().setFromUnitVectors(new THREE.Vector3(0, 0, 1), up);
     return new THREE.Vector3(...direction).applyQuaternion(turn).toArray();
@@ -49,10 +51,11 @@ class Panel {
     for (const item of this.stage.elements.items) this.addRow("elements", item.name, 0, [item]);
     for (const arrow of this.stage.arrows.items) this.addRow("arrows", `${arrow.name}, ${arrow.kind} [${arrow.unit}]`, 0, [arrow]);
     run.signals.forEach((signal) => this.addSignal(signal));
-    for (const group of ["bodies", "constraints", "elements", "arrows", "signals"]) element(`tree-${group}`).parentElement.hidden = !element(`tree-${group}`).children.length;
+    run.relations.forEach((relation) => this.addRelation(relation));
+    for (const group of ["bodies", "constraints", "elements", "arrows", "signals", "relations"]) element(`tree-${group}`).parentElement.hidden = !element(`tree-${group}`).children.length;
   }
 
-  /** A row of the tree: a box that shows or hides its items, a button that shows nothing else of its kind, and others. */
+  /** Adds a row of the tree: a box that shows or hides its items, a button that hides all others of the group, and other buttons. */
   addRow(group, name, depth, items, actions = []) {
     const row = document.createElement("li"), label = document.createElement("label"), input = document.createElement("input");
     input.type = "checkbox"; input.checked = true;
@@ -76,41 +79,102 @@ class Panel {
 
   follow(joint) { this.stage.follow(joint); this.player.showToggles(); }
 
-  /** Draws the path of a body's center of mass, or takes it away. */
+  /** Draws or removes the path of a body's center of mass. */
   path(joint) {
     const { guides } = this.stage, line = guides.trails.get(joint);
     if (line) line.mesh.visible = !line.mesh.visible; else { guides.addTrail(joint, this.player.run.joints[joint].lever); this.stage.resize(); }
     this.redraw();
   }
 
-  addSignal(signal) {
+  /** A row with a box that plots something, in a list. */
+  addChoice(list, group, text, words, checked, plot) {
     const row = document.createElement("li"), label = row.appendChild(document.createElement("label")), input = document.createElement("input");
     input.type = "checkbox";
-    label.append(input, `${signal.label} [${signal.unit}]`);
-    input.addEventListener("change", () => this.plot(signal, input.checked));
-    element("tree-signals").append(row);
-    this.rows.push({ group: "signals", name: signal.label, row, set: () => {} });
+    input.checked = checked;
+    label.append(input, text);
+    input.addEventListener("change", () => plot(input.checked));
+    list.append(row);
+    this.rows.push({ group, name: words, row, set: () => {} });
   }
 
-  /** Adds a signal to the plot of its unit, or takes it out; a plot without curves goes. */
+  addSignal(signal) {
+    const { label, unit, section, words } = signal;
+    this.addChoice(this.section(section), "signals", unit ? `${label} [${unit}]` : label, `${label} ${words} ${section}`, false, (on) => this.plot(signal, on));
+  }
+
+  /** The list of a section of signals. */
+  section(name) {
+    const known = this.sections.get(name);
+    if (known) return known;
+    const box = element("tree-signals").appendChild(document.createElement("details")), title = box.appendChild(document.createElement("summary"));
+    title.textContent = name;
+    const list = box.appendChild(document.createElement("ul"));
+    this.sections.set(name, list);
+    return list;
+  }
+
+  /** Adds a signal to the plot of its unit, or removes it; a plot that was made for it is removed when it is empty. */
   plot(signal, wanted) {
-    const { player } = this, old = this.chosen.get(signal.unit) || { signals: [] };
-    const signals = wanted ? [...old.signals, signal] : old.signals.filter((one) => one !== signal);
-    if (old.plot) { old.plot.box.remove(); player.plots.splice(player.plots.indexOf(old.plot), 1); }
-    this.chosen.delete(signal.unit);
-    if (signals.length) {
-      const curves = signals.map(({ label, t, values }) => ({ label, t, values }));
-      const plot = player.newPlot({ title: "Chosen", unit: signal.unit, note: "", log: false, t: signals[0].t, curves });
-      this.chosen.set(signal.unit, { signals, plot });
-      player.plots.push(plot);
-      element("plots").classList.remove("off");
+    const { player } = this;
+    if (wanted) {
+      let plot = player.plots.find((one) => !one.log && !one.bounds && one.unit === signal.unit);
+      if (!plot) {
+        plot = player.newPlot({ title: "Chosen", unit: signal.unit, note: "", log: false, t: signal.t, curves: [], made: true });
+        player.plots.push(plot);
+      }
+      const curve = plot.add({ label: signal.label, t: signal.t, values: signal.values });
+      this.chosen.set(signal, { plot, curve });
+      this.show(plot);
+    } else {
+      const { plot, curve } = this.chosen.get(signal);
+      this.chosen.delete(signal);
+      plot.remove(curve);
+      if (plot.made && !plot.curves.length) this.drop(plot);
     }
     player.resize();
     player.showToggles();
   }
 
+  addRelation(relation) {
+    const { player } = this, words = { friction: "friction over velocity torque law", load: "friction over load law", phase: "phase plane velocity over position" };
+    const add = () => {
+      const plot = new Relation(relation, element("plots"), player.run.looks.curves, player.seekByHand);
+      player.plots.push(plot);
+      this.chosen.set(relation, { plot });
+      return plot;
+    };
+    if (relation.shown) add();
+    this.addChoice(element("tree-relations"), "relations", relation.name, `${relation.name} ${words[relation.name.split(" ")[0]]}`, relation.shown, (on) => {
+      if (on) this.show(add()); else { this.drop(this.chosen.get(relation).plot); this.chosen.delete(relation); }
+      player.resize();
+      player.showToggles();
+    });
+  }
+
+  /** Brings a plot into what is seen of all. */
+  show(plot) {
+    element("plots").classList.remove("off");
+    element("plots-toggle").hidden = false;
+    this.player.resize();
+    plot.box.scrollIntoView({ block: "nearest" });
+  }
+
+  drop(plot) {
+    plot.box.remove();
+    this.player.plots.splice(this.player.plots.indexOf(plot), 1);
+  }
+
+  /** Leaves the rows that have all words of a text, and opens the sections that hold them. */
   search(text) {
-    const wanted = text.trim().toLowerCase();
-    for (const { name, row } of this.rows) row.hidden = !name.toLowerCase().includes(wanted);
+    const wanted = text.trim().toLowerCase().split(/\s+/).filter(Boolean);
+    for (const { name, row } of this.rows) row.hidden = !wanted.every((word) => name.toLowerCase().includes(word));
+    const boxes = [...this.box.querySelectorAll("details")];
+    if (wanted.length && !this.opened) this.opened = new Map(boxes.map((box) => [box, box.open]));
+    for (const box of boxes) {
+      const rows = [...box.querySelectorAll("li")], hits = rows.some((row) => !row.hidden);
+      if (rows.length) box.hidden = !hits;
+      if (wanted.length) box.open = hits; else if (this.opened) box.open = this.opened.get(box);
+    }
+    if (!wanted.length) this.opened = null;
   }
 }

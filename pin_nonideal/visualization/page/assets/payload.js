@@ -1,4 +1,4 @@
-// What the page carries: gzip or plain bytes in base64; the run as a JSON header followed by typed arrays.
+// Content of the page: gzip or plain bytes in base64; the run is a JSON header followed by typed arrays.
 
 function fromBase64(text) {
   const raw = atob(text.trim()), bytes = new Uint8Array(raw.length);
@@ -18,14 +18,14 @@ async function carried(id) {
   return ZIPPED ? unzip(bytes) : bytes;
 }
 
-/** Runs what an element of the page carries. */
+/** Runs the script in an element of the page. */
 async function runScript(id) {
   const script = document.createElement("script");
   script.textContent = new TextDecoder().decode(await carried(id));
   document.head.appendChild(script);
 }
 
-/** The run: its header with every array reference {array: [type, offset, length]} replaced by the array. */
+/** Returns the run: its header, in which each array reference {array: [type, offset, length]} is replaced by the array. */
 async function loadRun() {
   const bytes = await carried("payload");
   const headerLength = new DataView(bytes.buffer, bytes.byteOffset).getUint32(0, true);

@@ -1,8 +1,9 @@
-// The player: one time for the view, the time line and the plots; buttons and keys drive it.
+// Player: one time for the view, the time axis and the plots, controlled by buttons and keys.
 
 const ICONS = { play: "M7 4.5v15l13-7.5z", pause: "M6 5h4v14H6zM14 5h4v14h-4z" };
 const SPEEDS = Array.from({ length: 27 }, (_, i) => Number(`${[1, 2, 5][i % 3]}e${Math.floor(i / 3) - 4}`)).slice(0, 25);
-const PLAYED = [5, 15]; // a run is played in so many seconds
+const LEAST_CURVE = 100; // minimum height of a curve [pixels]
+const PLAYED = [5, 15]; // shortest and longest duration of playback at the default speed [s]
 const element = (id) => document.getElementById(id);
 
 class Player {
@@ -26,13 +27,13 @@ class Player {
     this.resize();
     this.stage.resetView();
     this.panel = new Panel(this);
-    this.address = new Address(this);
+    this.address = new UrlState(this);
     this.capture = new Capture(this);
   }
 
   newPlot(plot) { return new Plot(plot, this.span, element("plots"), this.run.looks.curves, this.seekByHand, this.hovered); }
 
-  /** The speed at which the run takes 5 to 15 s; 1 when it does so by itself. */
+  /** Speed at which the run takes 5 to 15 s; 1 if its duration is in this range. */
   usualSpeed() {
     const length = this.end - this.start, fits = (speed) => length / speed >= PLAYED[0] && length / speed <= PLAYED[1];
     return !(length > 0) || fits(1) ? 1 : SPEEDS.find(fits) || (length / SPEEDS[0] < PLAYED[0] ? SPEEDS[0] : SPEEDS[SPEEDS.length - 1]);
@@ -57,18 +58,19 @@ class Player {
     element("run-list").open = run.others.length < 8;
     element("run-list").querySelector("summary").textContent = `${run.others.length + 1} runs`;
     if (!run.events.times.length) for (const id of ["event-back", "event-forth"]) element(id).hidden = true;
-    const legend = element("legend"), entry = ({ color, name }, title) => {
+    const legend = element("legend"), entry = ({ color, name }, title, shape) => {
       const item = legend.appendChild(document.createElement("span")), swatch = item.appendChild(document.createElement("i"));
       swatch.style.background = color;
+      if (shape) swatch.style.clipPath = `inset(${100 * shape[0]}% 0 ${100 * (1 - shape[0] - shape[1])}% 0)`;
       item.append(name);
       item.title = title || name;
     };
     const modes = new Set(run.modes.flatMap((band) => [...new Set(band.modes)]));
-    for (const mode of [1, -1, 0, 3, 2]) if (modes.has(mode)) entry(mode === OPEN ? { ...run.looks.modes[mode], color: "var(--open)" } : run.looks.modes[mode]);
+    for (const mode of [1, -1, 0, 3, 2]) if (modes.has(mode)) entry(mode === OPEN ? { ...run.looks.modes[mode], color: "var(--open)" } : run.looks.modes[mode], null, SHAPES[mode]);
     for (const kind of run.events.kinds) { const look = run.looks.events[kind] || run.looks.events.other; entry({ color: look.color, name: `▾ ${kind}` }, look.means); }
   }
 
-  /** A button for each run, and those that place and subtract. */
+  /** Adds a button for each run, and the buttons for placement and differences. */
   addRuns() {
     const all = [{ name: this.run.name, color: ink("soft") }, ...this.stage.ghosts.items.map(({ name, tint: [r, g, b] }) => ({ name, color: `rgb(${255 * r} ${255 * g} ${255 * b})` }))];
     all.forEach(({ name, color }, i) => {
@@ -92,7 +94,7 @@ class Player {
     this.showToggles();
   }
 
-  /** Curves of the other runs, or what they differ by from the first. */
+  /** Switches between the curves of the other runs and their differences from the first. */
   toggleDifferences() {
     this.differing = !this.differing;
     for (const plot of this.plots) plot.showDifferences(this.differing);
@@ -120,6 +122,7 @@ class Player {
       this.stage.arrows.scale = 4 ** Number(e.target.value);
       this.seek(this.time);
     });
+    this.listenToSplitter();
     window.addEventListener("keydown", (e) => this.key(e));
     new ResizeObserver(() => this.resize()).observe(element("stage"));
     window.addEventListener("resize", () => this.resize());
@@ -157,7 +160,7 @@ class Player {
     action();
   }
 
-  /** Shows the state at a time of the run, held between its ends. */
+  /** Shows the state at a time, clamped to the run. */
   seek(time) {
     this.time = Math.max(this.start, Math.min(this.end, Number(time)));
     this.stage.setTime(this.time);
@@ -175,14 +178,14 @@ class Player {
     for (const view of [this.timeline, this.bands, ...this.plots]) view.draw(this.time, this.hover);
   }
 
-  /** Goes on by whole frames. */
+  /** Moves by a number of frames. */
   step(frames) {
     const { times } = this.run, here = lastBelow(times, this.time + 1e-9 * (this.end - this.start));
     this.seekByHand(times[Math.max(0, Math.min(times.length - 1, here + frames))]);
     this.span.show(this.time);
   }
 
-  /** To the next event, or to the last one before. */
+  /** Moves to the next event, or to the previous one. */
   toEvent(way) {
     const times = [...this.run.events.times].sort((a, b) => a - b), near = 1e-9 * (this.end - this.start);
     const found = way > 0 ? times.find((t) => t > this.time + near) : times.reverse().find((t) => t < this.time - near);
@@ -191,7 +194,7 @@ class Player {
     this.span.show(found);
   }
 
-  /** The shown time becomes the start (0) or the end (1) of what is repeated; null: all of the run is. */
+  /** Sets the start (0) or the end (1) of the repeated part to the current time; null repeats the whole run. */
   setLoop(end) {
     const loop = this.loop || [this.start, this.end];
     if (end !== null) loop[end] = this.time;
@@ -244,16 +247,56 @@ class Player {
     }
   }
 
+  /** A height of the plots by hand [pixels], or null for that of the style. */
+  setDock(height) {
+    const dock = element("dock"), room = document.querySelector("main").clientHeight, least = 120;
+    this.dock = height === null ? null : Math.max(least, Math.min(room - 140, height));
+    dock.style.flexBasis = this.dock === null ? "" : `${this.dock}px`;
+    dock.style.maxHeight = this.dock === null ? "" : "none";
+    element("splitter").setAttribute("aria-valuenow", String(Math.round((100 * dock.offsetHeight) / Math.max(room, 1))));
+    this.resize();
+  }
+
+  listenToSplitter() {
+    const splitter = element("splitter");
+    for (const [name, value] of [["aria-valuemin", 0], ["aria-valuemax", 100], ["aria-valuenow", 50]]) splitter.setAttribute(name, String(value));
+    splitter.addEventListener("pointerdown", (event) => splitter.setPointerCapture(event.pointerId));
+    splitter.addEventListener("pointermove", (event) => { if (event.buttons & 1) this.setDock(innerHeight - event.clientY + splitter.offsetHeight / 2); });
+    splitter.addEventListener("dblclick", () => this.setDock(null));
+    splitter.addEventListener("keydown", (event) => {
+      const by = { ArrowUp: 24, ArrowDown: -24 }[event.key];
+      if (!by) return;
+      event.preventDefault(); event.stopPropagation();
+      this.setDock(element("dock").offsetHeight + by);
+    });
+  }
+
+  /** The height of curves: of the style, or what a dock by hand leaves for a single row of plots. */
+  fitPlots() {
+    const plots = element("plots"), last = this.plots[this.plots.length - 1];
+    plots.style.removeProperty("--tall");
+    if (!this.dock || !last || last.box.offsetTop !== this.plots[0].box.offsetTop) return;
+    const more = plots.clientHeight - last.box.offsetTop + plots.offsetTop - last.box.offsetHeight;
+    plots.style.setProperty("--tall", `${Math.max(LEAST_CURVE, last.canvas.clientHeight + more)}px`);
+  }
+
   resize() {
     const box = element("forces"), { clientWidth: width, clientHeight: height } = element("stage"), narrow = width < 640, folded = box.classList.contains("off");
-    // The view is framed between what lies over it: the heading, the buttons, and beside the table of forces where there is room.
+    // The view is framed between the heading and the buttons that cover it, and beside the table of forces if there is space.
     const taken = (card, side, room) => (card[side] ? card[side] + room : 0);
+    // The panel begins below the heading and ends above the buttons where they are under it.
+    const heading = element("heading"), beside = narrow || box.hidden ? 0 : box.offsetWidth;
+    heading.style.maxWidth = beside ? `min(60%, ${Math.max(width - beside - 36, 200)}px)` : "";
+    const tools = element("tools"), panel = element("panel"), under = tools.offsetLeft < panel.offsetLeft + panel.offsetWidth;
+    panel.style.top = `${height < 330 && element("runs").hidden ? 8 : heading.offsetTop + heading.offsetHeight + 8}px`;
+    panel.style.bottom = under ? `${tools.offsetHeight + 16}px` : "";
     const below = taken(element("tools"), "offsetHeight", 12) + (narrow && folded ? taken(box, "offsetHeight", 6) : 0);
     this.stage.covered = {
       right: folded || narrow ? 0 : Math.min(taken(box, "offsetWidth", 12) / Math.max(width, 1), 0.4),
       top: Math.min(taken(element("heading"), "offsetHeight", 14) / Math.max(height, 1), 0.35), bottom: Math.min(below / Math.max(height, 1), 0.3),
     };
     this.stage.resize();
+    this.fitPlots();
     this.resizePlots();
   }
 

@@ -1,8 +1,22 @@
-// Plots on canvas: one axis each, a cursor at the shown time, a reading at the pointer.
+// Plots on canvas: one axis each, a cursor at the current time, and readings at the pointer.
 
-const DASHES = [[5, 3], [2, 2], [8, 3, 2, 3], [10, 4], [3, 5], [8, 2, 2, 2, 2, 2], [1, 3]]; // of the second run and those after it
+const DASHES = [[5, 3], [2, 2], [8, 3, 2, 3], [10, 4], [3, 5], [8, 2, 2, 2, 2, 2], [1, 3]]; // for the second and later runs, or the ninth and later curves
 
-/** A dashed line as a background; a whole one without dashes. */
+/** Returns a color and dash without a curve in the plot: solid colors first, then dashed colors. */
+function freeLook(curves, colors) {
+  const taken = new Set(curves.map((curve) => `${curve.color} ${curve.dash}`));
+  for (const dash of [[], ...DASHES]) for (const color of colors) if (!taken.has(`${color} ${dash}`)) return { color, dash };
+  return { color: colors[curves.length % colors.length], dash: [] };
+}
+
+/** Writes a text into an element, and shortens its middle if the element is too narrow. */
+function fitText(box, text) {
+  box.textContent = text;
+  for (let kept = text.length - 1; kept > 3 && box.scrollWidth > box.clientWidth; kept--)
+    box.textContent = `${text.slice(0, Math.ceil(kept / 2))}…${text.slice(text.length - Math.floor(kept / 2))}`;
+}
+
+/** CSS background of a dashed line, or of a solid line without dashes. */
 function stroke(dash, color) {
   let at = 0;
   const stops = dash.map((length, i) => `${i % 2 ? "transparent" : color} ${at}px ${(at += length)}px`);
@@ -10,54 +24,79 @@ function stroke(dash, color) {
 }
 
 class Plot {
-  /** seek(t) and hover(t or null) tell the page what the pointer does. */
+  /** The callbacks seek(t) and hover(t or null) report the pointer. */
   constructor(plot, span, parent, colors, seek, hover) {
     Object.assign(this, plot, { logarithmic: plot.log });
-    const first = this.curves.filter((curve) => !curve.run);
-    this.curves.forEach((curve, i) => {
+    this.colors = colors;
+    const first = this.curves.filter((curve) => !curve.run), looks = [];
+    this.curves.forEach((curve) => {
       curve.base = curve.run ? first.find((own) => own.label === curve.of) : null;
-      // A plot of one curve tells runs apart by colors, one of several by dashes.
-      const color = !curve.base ? colors[i % colors.length] : first.length > 1 ? curve.base.color : colors[curve.run % colors.length];
-      Object.assign(curve, { color, shown: true, t: curve.t || plot.t, dash: curve.run ? DASHES[(curve.run - 1) % DASHES.length] : [], plain: curve.values });
+      // A plot of one curve distinguishes runs by colors, other plots by dashes.
+      const apart = curve.base && first.length > 1 && first.length <= colors.length;
+      const look = apart ? { color: curve.base.color, dash: DASHES[(curve.run - 1) % DASHES.length] } : freeLook(looks, colors);
+      looks.push(look);
+      Object.assign(curve, look, { shown: true, t: curve.t || plot.t, plain: curve.values });
     });
+    this.makeBox(parent);
+    for (const curve of this.curves) this.addToLegend(curve);
+    this.background = document.createElement("canvas");
+    this.listen(span, seek, hover);
+  }
+
+  listen(span, seek, hover) { this.axis = new TimeAxis(span, this.canvas, seek, (t) => hover(t)); }
+
+  /** Words after the title. */
+  about() { return `[${this.unit}]`; }
+
+  makeBox(parent) {
     this.box = document.createElement("div");
     const heading = document.createElement("h2"), unit = document.createElement("span");
     this.box.className = "plot";
     heading.textContent = `${this.title} `;
-    unit.textContent = `[${this.unit}]${this.note ? ` · ${this.note}` : ""}`;
+    unit.textContent = `${this.about()}${this.note ? ` · ${this.note}` : ""}`;
     heading.append(unit);
+    heading.title = heading.textContent;
     this.heading = heading;
     this.legend = document.createElement("ul");
     this.canvas = document.createElement("canvas");
     this.canvas.setAttribute("role", "img");
-    this.canvas.setAttribute("aria-label", `${this.title} over time`);
-    this.box.append(heading, this.legend, this.canvas);
+    this.canvas.setAttribute("aria-label", `${this.title} ${this.about()}`);
+    const inner = this.box.appendChild(document.createElement("div"));
+    inner.append(heading, this.canvas, this.legend);
     parent.append(this.box);
-    this.addLegend();
-    this.background = document.createElement("canvas");
-    this.axis = new TimeAxis(span, this.canvas, seek, (t) => hover(t));
   }
 
-  addLegend() {
-    for (const curve of this.curves) {
-      const item = document.createElement("li"), button = document.createElement("button");
-      curve.button = button;
-      button.title = "show or hide the curve";
-      button.setAttribute("aria-pressed", "true");
-      curve.reading = document.createElement("b");
-      button.append(`${curve.label} `, curve.reading);
-      button.addEventListener("click", () => {
-        curve.shown = !curve.shown;
-        item.classList.toggle("off", !curve.shown);
-        button.setAttribute("aria-pressed", String(curve.shown));
-        this.resize();
-      });
-      item.append(button);
-      this.legend.append(item);
-    }
+  addToLegend(curve) {
+    const item = document.createElement("li"), button = item.appendChild(document.createElement("button")), name = document.createElement("span");
+    Object.assign(curve, { item, button, reading: document.createElement("b") });
+    name.textContent = curve.label;
+    curve.name = name;
+    button.title = `${curve.label}: show or hide the curve`;
+    button.setAttribute("aria-pressed", "true");
+    button.append(name, " ", curve.reading);
+    button.addEventListener("click", () => {
+      curve.shown = !curve.shown;
+      item.classList.toggle("off", !curve.shown);
+      button.setAttribute("aria-pressed", String(curve.shown));
+      this.resize();
+    });
+    this.legend.append(item);
   }
 
-  /** Curves of other runs as their differences from the first run, which is hidden then; or as they are. */
+  /** Takes a curve in, in a look of its own. */
+  add(curve) {
+    Object.assign(curve, freeLook(this.curves, this.colors), { base: null, shown: true, plain: curve.values });
+    this.curves.push(curve);
+    this.addToLegend(curve);
+    return curve;
+  }
+
+  remove(curve) {
+    this.curves.splice(this.curves.indexOf(curve), 1);
+    curve.item.remove();
+  }
+
+  /** Shows curves of other runs as differences from the first run, which is then hidden, or unchanged. */
   showDifferences(on) {
     if (!this.curves.some((curve) => curve.base)) return;
     for (const curve of this.curves) {
@@ -81,7 +120,7 @@ class Plot {
     for (const curve of this.curves.filter((c) => c.shown))
       for (const value of curve.values) if (Number.isFinite(value) && (!this.log || value > 0)) { low = Math.min(low, value); high = Math.max(high, value); }
     if (this.log) {
-      // Rounding has no lower end worth showing; zero is drawn at the bottom.
+      // Rounding has no meaningful lower end; zero is drawn at the bottom.
       high = Number.isFinite(high) ? Math.ceil(Math.log10(high) + 0.1) : -12;
       low = Number.isFinite(low) ? Math.max(Math.floor(Math.log10(low) - 0.1), high - 12) : high - 4;
       this.floor = 10 ** low;
@@ -96,6 +135,7 @@ class Plot {
 
   resize() {
     if (!this.canvas.clientWidth) return;
+    for (const { name, label } of this.curves) fitText(name, label);
     this.scale();
     for (const curve of this.curves) {
       curve.button.style.setProperty("--swatch", onPaper(curve.color));
@@ -121,14 +161,14 @@ class Plot {
     const { t, values } = curve, { start, end } = this.axis.span;
     const first = Math.max(lastBelow(t, start) - 1, 0), last = Math.min(lastBelow(t, end) + 2, t.length - 1);
     c.strokeStyle = onPaper(curve.color); c.setLineDash(curve.dash || []);
-    c.globalAlpha = this.crowded(values, first, last) ? 0.55 : 1; // what covers others lets them through
+    c.globalAlpha = this.crowded(values, first, last) ? 0.55 : 1; // a crowded curve is transparent
     c.beginPath();
     for (let i = first; i <= last; i++) if (Number.isFinite(values[i])) c.lineTo(this.axis.x(t[i]), this.y(values[i]));
     c.stroke(); c.setLineDash([]); c.globalAlpha = 1;
     if (t.length === 1) { c.fillStyle = onPaper(curve.color); c.fillRect(this.axis.left - 3, this.y(values[0]) - 3, 6, 6); }
   }
 
-  /** Whether a curve goes up and down more often than every third pixel. */
+  /** Checks if a curve changes direction more often than every third pixel. */
   crowded(values, first, last) {
     let turns = 0;
     for (let i = first + 1; i < last; i++) {
@@ -156,7 +196,7 @@ class Plot {
     return part === 0 ? curve.values[k] : (1 - part) * curve.values[k] + part * curve.values[next];
   }
 
-  /** Cursor at the shown time; the readings belong to the pointer's time when there is one. */
+  /** Draws the cursor at the current time; readings are at the pointer's time if there is one. */
   draw(time, hover) {
     this.drawn = [time, hover];
     const { context: c, axis } = this, read = hover === null ? time : hover;

@@ -2,7 +2,7 @@
 
 const CREASE = Math.cos((35 * Math.PI) / 180);
 
-/** A mesh whose edges stay sharp where faces meet at more than 35 degrees and are smooth elsewhere. */
+/** Mesh with sharp edges between faces at more than 35 degrees, and smooth edges elsewhere. */
 function creasedMesh(THREE, vertices, triangles) {
   const faces = triangles.length / 3, corners = faces * 3;
   const position = new Float32Array(corners * 3), normal = new Float32Array(corners * 3), face = new Float32Array(faces * 3);
@@ -58,7 +58,7 @@ function shapeGeometry(THREE, shape, size) {
   }
 }
 
-/** A mesh whose parts have colors of their own; `color` is that of the others. */
+/** Mesh with separate colors of its parts; `color` is the color of the others. */
 function paintedMesh(THREE, geometry, shape, color) {
   const painted = new THREE.BufferGeometry(), colors = new Float32Array(geometry.attributes.position.array.length);
   let start = 0;
@@ -84,7 +84,7 @@ function surface(THREE, color) {
   });
 }
 
-/** A coil along z of length 1, to be stretched. */
+/** Coil along z of length 1, to be scaled. */
 function coilGeometry(THREE, radius) {
   const slender = 12; // length over radius at which the wire is round
   class Coil extends THREE.Curve {
@@ -96,7 +96,7 @@ function coilGeometry(THREE, radius) {
   return new THREE.TubeGeometry(new Coil(), 240, 0.14 * radius, 5).scale(1, 1, 1 / (slender * radius));
 }
 
-/** The ground: a grid that fades with distance, and a plane that takes the shadow. */
+/** Ground: a grid that fades with distance, and a plane that receives the shadow. */
 function groundMesh(THREE, cell, reach) {
   const plane = new THREE.PlaneGeometry(2 * reach, 2 * reach);
   const grid = new THREE.Mesh(plane, new THREE.ShaderMaterial({
@@ -123,7 +123,7 @@ function groundMesh(THREE, cell, reach) {
   return group;
 }
 
-/** A line some pixels wide through places (flat), each segment a quad that faces the camera; beyond `now` it is faint. */
+/** Line with a width in pixels through points (flat); each segment is a quad that faces the camera. Beyond `now` it is faint. */
 class WideLine {
   constructor(THREE, world, places, times, color, width) {
     const count = places.length / 3 - 1, geometry = new THREE.BufferGeometry();

@@ -1,4 +1,4 @@
-// The three-dimensional view: it gathers what is drawn, lights it, and looks at it.
+// Three-dimensional view: scene, lights and camera.
 
 class Stage {
   constructor(THREE, run, canvas, labels) {
@@ -48,7 +48,7 @@ class Stage {
     this.world.add(this.sun, this.sun.target, fill);
   }
 
-  /** A grid on the plane that something touches or stands on; where there is none, nothing is drawn. */
+  /** Adds a grid on the ground plane, if the run has one. */
   addGround() {
     const { THREE, run, up, size } = this;
     if (run.view.ground === null) return;
@@ -59,7 +59,7 @@ class Stage {
     this.world.add(this.ground);
   }
 
-  /** Outermost points of the motion; while the camera follows, around the center at the shown time. */
+  /** Extreme points of the motion, around the center at the current time if the camera follows. */
   outline() {
     const center = this.run.view.follow ? (this.center || new this.THREE.Vector3()) : new this.THREE.Vector3();
     const own = this.run.view.outline.map((point) => new this.THREE.Vector3(...point).add(center));
@@ -79,7 +79,7 @@ class Stage {
     this.dirty = true;
   }
 
-  /** Puts the other runs beside the first one, or back over it. */
+  /** Places the other runs beside the first one, or over it. */
   setApart(apart) {
     this.ghosts.setApart(apart, this.run.view, this.up);
     this.setTime(this.time);
@@ -94,7 +94,7 @@ class Stage {
     this.render();
   }
 
-  /** Lets the camera go with a joint, or with the center of mass (0); null: it stays. */
+  /** Lets the camera follow a joint, or the center of mass (0); null stops following. */
   follow(joint) {
     this.following = joint !== null;
     this.followed = joint || 0;
@@ -102,14 +102,14 @@ class Stage {
     this.dirty = true;
   }
 
-  /** Frames the motion, from a direction or from the usual one. */
+  /** Frames the motion from a direction or from the default one. */
   resetView(direction = this.run.view.direction) {
     const { THREE } = this;
     this.center = this.kinematics.center(this.followed);
     this.orbit.frame([...this.outline(), ...this.arrowTips()], direction.isVector3 ? direction : new THREE.Vector3(...direction), this.covered);
   }
 
-  /** Ends of the straight arrows at some frames of the run, but for the peaks that a fifth of them hold; none where the camera follows. */
+  /** Tips of the straight arrows at some frames of the run, without the largest fifth; none if the camera follows. */
   arrowTips() {
     if (this.run.view.follow) return [];
     const tips = new Map(), count = this.run.times.length, stride = Math.ceil(count / 60), reach = this.arrowReach() * this.arrows.scale;
@@ -145,7 +145,7 @@ class Stage {
   /** Length of a pixel at the target [m]. */
   pixel() { return (2 * this.orbit.distance * Math.tan((this.camera.fov * Math.PI) / 360)) / Math.max(this.canvas.clientHeight, 1); }
 
-  /** Place of a world point on the canvas in pixels; null behind the camera. */
+  /** Position of a world point on the canvas in pixels; null behind the camera. */
   onScreen(point) {
     const p = point.clone().project(this.camera);
     if (p.z > 1) return null;
@@ -159,7 +159,7 @@ class Stage {
     this.sun.target.position.copy(focus);
     this.sun.position.copy(focus).add(this.sunOffset);
     if (this.ground) {
-      // The ground goes with the focus in whole cells, so that its lines stay where they are in the world.
+      // The ground follows the focus in whole cells, so that its lines stay fixed in the world.
       const local = focus.clone().applyQuaternion(this.ground.quaternion.clone().invert()), step = 5 * this.cell;
       this.ground.position.set(Math.round(local.x / step) * step, Math.round(local.y / step) * step, this.run.view.ground).applyQuaternion(this.ground.quaternion);
     }
@@ -174,7 +174,7 @@ class Stage {
     this.arrows.placeLabels((point) => this.onScreen(point));
   }
 
-  /** Box around all bodies that stay in view on the canvas, in pixels: left, top, right, bottom. */
+  /** Bounding box on the canvas of all bodies in view, in pixels: left, top, right, bottom. */
   box() {
     const { THREE, run } = this, box = [Infinity, Infinity, -Infinity, -Infinity];
     for (const item of this.bodies.items) {
@@ -191,7 +191,7 @@ class Stage {
     return box;
   }
 
-  /** Name of the mark or joint nearest to a place on the canvas, within 12 pixels. */
+  /** Name of the mark or joint nearest to a point on the canvas, within 12 pixels. */
   nearest(x, y) {
     let best = null, closest = 12;
     const look = (text, place) => {
@@ -203,7 +203,7 @@ class Stage {
     return best;
   }
 
-  /** Placements in the world at the shown time, as 4 x 4 matrices by name. */
+  /** Placements in the world at the current time, as 4 x 4 matrices by name. */
   poses() {
     const joints = this.kinematics.poses();
     const visuals = Object.fromEntries(this.bodies.items.filter((item) => item.run === 0).map((item) => [item.name, matrixRows(this.bodies.place(item, false))]));

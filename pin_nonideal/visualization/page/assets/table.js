@@ -1,4 +1,4 @@
-// The table of forces: a row for each place, a column for each part.
+// Table of forces: a row for each point of action, a column for each part.
 
 class ForceTable {
   constructor(run, arrows, box) {

@@ -1,6 +1,6 @@
-// The time line: a slider, marks of events, and their density where they are too many to be told apart.
+// Time axis of the run: a slider, marks of events, and the density of crowded events.
 
-const APART = 6; // least distance of marks that are drawn one by one [pixels]
+const APART = 6; // minimum distance of separate marks [pixels]
 
 class Timeline {
   constructor(run, span, canvas, tip, seek, hover) {
@@ -17,7 +17,7 @@ class Timeline {
 
   color(kind) { return (this.run.looks.events[kind] || this.run.looks.events.other).color; }
 
-  /** Events close to a time. */
+  /** Text of the events close to a time. */
   textAt(time) {
     const { times, kind, element, kinds, elements, impulse, taken } = this.run.events, near = [];
     const reach = (APART * (this.span.end - this.span.start)) / Math.max(this.axis.right - this.axis.left, 1);
@@ -76,7 +76,7 @@ class Timeline {
         for (const k of own) { const x = axis.x(times[k]); c.fillStyle = this.color(kinds[kind[k]]); c.beginPath(); c.moveTo(x, track - 5); c.lineTo(x - 3.5, track - 12); c.lineTo(x + 3.5, track - 12); c.fill(); }
         continue;
       }
-      // So many in so little room: a column as tall as their number, divided by kind.
+      // Crowded events are a column with a height by their number, divided by kind.
       const tall = 4 + 10 * (Math.log(own.length) / Math.log(Math.max(most, 3))), counts = new Map();
       for (const k of own) counts.set(kind[k], (counts.get(kind[k]) || 0) + 1);
       let y = track - 5;
@@ -88,7 +88,7 @@ class Timeline {
     }
   }
 
-  /** A cross where the run stopped. */
+  /** Draws a cross at the end of a stopped run. */
   drawEnd(c, x) {
     c.strokeStyle = ink("bad"); c.lineWidth = 2.5;
     for (const s of [-1, 1]) { c.beginPath(); c.moveTo(x - 5, this.track - 5 * s); c.lineTo(x + 5, this.track + 5 * s); c.stroke(); }

@@ -1,6 +1,6 @@
-// The state of the page in its address: #t=1.5&cam=azimuth,elevation,distance,x,y,z&speed=0.1&span=0,2
+// State of the page in its address: #t=1.5&cam=azimuth,elevation,distance,x,y,z&speed=0.1&span=0,2
 
-class Address {
+class UrlState {
   constructor(player) {
     this.player = player;
     this.last = "";
@@ -26,7 +26,7 @@ class Address {
     orbit.place();
   }
 
-  /** What a reload or a copied link needs to show the same; while the run plays nothing is written. */
+  /** State for a reload or a copied link; it is not written during playback. */
   text() {
     const { player } = this, { orbit } = player.stage, digits = (x) => Number(x.toPrecision(6));
     const camera = [orbit.azimuth, orbit.elevation, orbit.distance, ...orbit.target.toArray()].map(digits).join();
@@ -39,6 +39,6 @@ class Address {
     const text = this.text();
     if (text === this.last) return;
     this.last = text;
-    try { history.replaceState(null, "", `#${text}`); } catch (error) { this.last = text; } // pages inside a notebook have no address
+    try { history.replaceState(null, "", `#${text}`); } catch (error) { this.last = text; } // a page in a notebook has no address
   }
 }

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from threading import RLock
 from typing import Any, TypeVar
 
-from .types import Table
+from pin_nonideal.types import Table
 
 Made = TypeVar("Made", bound="MadeLater")
 MAKER = "_make"

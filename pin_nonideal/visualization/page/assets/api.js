@@ -1,6 +1,6 @@
-// The start of the page, and what scripts and tests may use: window.replay.
+// Start of the page, and its interface for scripts and tests: window.replay.
 
-function door(player) {
+function publicApi(player) {
   return {
     ready: true,
     seek: (time) => { player.pause(); player.seek(time); player.stage.render(); },
@@ -20,6 +20,7 @@ function door(player) {
     onScreen: (place) => player.stage.onScreen(new player.stage.THREE.Vector3(...place)),
     box: () => player.stage.box(),
     show: (what, shown) => player.stage.show(what, shown),
+    get looks() { return player.plots.map((plot) => plot.curves.map(({ color, dash }) => `${color} ${dash}`)); },
     get margin() { return player.timeline.axis.left; },
     get address() { return player.address.text(); },
     get gap() { return player.stage.marks.gap(); },
@@ -41,7 +42,7 @@ async function main() {
   player.tick();
   loop();
   element("message").hidden = true;
-  window.replay = door(player);
+  window.replay = publicApi(player);
   window.replayDone = true;
   if (!/[#&]paused\b/.test(location.hash) && !matchMedia("(prefers-reduced-motion: reduce)").matches) player.play();
 }

@@ -1,4 +1,4 @@
-// Unpacks the scripts of the page and starts it; what fails is said in its place.
+// Unpacks the scripts of the page and starts it; errors are shown in its place.
 
 window.addEventListener("error", (event) => { window.replayError = window.replayError || String(event.message); });
 runScript("scripts").then(() => main()).catch((error) => {

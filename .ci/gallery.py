@@ -1,23 +1,27 @@
 """Gallery page of the package's robots and the paper's examples, with an image and a replay of each.
 
-Run: python examples/gallery.py [FOLDER]   (default docs/gallery; index.html is the page)
+Run: python .ci/gallery.py [FOLDER]   (default docs/gallery; index.html is the page)
 """
 
 from __future__ import annotations
 
 import html
-import importlib.util
+import os
+import runpy
 import sys
+import tempfile
 import time
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 import pin_nonideal as pn
 
-HERE = Path(__file__).resolve().parent
+ROOT = Path(__file__).resolve().parent.parent
+PAPER = {
+    "paper_a_particle": "a nonlinear nonholonomic constraint",
+    "paper_b_ring": "a bead on a rough ring",
+    "paper_c_incline": "a block on a vibrating incline",
+}
 RECORD = ("forces", "energy", "reactions")
 DURATIONS = {"andrews_squeezer": 0.03, "n_four_bar": 3.0, "solo12_standing": 2.0, "panda_settling": 2.0}
 LONGEST = 5.0  # [s]
@@ -43,36 +47,15 @@ CARD = """<a href="{name}.html"><img src="{name}.png" alt="{title}" width="{widt
 <h2>{title}</h2><p>{words}</p></a>"""
 
 
-def example(name: str) -> Any:
-    """Import a script of this folder as a module."""
-    spec = importlib.util.spec_from_file_location(name, HERE / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-def paper_runs() -> Iterator[tuple[str, str, Callable[[], Any]]]:
-    """Yield name, description and run function of the paper's three examples."""
-    a, b, c = (example(f"paper_{name}") for name in ("a_particle", "b_ring", "c_incline"))
-
-    def run(scene: Any, duration: float, q: Any, v: Any) -> Any:
-        return pn.simulate(scene, duration, q=q, v=v, record=RECORD[:2], output_dt=duration / SAMPLES)
-
-    particle, ring, block = a.Particle(), b.Ring(), c.Incline()
-    q = np.array([0.3, -0.2, 0.9])
-    start = particle.start(q, (1.1, -0.6))
-    yield (
-        "paper_a_particle",
-        "a nonlinear nonholonomic constraint",
-        lambda: run(particle.scene(), 3.0, q, start),
-    )
-    yield "paper_b_ring", "a bead on a rough ring", lambda: run(ring.scene(), 1.0, *ring.at(0.0, 6.0))
-    yield (
-        "paper_c_incline",
-        "a block on a vibrating incline",
-        lambda: run(block.scene(), 1.0, *block.at(0.0, 0.1)),
-    )
+def paper_run(name: str) -> Any:
+    """Run an example of the paper in a temporary folder and return its trajectory."""
+    here = Path.cwd()
+    with tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)
+        try:
+            return runpy.run_path(str(ROOT / "examples" / f"{name}.py"))["run"]
+        finally:
+            os.chdir(here)
 
 
 def robot_run(name: str) -> Any:
@@ -86,11 +69,11 @@ def robot_run(name: str) -> Any:
         return error.trajectory
 
 
-def main(folder: str | Path = HERE.parent / "docs" / "gallery") -> None:
+def main(folder: str | Path = ROOT / "docs" / "gallery") -> None:
     """Write the page, and a replay and an image for each entry."""
     target, begun = Path(folder), time.perf_counter()
     target.mkdir(parents=True, exist_ok=True)
-    entries = [*paper_runs()]
+    entries = [(name, words, lambda name=name: paper_run(name)) for name, words in PAPER.items()]
     entries += [(name, words, lambda name=name: robot_run(name)) for name, words in pn.robots()]
     cards = []
     for name, words, make in entries:

@@ -1,0 +1,413 @@
+"""Actuation in the core's program: one drive, or a list of drives whose torques add."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from pin_nonideal.core_loader import core
+from pin_nonideal.description.actuation import (
+    EffortLimits,
+    HoldPosition,
+    SampledControl,
+    Table,
+    drives_of,
+    requesting_drives,
+)
+from pin_nonideal.description.scene_drive import SceneDrive
+from pin_nonideal.errors import InputError
+from pin_nonideal.states.joint_layout import joint_places
+from pin_nonideal.states.parsing import (
+    joint_named,
+    named_configuration,
+    named_joint_samples,
+    named_joint_values,
+)
+from pin_nonideal.types import Array, Model
+from pin_nonideal.validation import by_name, label
+
+from .callbacks import checked
+from .delay import DelayedTorque
+from .resolver import Resolution, words
+
+Mask = NDArray[np.bool_]
+
+# Efforts from here on are unlimited: Pinocchio stores the largest float for no limit.
+UNBOUNDED = 1e300
+
+
+class Constant(NamedTuple):
+    """Constant torques tau, (nv,)."""
+
+    tau: Array
+
+
+class Timed(NamedTuple):
+    """Torques `values`, (nt, nv), at `times` [s], (nt,), linear in between. Steps end at every time."""
+
+    times: Array
+    values: Array
+
+
+class Spring(NamedTuple):
+    """Torques kp (q - q_now) - kd v, with gains (nv,) and a configuration q, (nq,)."""
+
+    kp: Array
+    kd: Array
+    q: Array
+
+
+class Called(NamedTuple):
+    """Torques of a function (t, q, v) -> tau, held between samples of `period` [s] if it is not None."""
+
+    function: Callable[..., Any]
+    period: float | None
+
+
+Part = Constant | Timed | Spring | Called
+
+
+def lower_actuation(u: Any, out: core.Builder, where: Resolution, said: Any) -> None:
+    """Set the actuation of the scene.
+
+    Args:
+        u: None, an array (nv,), a table by joint name, a function, a description, or a list of drives.
+        out: the program under construction.
+        where: frames and joints by name.
+        said: descriptions of the scene.
+
+    Raises:
+        InputError: shapes do not fit the model, two drives command the same joint, or drives cannot be added.
+        UnknownNameError: a joint does not exist.
+    """
+    model, drives = where.model, requesting_drives(u)
+    if not drives:
+        return
+    listed = len(drives) > 1
+    lowered = [
+        _lowered(drive, where, said, f"actuation[{k}]" if listed else "actuation")
+        for k, drive in enumerate(drives)
+    ]
+    if listed:
+        _require_separate(model, drives, [acts for _, acts in lowered])
+    _write(lowered[0][0] if not listed else _sum([part for part, _ in lowered], drives, model), out)
+    limits = _limits(u, model, [acts for _, acts in lowered])
+    if limits is not None:
+        out.limit_effort(least=limits[0], most=limits[1])
+
+
+def _write(part: Part, out: core.Builder) -> None:
+    """Set the torques of the program."""
+    if isinstance(part, Constant):
+        out.set_constant_torque(tau=part.tau)
+    elif isinstance(part, Timed):
+        out.set_torque_table(part.times.tolist(), np.ascontiguousarray(part.values))
+    elif isinstance(part, Spring):
+        out.set_hold_position(kp=part.kp, kd=part.kd, q=part.q)
+    elif part.period is None:
+        out.set_torque_function(part.function)
+    else:
+        out.set_sampled_torque(part.function, part.period)
+
+
+# --- one drive ----------------------------------------------------------------------------------------------
+
+
+def _lowered(u: Any, where: Resolution, said: Any, who: str) -> tuple[Part, Mask]:
+    """Return the torques of one drive, and the mask of the degrees of freedom that it commands, (nv,)."""
+    model, everything = where.model, np.ones(where.model.nv, dtype=bool)
+    if isinstance(u, SampledControl):
+        if u.delay_in_samples:  # runs have their own delayed torques, see `delayed_torque`
+            initial = initial_torque(u, model)
+            return Called(lambda t, q, v: initial, u.period), everything
+        return Called(_sampled_torque(u, model), u.period), everything
+    if isinstance(u, SceneDrive):
+        function, acts = u.bound(model, where.q0, said)
+        return Called(_Identified(checked(function, words(u), (model.nv,)), u), u.period), acts
+    if isinstance(u, HoldPosition):
+        q = where.q0 if u.q is None else named_configuration(model, u.q, where.q0, f"{words(u)}: q")
+        kp, kd = (gains_of(model, getattr(u, key), f"{words(u)}: {key}") for key in ("kp", "kd"))
+        _require_vectors(model, kp, f"{words(u)}: kp")
+        acts = commanded(model, u.kp) | commanded(model, u.kd)
+        return Spring(kp, kd, np.ascontiguousarray(q)), acts
+    if isinstance(u, Table):
+        times = np.asarray(u.times)
+        values = named_joint_samples(model, u.values, times.size, f"{words(u)}: values")
+        timed = Timed(times, values) if u.interpolation == "linear" else _held(times, values)
+        return timed, commanded(model, u.values)
+    if callable(u):
+        return Called(checked(_torques_of(u, model, who), who, (model.nv,)), None), everything
+    return Constant(named_joint_values(model, u, who)), commanded(model, u)
+
+
+def delayed_torque(u: SampledControl, model: Model, t0: float, by_thread: bool) -> DelayedTorque:
+    """Return the delayed torques of one run, or of the runs of a rollout.
+
+    Args:
+        u: a sampled control with a delay.
+        model: pinocchio.Model.
+        t0: start time of the runs [s].
+        by_thread: whether runs go on in several threads at once, each run in one thread.
+    """
+    function, initial = _sampled_torque(u, model), initial_torque(u, model)
+    return DelayedTorque(function, u.delay_in_samples, initial, t0, by_thread)
+
+
+def _sampled_torque(u: SampledControl, model: Model) -> Callable[..., Any]:
+    who = f"{words(u)}: function"
+    return checked(_torques_of(u.function, model, who), who, (model.nv,))
+
+
+def initial_torque(u: SampledControl, model: Model) -> Array:
+    """Return the torque before the first delayed one arrives, (nv,).
+
+    Args:
+        u: a sampled control.
+        model: pinocchio.Model.
+    """
+    if u.initial is None:
+        return np.zeros(model.nv)
+    return np.ascontiguousarray(named_joint_values(model, u.initial, f"{words(u)}: initial"))
+
+
+class _Identified:
+    """A function of torques that is equal to those of the same drive only, see `parameter_overrides`.
+
+    Args:
+        function: (t, q, v) -> tau.
+        source: the drive.
+    """
+
+    def __init__(self, function: Callable[..., Any], source: object) -> None:
+        self.function, self.source = function, source
+
+    def __call__(self, t: float, q: Array, v: Array) -> Any:
+        return self.function(t, q, v)
+
+
+def _torques_of(function: Callable[..., Any], model: Model, who: str) -> Callable[..., Any]:
+    """A function of torques that may return them by joint name."""
+
+    def torques(*arguments: Any) -> Any:
+        tau = function(*arguments)
+        if type(tau) is np.ndarray or by_name(tau) is None:
+            return tau
+        return named_joint_values(model, tau, who)
+
+    return torques
+
+
+def _held(times: Array, values: Array) -> Timed:
+    """Return a zero-order hold: each value ends one floating-point spacing before the next time.
+
+    A step of the core ends there and at the next time, so that no stage of a step sees both values.
+    """
+    ends = times[1:] - np.spacing(np.maximum(np.abs(times[1:]), np.diff(times)))
+    both = np.column_stack([times[:-1], np.maximum(ends, times[:-1])]).ravel()
+    return Timed(np.append(both, times[-1]), np.vstack([np.repeat(values[:-1], 2, axis=0), values[-1:]]))
+
+
+def gains_of(model: Model, gain: Any, who: str) -> Array:
+    """Return a gain for each degree of freedom; a scalar acts on joints with one degree of freedom.
+
+    Args:
+        model: pinocchio.Model.
+        gain: a number, an array (nv,), or a table by joint name.
+        who: words for messages.
+
+    Raises:
+        InputError: wrong shape, or not finite.
+        UnknownNameError: there is no such joint.
+    """
+    if isinstance(gain, float):
+        return np.where(commanded(model, gain), gain, 0.0)
+    return named_joint_values(model, gain, who)
+
+
+def commanded(model: Model, given: Any) -> Mask:
+    """Return the mask of the degrees of freedom that torques, samples or gains command, (nv,).
+
+    A table by joint name commands its joints. A number commands the joints with one degree of freedom, and an
+    array commands all joints.
+
+    Args:
+        model: pinocchio.Model.
+        given: see above; names exist.
+    """
+    acts = np.zeros(model.nv, dtype=bool)
+    table = by_name(given)
+    if table is None and not isinstance(given, float):
+        return ~acts
+    names = None if table is None else {joint_named(model, name, "actuation") for name in table}
+    for j, place in enumerate(joint_places(model), start=1):
+        if place.nv == 1 if names is None else j in names:
+            acts[place.v_first : place.v_first + place.nv] = True
+    return acts
+
+
+def _require_vectors(model: Model, kp: Array, who: str) -> None:
+    """Check that a stiffness acts on no joint whose configuration is no vector.
+
+    Raises:
+        InputError: see above.
+    """
+    for place in joint_places(model):
+        part = kp[place.v_first : place.v_first + place.nv]
+        if place.nq != place.nv and place.nv > 1 and (part != 0.0).any():
+            raise InputError(
+                f'{who} must be zero on joint "{place.name}", whose configuration is no vector; '
+                "drive it by a function or by a TrackTrajectory"
+            )
+
+
+def _limits(u: Any, model: Model, acts: Sequence[Mask]) -> tuple[Array, Array] | None:
+    """Return the lower and upper effort limits, (nv,), or None without limits.
+
+    Limits of one drive of a list apply to the degrees of freedom that it commands.
+    """
+    outer = drives_of(u)
+    if not any(isinstance(drive, EffortLimits) for drive in outer):
+        return None
+    if len(outer) == 1:
+        return _efforts(outer[0], model)
+    least, most = np.full(model.nv, -np.inf), np.full(model.nv, np.inf)
+    first = 0
+    for drive in outer:
+        count = len(requesting_drives(drive))
+        if isinstance(drive, EffortLimits):
+            own = np.logical_or.reduce(acts[first : first + count])
+            for all_limits, limits in zip((least, most), _efforts(drive, model), strict=True):
+                all_limits[own] = limits[own]
+        first += count
+    return least, most
+
+
+def _efforts(u: EffortLimits, model: Model) -> tuple[Array, Array]:
+    """Return the lower and upper effort limit of each degree of freedom; no limit is infinite."""
+    if u.effort is not None:
+        if isinstance(u.effort, float):
+            most = np.full(model.nv, u.effort)
+        else:
+            most = named_joint_values(model, u.effort, f"{words(u)}: effort", others=np.inf)
+        return -most, most
+    least, most = model.lowerEffortLimit.copy(), model.upperEffortLimit.copy()
+    unstated = least >= most
+    least[unstated | (least <= -UNBOUNDED)] = -np.inf
+    most[unstated | (most >= UNBOUNDED)] = np.inf
+    return np.ascontiguousarray(least), np.ascontiguousarray(most)
+
+
+# --- several drives -----------------------------------------------------------------------------------------
+
+
+def _require_separate(model: Model, drives: Sequence[Any], acts: Sequence[Mask]) -> None:
+    """Check that no joint is commanded by two drives.
+
+    Raises:
+        InputError: see above; the message names the joint and both drives.
+    """
+    for place in joint_places(model):
+        own = slice(place.v_first, place.v_first + place.nv)
+        first, *others = [*(k for k, mask in enumerate(acts) if mask[own].any()), None]
+        if first is None or others == [None]:
+            continue
+        second = others[0]
+        assert second is not None
+        raise InputError(
+            f'actuation: each joint must be commanded by one drive; "{place.name}" is commanded by drive '
+            f"{first} ({_kind(drives[first])}) and drive {second} ({_kind(drives[second])}) of the list; "
+            "drives by joint name command the joints that they name, and the others command all joints"
+        )
+
+
+def _kind(drive: Any) -> str:
+    """Return a label of a drive for messages."""
+    if isinstance(drive, (list, tuple, np.ndarray)) or by_name(drive) is not None:
+        return "constant torques"
+    return label(drive)
+
+
+def _sum(parts: Sequence[Part], drives: Sequence[Any], model: Model) -> Part:
+    """Return the sum of torques that act on separate joints.
+
+    Raises:
+        InputError: sampled torques cannot be added to torques that change between their samples.
+    """
+    if all(isinstance(part, Constant) for part in parts):
+        return Constant(np.sum([part.tau for part in parts], axis=0))  # type: ignore[union-attr]
+    if all(isinstance(part, (Constant, Timed)) for part in parts):
+        return _sum_of_tables(parts)
+    springs = [part for part in parts if isinstance(part, Spring)]
+    if len(springs) == len(parts):
+        return _sum_of_springs(springs, model)
+    functions = [_function_of(part, model) for part in parts]
+
+    def total(t: float, q: Array, v: Array) -> Array:
+        tau = np.zeros(model.nv)
+        for function in functions:
+            tau += function(t, q, v)
+        return tau
+
+    periods = {part.period for part in parts if isinstance(part, Called)} - {None}
+    if not periods:
+        return Called(total, None)
+    steady = [isinstance(part, Constant) or getattr(part, "period", None) is not None for part in parts]
+    if len(periods) > 1 or not all(steady):
+        sampled = next(k for k, part in enumerate(parts) if getattr(part, "period", None) is not None)
+        other = steady.index(False) if not all(steady) else None
+        got = "several periods" if other is None else _kind(drives[other])
+        raise InputError(
+            f"actuation: torques that {_kind(drives[sampled])} holds between samples add to constant torques "
+            f"and to torques of the same period only; got {got}; give all drives one period, or compute "
+            "their sum in one function"
+        )
+    return Called(total, periods.pop())
+
+
+def _sum_of_tables(parts: Sequence[Part]) -> Timed:
+    """Return the sum of tables and constant torques: a table with all times."""
+    tables = [part for part in parts if isinstance(part, Timed)]
+    times = np.unique(np.concatenate([table.times for table in tables]))
+    values = np.zeros((times.size, tables[0].values.shape[1]))
+    for part in parts:
+        if isinstance(part, Timed):
+            values += np.array([_interpolated(part, float(t)) for t in times])
+        elif isinstance(part, Constant):
+            values += part.tau
+    return Timed(times, values)
+
+
+def _interpolated(table: Timed, t: float) -> Array:
+    """Return the torques of a table at a time, as the core computes them, (nv,)."""
+    times, values = table
+    if t <= times[0] or t >= times[-1]:
+        return np.asarray(values[0] if t <= times[0] else values[-1])
+    k = int(np.searchsorted(times, t, side="right")) - 1
+    s = (t - times[k]) / (times[k + 1] - times[k])
+    return np.asarray((1.0 - s) * values[k] + s * values[k + 1])
+
+
+def _sum_of_springs(springs: Sequence[Spring], model: Model) -> Spring:
+    """Return one spring with the gains of all and the configuration that each holds."""
+    q = springs[0].q.copy()
+    for spring in springs[1:]:
+        for place in joint_places(model):
+            if spring.kp[place.v_first : place.v_first + place.nv].any():
+                own = slice(place.q_first, place.q_first + place.nq)
+                q[own] = spring.q[own]
+    return Spring(np.sum([s.kp for s in springs], axis=0), np.sum([s.kd for s in springs], axis=0), q)
+
+
+def _function_of(part: Part, model: Model) -> Callable[..., Any]:
+    """Return the torques of a part as a function (t, q, v) -> tau."""
+    if isinstance(part, Called):
+        return part.function
+    if isinstance(part, Timed):
+        return lambda t, q, v: _interpolated(part, t)
+    if isinstance(part, Constant):
+        return lambda t, q, v: part.tau
+    return lambda t, q, v: part.kp * pin.difference(model, q, part.q) - part.kd * v

@@ -1,0 +1,47 @@
+"""Small HTML tables that notebooks show for scenes, runs, solutions and sweeps."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Sequence
+
+NAMES_MAX = 8  # names in a cell
+CELL_MAX = 400  # characters of a cell
+
+
+def table(title: str, rows: Sequence[Sequence[object]], header: Sequence[str] = ()) -> str:
+    """Return a table as HTML that needs no style sheet, script or network.
+
+    Args:
+        title: caption.
+        rows: cells of each row; the first cell is its heading.
+        header: headings of the columns, or none.
+
+    Returns:
+        The table, with all text escaped.
+    """
+    top = f"<tr>{''.join(_cell('th', x) for x in header)}</tr>" if header else ""
+    lines = [_cell("th", row[0]) + "".join(_cell("td", x) for x in row[1:]) for row in rows]
+    body = "".join(f"<tr>{line}</tr>" for line in lines)
+    return f"<table><caption>{_escaped(title)}</caption>{top}{body}</table>"
+
+
+def names(listed: Sequence[str]) -> str:
+    """Return the number of some names and the first of them, for a cell.
+
+    Args:
+        listed: the names.
+    """
+    if not listed:
+        return "none"
+    more = ", ..." if len(listed) > NAMES_MAX else ""
+    return f"{len(listed)}: {', '.join(listed[:NAMES_MAX])}{more}"
+
+
+def _cell(tag: str, value: object) -> str:
+    return f'<{tag} style="text-align: left">{_escaped(str(value))}</{tag}>'
+
+
+def _escaped(text: str) -> str:
+    cut = text if len(text) <= CELL_MAX else f"{text[:CELL_MAX]} ..."
+    return html.escape(cut).replace("\n", "<br>")

@@ -1,0 +1,216 @@
+"""A reference motion on the constraints of a scene: some coordinates are given, and the others follow."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from pin_nonideal.errors import InputError
+from pin_nonideal.scene.scene import Scene, compiled_scene
+from pin_nonideal.states.held import Held, settled
+from pin_nonideal.states.reference_motion import ReferenceMotion
+from pin_nonideal.states.rows import DEPENDENT, holonomic_rows, rows_at
+from pin_nonideal.states.scales import coordinate, slides
+from pin_nonideal.types import Array
+
+from .inverse_dynamics import inverse_dynamics
+from .residual import AtRest
+
+Mask = NDArray[np.bool_]
+
+# Velocities of a coordinate below this part of the admitted ones depend on the coordinates chosen before.
+INDEPENDENT = 1e-6
+LONGEST = 0.1  # move of a given coordinate between two closures, in rad or relative to the scene's length
+LOG_ROUNDING = 1e-3  # largest move of a named coordinate, in rad or relative to the scene's length
+CLOSED = 1e-9  # residual of a reference on the constraints, relative to the scene's length or 1 m
+
+
+class ClosedReference:
+    """A reference motion on the constraints, and the torques that drive it.
+
+    As many given coordinates as the constraints leave free are kept, driven ones first. The other coordinates
+    follow from the constraints at every time.
+
+    Args:
+        scene: the scene without actuation and contacts; its constraints hold positions.
+        times: sample times [s], (nt,).
+        q: configurations, (nt, nq); coordinates that are not given are guesses.
+        v: velocities, (nt, nv), or None.
+        given: mask of the given coordinates, (nv,).
+        driven: names of the driven joints.
+        dofs: mask of their degrees of freedom, (nv,).
+        who: words for messages.
+        by_name: whether the coordinates are given by name, so that all of them must be kept, up to rounding.
+
+    Raises:
+        InputError: the given coordinates do not determine the motion, or no configuration on the constraints
+            has them.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        times: Array,
+        q: Array,
+        v: Array | None,
+        given: Mask,
+        driven: list[str],
+        dofs: Mask,
+        who: str,
+        by_name: bool = True,
+    ) -> None:
+        self._scene, self._driven, self._who = scene, driven, who
+        compiled = compiled_scene(scene)
+        self._runner, self._rows = compiled.program.runner(), holonomic_rows(compiled.program)
+        self._allowed = CLOSED * max(1.0, compiled.projection.length)
+        still = np.zeros(scene.model.nv)
+        start = compiled.project(q[0], still, float(times[0]), Held(q=given & dofs))[0]
+        basis = AtRest(scene, still, float(times[0]), start).free(start)
+        self._free = ~self._independent(basis, [given & dofs, given])
+        on = np.array(q)
+        on[0] = self._settled(start, float(times[0]))
+        unit = np.where(slides(scene.model), compiled.projection.length or 1.0, 1.0)
+        for k in range(1, len(on)):
+            on[k] = self._followed(on[k - 1], q[k], given, times[k - 1 : k + 1], unit)
+        if by_name:
+            self._require_kept(on, q, times, given, unit)
+        on_rates = None if v is None else np.array(v)
+        if on_rates is not None:
+            for k, t in enumerate(times.tolist()):
+                on_rates[k] = self._velocity(on[k], on_rates[k], t)
+        self._motion = ReferenceMotion(scene.model, times, on, on_rates)
+
+    def __call__(self, t: float) -> tuple[Array, Array, Array]:
+        """Return q (nq,), v (nv,) and a (nv,) on the constraints at time t [s]."""
+        q, v, a = self._motion(t)
+        q = self._settled(q, t)
+        v = self._velocity(q, v, t)
+        A, b, _, _ = rows_at(self._runner, q, v, t)
+        a = np.array(a)
+        a[self._free] += self._solved(A, b - A @ a, t)
+        return q, v, a
+
+    def torques(self, q: Array, v: Array, a: Array, t: float) -> Array:
+        """Return the torques of the driven joints for a motion on the constraints, (nv,)."""
+        return inverse_dynamics(self._scene, q, v, a, self._driven, t=t).tau
+
+    def _followed(self, before: Array, q: Array, given: Mask, times: Array, unit: Array) -> Array:
+        """Return a sample on the constraints, followed from the sample before it in short moves, (nq,).
+
+        Args:
+            before: the sample before it, on the constraints, (nq,).
+            q: the sample, (nq,).
+            given: mask of its given coordinates, (nv,).
+            times: times of both samples [s].
+            unit: unit displacement of each coordinate, (nv,).
+        """
+        model = self._scene.model
+
+        def way() -> Array:
+            return np.where(given, pin.difference(model, before, q), 0.0)
+
+        count = max(1, int(np.ceil(np.abs(way() / unit).max(initial=0.0) / LONGEST)))
+        for left in range(count, 0, -1):
+            t = float(times[1] - (left - 1) / count * (times[1] - times[0]))
+            before = self._settled(pin.integrate(model, before, way() / left), t)
+        return before
+
+    def _require_kept(self, on: Array, q: Array, times: Array, given: Mask, unit: Array) -> None:
+        """Check that given coordinates keep their values, up to the rounding of a log.
+
+        Raises:
+            InputError: a given coordinate has moved farther.
+        """
+        model = self._scene.model
+        for t, now, asked in zip(times.tolist(), on, q, strict=True):
+            away = np.where(given, np.abs(pin.difference(model, asked, now)) / unit, 0.0)
+            worst = int(np.argmax(away))
+            if away[worst] > LOG_ROUNDING:
+                raise InputError(
+                    f'{self._who}: q of "{coordinate(model, worst)}" cannot be kept together with the other '
+                    f"named joints at t = {t:g} s, since the constraints move it by {away[worst]:.2g}; name "
+                    "as many joints as the constraints leave free, or give consistent values"
+                )
+
+    def _independent(self, basis: Array, groups: list[Mask]) -> Mask:
+        """Return the mask of coordinates that determine the motion, (nv,), from the first groups first."""
+        chosen, left = np.zeros(len(basis), dtype=bool), basis.copy()
+        for group in groups:
+            while chosen.sum() < basis.shape[1]:
+                sizes = np.where(group & ~chosen, np.linalg.norm(left, axis=1), 0.0)
+                best = int(np.argmax(sizes))
+                if sizes[best] < INDEPENDENT:
+                    break
+                chosen[best] = True
+                along = left[best] / sizes[best]
+                left = left - np.outer(left @ along, along)
+        if chosen.sum() < basis.shape[1]:
+            loose = coordinate(self._scene.model, int(np.argmax(np.linalg.norm(left, axis=1))))
+            raise InputError(
+                f'{self._who}: q must determine the motion with feedforward "constrained"; the constraints '
+                f'leave "{loose}" free beside the joints that q names; name further joints'
+            )
+        return chosen
+
+    def _settled(self, q: Array, t: float) -> Array:
+        """Return the configuration on the constraints with the independent coordinates of q, (nq,)."""
+        on = settled(self._scene.model, self._runner, q, self._free, self._rows, t)
+        residual = rows_at(self._runner, on, np.zeros(len(self._free)), t)[2][self._rows]
+        if not np.abs(residual).max(initial=0.0) <= self._allowed:
+            raise InputError(
+                f"{self._who}: no configuration on the constraints has the reference at t = {t:g} s; the "
+                f"loops stay open by {np.abs(residual).max():.2g} (m or rad)"
+            )
+        return on
+
+    def _velocity(self, q: Array, v: Array, t: float) -> Array:
+        """Return the velocity on the constraints with the independent entries of v, (nv,)."""
+        A, _, _, rate = rows_at(self._runner, q, v, t)
+        found = np.array(v)
+        found[self._free] -= self._solved(A, rate, t)
+        return found
+
+    def _solved(self, A: Array, b: Array, t: float) -> Array:
+        """Solve A x = b for the dependent coordinates."""
+        own = A[np.ix_(self._rows, self._free)]
+        x, _, rank, _ = np.linalg.lstsq(own, b[self._rows], rcond=DEPENDENT)
+        if rank < own.shape[1]:
+            raise InputError(
+                f"{self._who}: the reference passes a singular position at t = {t:g} s, where the given "
+                "coordinates do not determine the others"
+            )
+        return np.asarray(x)
+
+
+def without_drives(model: Any, q0: Array, said: Any, who: str) -> Scene:
+    """Return a scene with the constraints, laws and forces of another, without contacts and actuation.
+
+    Args:
+        model: pinocchio.Model.
+        q0: initial configuration, (nq,).
+        said: descriptions of the other scene.
+        who: words for messages.
+
+    Raises:
+        InputError: a constraint holds no position.
+    """
+    scene = Scene(
+        model,
+        constraints=said.constraints,
+        laws=said.laws,
+        forces=said.forces,
+        q0=q0,
+        terms=said.terms,
+        assembly_tolerance=said.assembly_tolerance,
+    )
+    program = compiled_scene(scene).program
+    for c in program.constraints:
+        if not np.all(c.holonomic):
+            raise InputError(
+                f'{who}: feedforward "constrained" needs constraints of positions; "{c.name}" constrains '
+                'velocities only; take feedforward "rnea" or "gravity"'
+            )
+    return scene

@@ -1,0 +1,69 @@
+"""Quantities of a run that are recorded by name: tables that explain a missing name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from pin_nonideal.errors import InputError, UnknownNameError, nearest
+from pin_nonideal.types import Array
+
+# Groups of a Trajectory, with the value of `record` that records them.
+RECORD_OF = {
+    "energy": "energy",
+    "power": "power",
+    "law_forces": "laws",
+    "reactions": "reactions",
+    "contact_forces": "forces",
+}
+
+
+class Group(dict[str, Array]):
+    """Arrays by name; empty, and false in a condition, if they were not recorded.
+
+    Args:
+        field: field of the Trajectory.
+        arrays: arrays by name, (nt,) or (nt, n), or None if they were not recorded.
+
+    Attributes:
+        field: see above.
+        recorded: whether the run recorded them.
+    """
+
+    def __init__(self, field: str, arrays: Mapping[str, Array] | None) -> None:
+        super().__init__(arrays or {})
+        self.field, self.recorded = field, arrays is not None
+
+    def __missing__(self, name: object) -> Array:
+        if not self.recorded:
+            raise InputError(
+                f'run.{self.field} was not recorded; pass record="{RECORD_OF[self.field]}" to simulate'
+            )
+        raise UnknownNameError(f'run.{self.field} has no "{name}"{nearest(str(name), self)}')
+
+
+class GroupField:
+    """Attribute of a Trajectory that returns its `Group`.
+
+    Args:
+        field: field of the Trajectory.
+    """
+
+    def __init__(self, field: str) -> None:
+        self._field = field
+
+    def __get__(self, run: Any, owner: Any = None) -> Any:
+        if run is None:
+            return self
+        fields = vars(run)
+        arrays = fields[self._field]
+        if isinstance(arrays, Group):
+            return arrays
+        group = Group(self._field, arrays)
+        if group.recorded:
+            fields[self._field] = group
+        return group
+
+    def __set__(self, run: Any, arrays: Mapping[str, Array] | None) -> None:
+        empty = isinstance(arrays, Group) and not arrays.recorded
+        vars(run)[self._field] = None if empty else arrays

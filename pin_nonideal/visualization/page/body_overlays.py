@@ -1,0 +1,42 @@
+"""What a reader of a replay may choose to see of bodies: boxes of inertia, collision shapes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pinocchio as pin
+
+from pin_nonideal.types import Table
+
+from .visuals import Visual, visuals_of
+
+if TYPE_CHECKING:
+    from pin_nonideal.scene.scene import Scene
+
+# Collision shapes with more triangles are not carried.
+TRIANGLES = 20_000
+
+
+def inertia_box(inertia: pin.Inertia) -> Table:
+    """The even box of the same mass and inertia: edges [m] and orientation (x, y, z, w) in its frame."""
+    moments, axes = np.linalg.eigh(np.asarray(inertia.inertia))
+    if np.linalg.det(axes) < 0.0:
+        axes[:, 0] *= -1.0
+    squares = 6.0 * (moments.sum() - 2.0 * moments) / (inertia.mass or 1.0)
+    return {
+        "edges": np.sqrt(np.maximum(squares, 0.0)).tolist(),
+        "turn": pin.Quaternion(axes).coeffs().tolist(),
+    }
+
+
+def collisions_of(scene: Scene) -> list[Visual]:
+    """Collision shapes, without those of too many triangles in all."""
+    if scene.collision_model is None:
+        return []
+    found, room = [], TRIANGLES
+    for visual in visuals_of(scene.collision_model, TRIANGLES):
+        if visual.shape.kind != "plane" and len(visual.shape.triangles) <= room:
+            room -= len(visual.shape.triangles)
+            found.append(visual)
+    return found

@@ -1,0 +1,86 @@
+"""Plots of one quantity over another as a page carries them, with the times of their points."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pin_nonideal.types import Array, Table
+
+from .binary import Payload
+from .signal_list import without_rounding
+from .signals import Plot
+from .xy_plots import Relation, available, is_relation, relations_of
+
+if TYPE_CHECKING:
+    from pin_nonideal.trajectory.trajectory import Trajectory
+
+# Points of a curve at most, of all curves together, and of what a law allows.
+MOST, POINTS, BOUNDS = 1_500, 60_000, 300
+
+
+def is_asked(run: Trajectory, item: Any) -> bool:
+    """Whether an item of `plots` names a relation and not a joint.
+
+    Args:
+        run: the run.
+        item: of `plots`.
+    """
+    return is_relation(item) and item not in list(run.scene.model.names)
+
+
+def stored_relations(payload: Payload, run: Trajectory, finer: Trajectory, asked: list[str]) -> list[Table]:
+    """The relations of a run: those asked for, which are shown, and those that a reader may choose.
+
+    Args:
+        payload: that carries their points.
+        run: the run.
+        finer: the same with more samples, for phase planes.
+        asked: names, as `relations_of` takes them.
+    """
+    more = [name for name in available(run) if name not in asked]
+    each = min(MOST, POINTS // max(len(asked) + len(more), 1))
+    found = []
+    for name in [*asked, *more]:
+        own = finer if name.split(" ", 1)[0] == "phase" else run
+        for relation in relations_of(own, name):
+            found.append(_stored(payload, own, name, relation, each) | {"shown": name in asked})
+    return found
+
+
+def _stored(payload: Payload, run: Trajectory, name: str, relation: Relation, points: int) -> Table:
+    curves = [_curve(payload, run, label, *pair, points) for label, pair in relation.curves.items()]
+    one_side = relation.x.startswith("load")
+    bounds = [_bound(payload, label, *pair, one_side) for label, pair in relation.bounds.items()]
+    return {
+        "name": name,
+        "title": relation.title if name in ("phase", "friction", "load") else name,
+        "x": relation.x,
+        "y": relation.y,
+        "note": relation.note,
+        "curves": curves,
+        "bounds": bounds,
+    }
+
+
+def _curve(payload: Payload, run: Trajectory, label: str, x: Array, y: Array, points: int) -> Table:
+    """Points of a curve with their times; where it breaks, numbers that are none."""
+    t = np.asarray(run.t, dtype=float)
+    if len(x) > len(t):  # breaks were put in
+        at = np.flatnonzero(np.isnan(x)) - np.arange(len(x) - len(t))
+        t = np.insert(t, at, t[at])
+    thin = Plot(label, "", t, {"x": x, "y": y}).thinned(max(points // 4, 25))
+    values = {key: without_rounding(part, 1e-12 * _largest(part)) for key, part in thin.curves.items()}
+    return {"label": label, "t": payload.add(thin.t, "f8")} | {k: payload.curve(v) for k, v in values.items()}
+
+
+def _bound(payload: Payload, label: str, x: Array, y: Array, one_side: bool) -> Table:
+    """What a law allows, in the order of x."""
+    chosen = np.unique(np.linspace(0, len(x) - 1, BOUNDS).astype(int))
+    order = chosen[np.argsort(x[chosen], kind="stable")]
+    return {"label": label, "x": payload.add(x[order]), "y": payload.add(y[order]), "both": not one_side}
+
+
+def _largest(values: Array) -> float:
+    return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))

@@ -1,0 +1,233 @@
+"""Drives of a scene: tables that hold their torques, and lists of drives whose torques add."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import pin_nonideal as pn
+
+TIMES = np.array([0.1, 0.237, 0.3, 0.71])
+VALUES = np.array([[1.0, 0.0], [-4.0, 2.0], [9.0, -3.0], [-2.0, 5.0]])
+END = 1.0
+
+
+def pendulum():
+    """Two links that hang from the world, joints "shoulder" and "elbow"."""
+    model = pin.Model()
+    parent = 0
+    for name, z in (("shoulder", 0.0), ("elbow", -1.0)):
+        parent = model.addJoint(parent, pin.JointModelRY(), pin.SE3(np.eye(3), np.array([0.0, 0.0, z])), name)
+        inertia = pin.Inertia(1.0, np.array([0.1, 0.0, -0.5]), 0.1 * np.eye(3))
+        model.appendBodyToJoint(parent, inertia, pin.SE3.Identity())
+    return model
+
+
+def run(actuation, laws=(), duration=END, **options):
+    return pn.simulate(
+        pn.Scene(pendulum(), laws=laws, actuation=actuation), duration, progress=False, **options
+    )
+
+
+FRICTION = [
+    pn.JointFriction("shoulder", coulomb=3.0, mu=0.1, radius=0.05),
+    pn.JointFriction("elbow", coulomb=0.5, static_ratio=1.5),
+]
+METHODS = {
+    "dop853": {"method": "dop853", "rtol": 1e-13, "atol": 1e-14},
+    "dopri5": {"method": "dopri5", "rtol": 1e-13, "atol": 1e-14},
+    "rk4": {"method": "rk4", "dt": 1e-3},
+    "semi_implicit_euler": {"method": "semi_implicit_euler", "dt": 1e-3},
+    "moreau": {"method": "moreau", "dt": 1e-3},
+}
+
+
+@pytest.mark.parametrize("laws", [(), FRICTION], ids=["smooth", "friction"])
+@pytest.mark.parametrize("method", METHODS)
+def test_a_held_table_is_a_sequence_of_constant_torques(method, laws):
+    options = METHODS[method]
+    whole = run(pn.Table(TIMES, VALUES, interpolation="hold"), laws, **options)
+    stops = [*TIMES[1:], END]
+    t, q, v = 0.0, np.zeros(2), np.zeros(2)
+    for tau, stop in zip(VALUES, stops, strict=True):
+        piece = run(tau, laws, stop - t, q=q, v=v, t0=t, **options)
+        t, q, v = stop, piece.q[-1], piece.v[-1]
+    np.testing.assert_allclose(whole.q[-1], q, rtol=0.0, atol=1e-10)
+    np.testing.assert_allclose(whole.v[-1], v, rtol=0.0, atol=1e-10)
+
+
+@pytest.mark.parametrize("times", [TIMES, [-0.4, 0.0, 0.5, 0.75]])
+def test_steps_end_at_the_switching_times_and_the_next_torque_acts_there(times):
+    one = run(pn.Table(times, VALUES, interpolation="hold"), record="tau", t0=-0.2)
+    for switch, tau in zip(times[1:], VALUES[1:], strict=True):
+        at = np.flatnonzero(one.t == switch)
+        assert at.size >= 1
+        np.testing.assert_array_equal(one.tau[at[-1]], tau)
+        np.testing.assert_allclose(one.tau[at[0] - 1], VALUES[list(times).index(switch) - 1], atol=1e-14)
+    np.testing.assert_array_equal(one.tau[0], VALUES[0])
+
+
+def test_a_stepper_switches_at_the_ends_of_its_periods():
+    table = pn.Table([0.0, 0.1, 0.2], [[1.0, 0.0], [-2.0, 0.5], [0.0, 0.0]], interpolation="hold")
+    held = pn.Scene(pendulum(), actuation=table).stepper(0.1, method="rk4", dt=0.01)
+    plain = pn.Scene(pendulum()).stepper(0.1, method="rk4", dt=0.01)
+    for tau in ([1.0, 0.0], [-2.0, 0.5], [0.0, 0.0]):
+        for a, b in zip(held.step(), plain.step(tau), strict=True):
+            np.testing.assert_allclose(a, b, rtol=0.0, atol=1e-13)
+
+
+def test_a_held_table_of_one_sample_is_constant():
+    np.testing.assert_array_equal(
+        run(pn.Table([0.3], VALUES[:1], interpolation="hold")).q, run(pn.Table([0.3], VALUES[:1])).q
+    )
+
+
+def test_columns_by_name_are_the_columns_of_an_array():
+    """Joints that a table does not name have no torque."""
+    zero = np.zeros(len(TIMES))
+    for interpolation in ("linear", "hold"):
+        named = pn.Table(TIMES, {"elbow": VALUES[:, 1]}, interpolation=interpolation)
+        plain = pn.Table(TIMES, np.column_stack([zero, VALUES[:, 1]]), interpolation=interpolation)
+        one, other = run(named), run(plain)
+        np.testing.assert_array_equal(one.q, other.q)
+        np.testing.assert_array_equal(one.v, other.v)
+
+
+def test_methods_of_scipy_refuse_jumps():
+    with pytest.raises(pn.InputError, match=r"Table needs one of the core's methods"):
+        run(pn.Table(TIMES, VALUES, interpolation="hold"), method="BDF")
+
+
+# --- lists of drives ----------------------------------------------------------------------------------------
+
+SHOULDER = pn.HoldPosition({"shoulder": 20.0}, {"shoulder": 2.0}, q={"shoulder": 0.5})
+PAIRS = {
+    "constants": ([{"shoulder": 1.0}, {"elbow": -0.5}], [1.0, -0.5]),
+    "hold positions": (
+        [SHOULDER, pn.HoldPosition({"elbow": 5.0}, {"elbow": 1.0}, q={"elbow": -0.2})],
+        pn.HoldPosition([20.0, 5.0], [2.0, 1.0], q=[0.5, -0.2]),
+    ),
+    "tables": (
+        [pn.Table(TIMES, {"shoulder": VALUES[:, 0]}), pn.Table(TIMES, {"elbow": VALUES[:, 1]})],
+        pn.Table(TIMES, VALUES),
+    ),
+    "held tables": (
+        [
+            pn.Table(TIMES, {"shoulder": VALUES[:, 0]}, interpolation="hold"),
+            pn.Table(TIMES, {"elbow": VALUES[:, 1]}, interpolation="hold"),
+        ],
+        pn.Table(TIMES, VALUES, interpolation="hold"),
+    ),
+    "one drive": ([pn.Table(TIMES, VALUES)], pn.Table(TIMES, VALUES)),
+}
+
+
+@pytest.mark.parametrize("pair", PAIRS)
+def test_a_list_equals_one_drive_of_all_joints(pair):
+    several, one = (run(actuation, record="tau") for actuation in PAIRS[pair])
+    np.testing.assert_array_equal(several.t, one.t)
+    np.testing.assert_array_equal(several.q, one.q)
+    np.testing.assert_array_equal(several.tau, one.tau)
+
+
+def test_tables_of_different_times_and_kinds_add():
+    other = np.array([0.0, 0.4, 0.5])
+    drives = [
+        pn.Table(TIMES, {"shoulder": VALUES[:, 0]}, interpolation="hold"),
+        pn.Table(other, {"elbow": [1.0, 3.0, -1.0]}),
+    ]
+    tau = run(drives, record="tau", output_dt=0.05)
+    held = VALUES[np.maximum(np.searchsorted(TIMES, tau.t, side="right") - 1, 0), 0]
+    np.testing.assert_allclose(tau.tau[:, 0], held, atol=1e-13)
+    np.testing.assert_allclose(tau.tau[:, 1], np.interp(tau.t, other, [1.0, 3.0, -1.0]), atol=1e-13)
+    assert set(other[1:]) | set(TIMES[1:]) <= set(run(drives).t)
+
+
+def test_drives_of_different_kinds_add():
+    """The sum of a table and a spring equals their sum in one function."""
+
+    def both(t, q, v):
+        return [20.0 * (0.5 - q[0]) - 2.0 * v[0], np.interp(t, TIMES, VALUES[:, 1])]
+
+    drives = [SHOULDER, pn.Table(TIMES, {"elbow": VALUES[:, 1]})]
+    several, one = (run(actuation, rtol=1e-11, atol=1e-12) for actuation in (drives, both))
+    np.testing.assert_allclose(several.q[-1], one.q[-1], rtol=0.0, atol=1e-9)
+
+
+def test_jumps_beside_a_spring_are_found_by_the_error_control():
+    """Steps do not end at the times of a table beside a spring, and the tolerance holds all the same."""
+    table = pn.Table(TIMES, {"elbow": VALUES[:, 1]}, interpolation="hold")
+    tight = {"rtol": 1e-10, "atol": 1e-11}
+    whole = run([SHOULDER, table], **tight)
+    t, q, v = 0.0, np.zeros(2), np.zeros(2)
+    for tau, stop in zip(VALUES[:, 1], [*TIMES[1:], END], strict=True):
+        piece = run([SHOULDER, {"elbow": tau}], duration=stop - t, q=q, v=v, t0=t, **tight)
+        t, q, v = stop, piece.q[-1], piece.v[-1]
+    np.testing.assert_allclose(whole.q[-1], q, rtol=0.0, atol=1e-7)
+
+
+def test_limits_of_one_drive_apply_to_its_joints():
+    drives = [pn.EffortLimits(SHOULDER, effort=1.0), {"elbow": 3.0}]
+    tau = run(drives, record="tau").tau
+    assert np.abs(tau[:, 0]).max() == 1.0
+    assert (tau[:, 1] == 3.0).all()
+    around = run(pn.EffortLimits([SHOULDER, {"elbow": 3.0}], effort=1.0), record="tau").tau
+    assert (around[:, 1] == 1.0).all()
+
+
+def test_scenes_with_lists_are_described_copied_and_pickled():
+    scene = pn.Scene(pendulum(), actuation=[SHOULDER, {"elbow": 3.0}])
+    told = scene.describe()
+    assert [drive["kind"] for drive in told.to_dict()["actuation"]["made_with"]["drives"]] == [
+        "HoldPosition",
+        "constant torques",
+    ]
+    assert "HoldPosition" in str(told)
+    assert "actuation HoldPosition" in scene.report()
+    expected = pn.simulate(scene, 0.1).q
+    for other in (copy.deepcopy(scene), pickle.loads(pickle.dumps(scene)), scene.replace()):
+        np.testing.assert_array_equal(pn.simulate(other, 0.1).q, expected)
+
+
+@pytest.mark.parametrize(
+    ("drives", "message"),
+    [
+        (
+            [SHOULDER, {"shoulder": 1.0, "elbow": 2.0}],
+            '"shoulder" is commanded by drive 0 (HoldPosition) and drive 1 (constant torques)',
+        ),
+        (
+            [pn.HoldPosition(1.0, 1.0, name="stand"), pn.Table([0.0], {"elbow": [1.0]}, name="log")],
+            '"elbow" is commanded by drive 0 (HoldPosition "stand") and drive 1 (Table "log")',
+        ),
+        ([lambda t, q, v: [0.0, 0.0], {"elbow": 1.0}], '"elbow" is commanded by drive 0 (function)'),
+        (
+            [pn.SampledControl(lambda t, q, v: [0.0, 0.0], 0.01), SHOULDER],
+            '"shoulder" is commanded by drive 0 (SampledControl) and drive 1 (HoldPosition)',
+        ),
+        ([SHOULDER, {"elbo": 1.0}], 'actuation[1]: no joint "elbo"; nearest: "elbow"'),
+        ([SHOULDER, None], "each entry of a list of drives must be a drive; entry 1 is None"),
+        ([SHOULDER, [{"elbow": 1.0}]], "entry 1 is another list"),
+        (
+            pn.EffortLimits([{"elbow": 1.0}], 1.0),
+            None,
+        ),
+    ],
+)
+def test_errors(drives, message):
+    if message is None:
+        with pytest.raises(pn.InputError, match="must ask for torques without limits of its own"):
+            pn.EffortLimits([drives, {"shoulder": 1.0}], 1.0)
+        return
+    with pytest.raises((pn.InputError, pn.UnknownNameError)) as error:
+        pn.Scene(pendulum(), actuation=drives)
+    assert message in str(error.value)
+
+
+def test_an_interpolation_is_linear_or_hold():
+    with pytest.raises(pn.InputError, match="Table: interpolation must be one of 'linear', 'hold'"):
+        pn.Table([0.0], [[1.0]], interpolation="cubic")
