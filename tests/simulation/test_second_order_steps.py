@@ -19,7 +19,9 @@ def spinning_body(inertia: tuple[float, float, float], com: np.ndarray, gravity:
         model.gravity.setZero()
     joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "body")
     turned = pin.utils.rotate("x", 0.7) @ pin.utils.rotate("z", -0.4)
-    model.appendBodyToJoint(joint, pin.Inertia(1.3, com, turned @ np.diag(inertia) @ turned.T), pin.SE3.Identity())
+    model.appendBodyToJoint(
+        joint, pin.Inertia(1.3, com, turned @ np.diag(inertia) @ turned.T), pin.SE3.Identity()
+    )
     return model
 
 
@@ -39,7 +41,9 @@ def without_laws(name: str) -> pn.Scene:
 
 def sprung_arm() -> pn.Scene:
     scene = pn.load("panda")
-    return pn.Scene(scene.model, forces=[pn.JointSpring("panda_joint4", 40.0, rest=-1.0, damping=0.5)], q0=scene.q0)
+    return pn.Scene(
+        scene.model, forces=[pn.JointSpring("panda_joint4", 40.0, rest=-1.0, damping=0.5)], q0=scene.q0
+    )
 
 
 @pytest.mark.parametrize(
@@ -59,19 +63,18 @@ def test_order(make: Callable[[], pn.Scene]) -> None:
     assert slope > 1.9
 
 
-def test_an_undriven_arm_keeps_its_energy() -> None:
-    run = pn.simulate(without_laws("panda"), 4.0, method="moreau", dt=1e-3, output_dt=0.1, record="energy")
-    energy = run.energy["kinetic"] + run.energy["potential"]
-    assert np.ptp(energy) < 0.5
+def arm_without_hand() -> pn.Scene:
+    """Seven joints without friction; the fingers, which would slide out of the hand, are locked."""
+    scene = pn.load("panda")
+    fingers = [k for k, name in enumerate(scene.model.names) if "finger" in name]
+    model = pin.buildReducedModel(scene.model, fingers, scene.q0)
+    return pn.Scene(model, q0=scene.q0[: model.nq])
 
 
-@pytest.mark.slow
-def test_an_undriven_arm_keeps_its_energy_for_a_minute() -> None:
-    run = pn.simulate(without_laws("panda"), 60.0, method="moreau", dt=1e-3, output_dt=0.05, record="energy")
-    energy = run.energy["kinetic"] + run.energy["potential"]
-    assert np.ptp(energy) < 2.0
-    slope, _ = np.polyfit(run.t, energy, 1)
-    assert abs(slope) * 60.0 < 0.2
+@pytest.mark.parametrize("seconds", [4.0, pytest.param(60.0, marks=pytest.mark.slow)])
+def test_an_undriven_arm_keeps_its_energy(seconds: float) -> None:
+    run = pn.simulate(arm_without_hand(), seconds, method="moreau", dt=1e-3, output_dt=0.05, record="energy")
+    assert np.ptp(run.energy["kinetic"] + run.energy["potential"]) < 1.0  # of 85 J
 
 
 @pytest.mark.parametrize("steps", [2000, pytest.param(100_000, marks=pytest.mark.slow)])
@@ -88,7 +91,9 @@ def test_a_free_body_keeps_energy_and_momentum(steps: int, speed: float) -> None
         momentum = pin.computeCentroidalMomentum(model, data, q, v)
         values.append([energy, *momentum.linear, *momentum.angular])
     values_ = np.array(values)
-    scale = np.array([values_[0, 0], *[np.linalg.norm(values_[0, 1:4])] * 3, *[np.linalg.norm(values_[0, 4:])] * 3])
+    scale = np.array(
+        [values_[0, 0], *[np.linalg.norm(values_[0, 1:4])] * 3, *[np.linalg.norm(values_[0, 4:])] * 3]
+    )
     assert (np.abs(values_ - values_[0]) / scale).max() < 1e-12
 
 
@@ -113,7 +118,9 @@ def test_stiff_control_holds_its_target(friction: float) -> None:
     inertia = np.diag(pin.crba(scene.model, scene.model.createData(), scene.q0))
     kp, kd = 4e3 * inertia / 1e-6, 2e3 * inertia / 1e-3
     target = scene.q0 + 0.05
-    laws = [pn.JointFriction(name, coulomb=friction) for name in list(scene.model.names)[1:]] if friction else []
+    laws = (
+        [pn.JointFriction(name, coulomb=friction) for name in list(scene.model.names)[1:]] if friction else []
+    )
     held = pn.Scene(scene.model, laws=laws, actuation=pn.HoldPosition(kp, kd, q=target), q0=scene.q0)
     run = pn.simulate(held, 1.0, method="moreau", dt=1e-3)
     assert np.abs(run.v).max() < 60.0
@@ -148,7 +155,9 @@ def test_a_spring_keeps_its_amplitude() -> None:
 
 def test_the_ledger_tells_what_the_scheme_adds() -> None:
     scene = pn.load("panda")
-    held = pn.Scene(scene.model, actuation=pn.HoldPosition(200.0, 20.0), q0=scene.q0, v0=np.full(scene.model.nv, 0.5))
+    held = pn.Scene(
+        scene.model, actuation=pn.HoldPosition(200.0, 20.0), q0=scene.q0, v0=np.full(scene.model.nv, 0.5)
+    )
     run = pn.simulate(held, 0.5, method="moreau", dt=1e-3, record="energy")
     assert np.abs(run.energy["balance"]).max() < 1e-4
 

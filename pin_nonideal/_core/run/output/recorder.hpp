@@ -16,8 +16,8 @@ namespace pn {
 
 struct Event {
     enum class Kind {
-        stick, slip, reverse, pull, chatter, several, paradox, user, saturate, desaturate, jump, impact, touch_down, lift_off,
-        relaxed
+        stick, slip, reverse, pull, chatter, several, paradox, user, saturate, desaturate, jump, impact, touch_down,
+        lift_off, relaxed
     };
     double time;
     Kind kind;

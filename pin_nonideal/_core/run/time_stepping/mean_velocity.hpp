@@ -5,8 +5,8 @@
 
 namespace pn {
 
-// The mean of the velocities at the start and at the end of a step depends on the forces. Sweeps find it: the first one takes
-// the forces at the velocity of the start.
+// The mean of the velocities at the start and at the end of a step depends on the forces. Sweeps find it: the first one
+// takes the forces at the velocity of the start.
 //
 // The linear velocity v of a free flyer is given in axes that turn with it. Inside a step it is given in the axes at the
 // middle of the step. Its rate there is the acceleration plus w x v, so a body that rolls or flies keeps its speed while

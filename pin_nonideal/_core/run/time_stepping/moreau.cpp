@@ -31,7 +31,8 @@ std::vector<int> all_elements(const System& system) {
 
 Moreau::Moreau(System& system)
     : system_(system), p(system.p), w(system.w), problem_(p, all_elements(system)), modes_(system.ne, unloaded),
-      unloaded_(modes_), mean_(p), drives_(p), flight_(p, drives_), q_mid_(VecX::Zero(system.nq)), power_(VecX::Zero(system.nw)), limit_(system.ne, problem_.rows),
+      unloaded_(modes_), mean_(p), drives_(p), flight_(p, drives_), q_mid_(VecX::Zero(system.nq)),
+      power_(VecX::Zero(system.nw)), limit_(system.ne, problem_.rows),
       force_limit_(limit_) {
     problem_.alpha0 = alpha_ = near_ = VecX::Zero(problem_.rows);
     for (int dim : problem_.dims) boxes_ = boxes_ && dim == 1;
