@@ -43,10 +43,11 @@ def test_the_laws_hold_in_each_step(seed: int, ratio: float) -> None:
     if "relaxed" not in told:
         assert max(run.stats.signorini, run.stats.coulomb, run.stats.dissipation) < 100.0 * LAWS
     centers = run.q[:, [7 * k + i for k in range(20) for i in range(3)]].reshape(len(run.t), 20, 3)
-    assert centers[..., 2].min() > 0.99 * RADIUS
-    assert np.abs(centers[..., :2]).max() < WALL - 0.99 * RADIUS
+    inside = 1e-3 * 2.0 * np.sqrt(2.0 * 9.81 * 0.4)  # a step's approach of two balls that fell from the top
+    assert centers[..., 2].min() > RADIUS - inside
+    assert np.abs(centers[..., :2]).max() < WALL - RADIUS + inside
     gaps = np.linalg.norm(centers[:, :, None] - centers[:, None], axis=-1) + 10.0 * np.eye(20)
-    assert gaps.min() > 1.9 * RADIUS
+    assert gaps.min() > 2.0 * RADIUS - inside
 
 
 def test_a_pile_loses_energy() -> None:
@@ -74,4 +75,4 @@ def test_separate_piles_move_as_if_alone() -> None:
         return pn.Scene(model, contacts=contacts, q0=np.array(q))
 
     one, two = (pn.simulate(pile(copies), 0.3, method="moreau", dt=1e-3, output_dt=0.05) for copies in (1, 2))
-    np.testing.assert_allclose(two.q[:, :21], one.q, atol=1e-9)
+    np.testing.assert_allclose(two.q[:, :21], one.q, rtol=0.0, atol=1e-7)  # the top ball rolls off
