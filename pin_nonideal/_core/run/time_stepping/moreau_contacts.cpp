@@ -42,7 +42,8 @@ constexpr double most_relaxed = 1e-2;
 MoreauContacts::MoreauContacts(System& system, GapWatch& watch)
     : system_(system), p(system.p), w(system.w), mean_(p), drives_(p), flight_(p, drives_), watch_(watch),
       was_closed_(system.ng, 0), closed_(system.ng, 0), open_(system.ng, 0), modes_(system.ne, unloaded),
-      unloaded_(modes_), q_mid_(VecX::Zero(system.nq)), v0_(VecX::Zero(system.nv)), v1_(v0_), a_free_(v0_), power_(VecX::Zero(system.nw)), trees_(system.p), zero_(VecX::Zero(p.layout.rows)), force_(v0_) {
+      unloaded_(modes_), q_mid_(VecX::Zero(system.nq)), v0_(VecX::Zero(system.nv)), v1_(v0_), a_free_(v0_),
+      power_(VecX::Zero(system.nw)), trees_(system.p), zero_(VecX::Zero(p.layout.rows)), force_(v0_) {
     if (system.ng == 0) return;
     solver_.take_misses(most_miss);
     for (const Gap& gap : p.gaps) rounded_by_.push_back(rounded_by(p.blocks[gap.block].kind));
