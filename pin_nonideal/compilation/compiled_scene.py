@@ -14,7 +14,7 @@ from pin_nonideal.states.held import NOTHING_HELD, Held
 from pin_nonideal.states.joint_layout import joint_places
 from pin_nonideal.states.projection import Projection
 from pin_nonideal.states.report import ProjectionReport
-from pin_nonideal.states.rows import row_slices
+from pin_nonideal.states.rows import block_names, row_slices
 from pin_nonideal.types import Array, Model
 
 from .actuation import delayed_torque
@@ -52,6 +52,7 @@ class CompiledScene:
         joints: layout of the values of each joint in q and v.
         contact_names: names of the contacts in the order of their descriptions; each stop is one contact.
         opening_names: names of the unilateral contacts.
+        block_names: names of all constraints and contacts, by block of the core.
         anchors: (name, frame id, frame id or None for the world) of constraints between two frames.
         dropped: (name, row, reason) of rows that can never act.
         projection: projection onto the constraints.
@@ -77,8 +78,9 @@ class CompiledScene:
             name: described[name if name in described else name.rpartition(" ")[0]] for name in self.slices
         }
         self.joints = joint_places(model)
-        self.contact_names = [self.program.constraints[block].name for block in self.program.contacts]
-        self.opening_names = [c.name for c in self.program.constraints[self.program.first_gap :]]
+        self.block_names = block_names(self.program)
+        self.contact_names = [self.block_names[block] for block in self.program.contacts]
+        self.opening_names = self.block_names[self.program.first_gap :]
         named = list(zip(self.slices, said.constraints, strict=False))  # contacts follow
         self.anchors = anchor_frames(named, where)
         self.unprojected = [

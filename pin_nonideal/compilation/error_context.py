@@ -23,6 +23,7 @@ from pin_nonideal.errors import (
     StiffnessError,
     WallTimeError,
 )
+from pin_nonideal.states.rows import block_names
 from pin_nonideal.types import Model
 
 MOST_NAMED = 4  # names in a message
@@ -83,14 +84,16 @@ def named_failure(
         return _paradox(elements or program.law_names, failure)
     if kind is kinds.not_converged:
         names = [program.element_names[i] for i in failure.elements]
-        return _unresolved(names or [program.constraints[i].name for i in program.contacts], t)
+        blocks = block_names(program)
+        return _unresolved(names or [blocks[i] for i in program.contacts], t)
     if kind is kinds.closure:
         name = program.constraints[failure.elements[0]].name
         return opened(name, {name: value}, t)
     if kind is kinds.interrupted:
         return RunInterrupted(f"the run was interrupted at t = {t:.4g} s", time=t)
     if kind is kinds.impact_energy:
-        names = [program.constraints[i].name for i in failure.elements]
+        blocks = block_names(program)
+        names = [blocks[i] for i in failure.elements]
         return _gained(names, value, t, _touching(model, names, around.pairs))
     if kind is kinds.stiff:
         return _stiff(model, failure.elements[0], value, t, around.explicit_only)

@@ -11,6 +11,11 @@ from pin_nonideal.core_loader import core
 from pin_nonideal.types import Array
 
 
+def block_names(program: core.Program) -> list[str]:
+    """Return the names of all constraints and contacts, by block of the core."""
+    return [c.name for c in program.constraints]
+
+
 def row_slices(program: core.Program | core.Builder) -> dict[str, slice]:
     """Return the rows of each constraint and contact, by name.
 

@@ -110,17 +110,17 @@ def _of_laws(scene: Scene, outcome: core.Outcome) -> Table:
 
 def _contact_forces(scene: Scene, outcome: core.Outcome) -> dict[str, Array]:
     """Return the force of each contact between two frames, in world axes."""
-    program = compiled_scene(scene).program
-    names = [program.constraints[block].name for block in program.framed_contacts]
+    compiled = compiled_scene(scene)
+    names = [compiled.block_names[block] for block in compiled.program.framed_contacts]
     forces = outcome.contact_forces.reshape(len(outcome.t), len(names), 3)
     return {name: forces[:, k] for k, name in enumerate(names)}
 
 
 def _reactions(scene: Scene, outcome: core.Outcome) -> dict[str, Array]:
     """Return the wrenches of joints, then of anchors and contacts, in their own axes and in world axes."""
-    program = compiled_scene(scene).program
+    compiled = compiled_scene(scene)
     joints = [str(name) for name in scene.model.names][1:]
-    names = [*joints, *(program.constraints[block].name for block in program.reaction_blocks)]
+    names = [*joints, *(compiled.block_names[block] for block in compiled.program.reaction_blocks)]
     wrenches = outcome.reactions.reshape(len(outcome.t), len(names), 12)
     return {name: wrenches[:, k] for k, name in enumerate(names)}
 
@@ -136,7 +136,7 @@ def _event(scene: Scene, event: core.Event, functions: Sequence[str]) -> Event:
         # Without friction, a cluster of events consists of contact events.
         names = scene.element_names or compiled_scene(scene).opening_names
         return Event(event.time, event.kind.name, names[event.element])
-    name = compiled_scene(scene).program.constraints[event.element].name
+    name = compiled_scene(scene).block_names[event.element]
     if event.kind not in (core.EventKind.impact, core.EventKind.jump):
         return Event(event.time, event.kind.name, name, miss=event.miss)
     change = event.energy_change

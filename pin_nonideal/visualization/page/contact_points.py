@@ -58,7 +58,7 @@ def contact_points(run: Trajectory, motion: Motion) -> list[ContactPoint]:
         motion: motion of the run.
     """
     compiled = compiled_scene(run.scene)
-    names = [compiled.program.constraints[block].name for block in compiled.program.framed_contacts]
+    names = [compiled.block_names[block] for block in compiled.program.framed_contacts]
     struck = {str(event.element) for event in run.events}
     closed = {name: _closed(run, name) for name in names}
     chosen = [
