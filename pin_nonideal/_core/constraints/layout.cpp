@@ -102,7 +102,7 @@ RowLayout layout_rows(const std::vector<Block>& blocks, int nv) {
     for (int b = 0; b < n; ++b)
         for (size_t k = 0; k < blocks[b].kept.size(); ++k) layout.first[layout.position[blocks[b].row + k]] = lead[b];
     for (int i = 0; i < layout.rows; ++i) {
-        layout.start[i] = static_cast<int>(layout.entries) - layout.first[i];
+        layout.start[i] = static_cast<std::ptrdiff_t>(layout.entries) - layout.first[i];
         layout.entries += i - layout.first[i] + 1;
     }
     return layout;

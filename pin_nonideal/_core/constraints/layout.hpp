@@ -1,6 +1,7 @@
 // Positions of the rows of all blocks in the symmetric matrix B B^T, and the stored entries of this matrix.
 #pragma once
 
+#include <cstddef>
 #include <utility>
 #include <vector>
 
@@ -14,7 +15,8 @@ struct RowLayout {
     int rows = 0;
     std::vector<int> position;  // position of each kept row in elimination order
     std::vector<int> row_at;    // inverse of position
-    std::vector<int> first, start;
+    std::vector<int> first;
+    std::vector<std::ptrdiff_t> start;
     size_t entries = 0;
     using Common = std::vector<std::pair<int, int>>;  // positions of common dofs in two supports
     struct Pair {  // another block with common dofs

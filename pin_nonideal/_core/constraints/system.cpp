@@ -7,8 +7,8 @@ namespace pn {
 void RowSystem::allocate(const RowLayout& layout, int block_count, int nv) {
     blocks.reserve(block_count);
     block_used.assign(block_count, 0);
-    G.assign(layout.entries, 0.0);
-    factor.assign(layout.entries, 0.0);
+    G.allocate(layout.entries);
+    factor.allocate(layout.entries);
     scale = longest = longest_chosen = VecX::Zero(layout.rows);
     active.assign(layout.rows, 0);
     required.assign(layout.rows, 0);

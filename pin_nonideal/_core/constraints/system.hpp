@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "constraints/layout.hpp"
+#include "math/untouched_zeros.hpp"
 
 namespace pn {
 
@@ -22,7 +23,8 @@ struct RowChoice {
 };
 
 struct RowSystem : RowChoice {
-    std::vector<double> G, factor;  // B B^T and its Cholesky factor, in the envelope
+    // B B^T and its Cholesky factor, in the envelope. Rows of contacts that never close take no memory.
+    UntouchedZeros G, factor;
     VecX scale;                     // 1 / length of each row of B
     std::vector<char> required;     // rows that must hold (constraints, sticking elements)
     std::vector<int> blocks;        // blocks with a required row

@@ -42,7 +42,7 @@ static void size(const Program& p, Evaluation& now) {
     now.B.assign(p.entries, 0.0);
     for (VecX* x : {&now.b, &now.lam, &now.closing_lam, &now.reactions.lam}) *x = VecX::Zero(p.layout.rows);
     now.rows.allocate(p.layout, static_cast<int>(p.blocks.size()), nv);
-    now.ideal_rows = now.rows;
+    now.ideal_rows.allocate(p.layout, static_cast<int>(p.blocks.size()), nv);
     now.body_force.assign(bodies, no_force);
     now.wrench.assign(bodies, no_force);
     now.reactions.body.assign(bodies, no_force);

@@ -53,11 +53,12 @@ void System::rate_of_evaluation(double t, const VecX& y, VecX& dy) {
     write_rate(t, dy);
 }
 
-void System::write_rate(double t, VecX& dy) {
+void System::write_rate(double t, VecX& dy, bool locates_events) {
     configuration_rate(p.mechanism, q.data(), v.data(), dy.data());
     std::copy_n(w.now.a.data(), nv, dy.data() + nq);
     if (nz > 0) dy.segment(nq + nv, nz) = w.now.dz;
     if (energy) powers(p, w, v, dy.data() + nq + nv + nz);
+    if (!locates_events) return;
     if (!w.now.loaded.empty()) watch(t, dy);
     if (!w.now.touching.empty()) watch_loads(dy);
 }
@@ -113,17 +114,28 @@ void System::project_and_evaluate(double t, VecX& y, VecX& dy) {
         kinetic_energy(p.mechanism, w.now.terms, v) + potential_energy(p.mechanism, w.now.terms) - before;
 }
 
-bool System::settle_velocity(double t, bool chosen, bool evaluates, bool goes_through) {
+// Act at the end of a time step whose modes may allow no motion. If they do not, and the run `goes_through`, the motion
+// is that of the step's friction.
+template <class Act>
+void System::go_through(double t, bool goes_through, const Act& act) {
     try {
-        return begin_step_on_rates(p, w, t, v, chosen, evaluates);
+        act();
     } catch (const Failure& failure) {
         const bool of_modes = failure.kind == Failure::Kind::paradox || failure.kind == Failure::Kind::not_converged;
         if (!goes_through || !of_modes) throw;
         w.now.no_motion = true;
         w.now.several_element = failure.elements.empty() ? 0 : failure.elements.front();
         solve_with_step_friction(p, w, t, q, v);
-        return true;
     }
+}
+
+void System::evaluate_step_end(double t, const VecX& y, VecX& dy, bool goes_through) {
+    read(y);
+    read_law_states(y);
+    w.now.no_motion = false;
+    const bool chosen = begin_rows(p, w, t, q, v);
+    go_through(t, goes_through, [&] { continue_step(p, w, t, v, chosen); });
+    write_rate(t, dy, !goes_through);
 }
 
 void System::settle(double t, VecX& y, VecX& dy, bool evaluates, bool goes_through) {
@@ -152,9 +164,10 @@ void System::settle(double t, VecX& y, VecX& dy, bool evaluates, bool goes_throu
     require_closed(p, w, t);
     if (past_sticking || (moved && evaluates)) chosen = configure_step(p, w);
     moved |= past_sticking;
-    moved |= settle_velocity(t, chosen, evaluates, goes_through);
+    go_through(t, goes_through, [&] { moved |= begin_step_on_rates(p, w, t, v, chosen, evaluates); });
+    moved |= w.now.no_motion;
     write(y);
-    if (evaluates) write_rate(t, dy);
+    if (evaluates) write_rate(t, dy, !goes_through);
     if (moved && energy) moved_energy = total() - before;
 }
 

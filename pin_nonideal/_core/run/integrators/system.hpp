@@ -61,19 +61,23 @@ struct System {
     // Project a step's end onto the constraints, and evaluate there as the next step begins.
     void project_and_evaluate(double t, VecX& y, VecX& dy);
     // Project the end of a step of time stepping, whose modes have just been set. Evaluate only if `evaluates`.
-    // `goes_through`: if these modes have no motion, slipping elements keep the friction of the step.
+    // `goes_through`: the run locates no events, and if these modes have no motion, slipping elements keep the friction of
+    // the step.
     void settle(double t, VecX& y, VecX& dy, bool evaluates, bool goes_through);
+    // Evaluate the projected end of such a step.
+    void evaluate_step_end(double t, const VecX& y, VecX& dy, bool goes_through);
     // Check if y needs no projection. The quantities of a sample at y are then evaluated.
     bool is_on_constraints(double t, const VecX& y);
     void normalize(VecX& y) const;
 
 private:
-    // Write dy at q and v from the evaluation there.
-    void write_rate(double t, VecX& dy);
+    // Write dy at q and v from the evaluation there, with the quantities whose roots are events if `locates_events`.
+    void write_rate(double t, VecX& dy, bool locates_events = true);
     void watch(double t, VecX& dy);
     void watch_loads(VecX& dy);
     double energy_at(const VecX& y);
-    bool settle_velocity(double t, bool chosen, bool evaluates, bool goes_through);
+    template <class Act>
+    void go_through(double t, bool goes_through, const Act& act);
 
     VecX q_before_;
 };

@@ -73,7 +73,12 @@ void TimeStepping::take_part(double end, double t_end, double least) {
     }
     relaxes_ = relaxed.block >= 0;
     const bool goes_through = options_.method.scheme == Method::Scheme::moreau;
-    system_.settle(t, now_.y, now_.rate, whole && asks_for_motion(end, t_end), goes_through);
+    const bool asks = whole && asks_for_motion(end, t_end);
+    if (moreau_contacts_.project(t, now_.y, now_.moved_energy)) {
+        if (asks) system_.evaluate_step_end(t, now_.y, now_.rate, goes_through);
+        return;
+    }
+    system_.settle(t, now_.y, now_.rate, asks, goes_through);
     now_.moved_energy += system_.moved_energy;
 }
 

@@ -43,7 +43,8 @@ MoreauContacts::MoreauContacts(System& system, GapWatch& watch)
     : system_(system), p(system.p), w(system.w), mean_(p), drives_(p), flight_(p, drives_), watch_(watch),
       was_closed_(system.ng, 0), closed_(system.ng, 0), open_(system.ng, 0), modes_(system.ne, unloaded),
       unloaded_(modes_), q_mid_(VecX::Zero(system.nq)), v0_(VecX::Zero(system.nv)), v1_(v0_), a_free_(v0_),
-      power_(VecX::Zero(system.nw)), trees_(system.p), zero_(VecX::Zero(p.layout.rows)), force_(v0_) {
+      power_(VecX::Zero(system.nw)), trees_(system.p), projection_(system.p), zero_(VecX::Zero(p.layout.rows)), force_(v0_) {
+    projection_.energy = system.energy;
     if (system.ng == 0) return;
     solver_.take_misses(most_miss);
     for (const Gap& gap : p.gaps) rounded_by_.push_back(rounded_by(p.blocks[gap.block].kind));
@@ -118,6 +119,17 @@ void MoreauContacts::step(double t, double h, VecX& y, double& moved_energy, dou
     retract(m, q_mid_.data(), force_.data(), y.data());
     flight_.place(p, y.data());
     y.segment(system_.nq, system_.nv) = v1_;
+}
+
+bool MoreauContacts::project(double t, VecX& y, double& moved_energy) {
+    if (!separate_) return false;
+    const bool rests = (v0_.array() == 0.0).all() && (v1_.array() == 0.0).all() && same_bytes(closed_, was_closed_);
+    if (rests || (w.now.touching.empty() && w.now.loaded.empty())) return true;
+    system_.read(y);
+    if (!projection_.project(p, w, t, system_.q, system_.v)) return false;
+    system_.write(y);
+    moved_energy += projection_.moved_energy();
+    return true;
 }
 
 // Solve the step with the forces at the mean velocity found so far.
@@ -509,6 +521,7 @@ void MoreauContacts::end_velocity() {
         const Block& block = p.blocks[p.frictions[part.element].block];
         if (held && block.dof >= 0) v1_.segment(block.dof, block.total).setZero();
     }
+    if (separate_) trees_.keep_rest(h_, v0_, v1_);
     const auto rest = [&](int e) {  // elements held by the constraints stick
         if (modes_[e] == unloaded && (p.frictions[e].gap < 0 || closed_[p.frictions[e].gap])) modes_[e] = sticking;
     };

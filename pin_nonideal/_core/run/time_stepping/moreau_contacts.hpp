@@ -7,6 +7,7 @@
 
 #include "complementarity/cone/solver.hpp"
 #include "run/events/gap_watch.hpp"
+#include "run/time_stepping/contact_projection.hpp"
 #include "run/time_stepping/free_flight.hpp"
 #include "run/time_stepping/joint_drives.hpp"
 #include "run/time_stepping/mean_velocity.hpp"
@@ -29,6 +30,9 @@ public:
     // energy added by the scheme itself is added to moved_energy. The modes are set for the step's end. The caller must
     // project and evaluate the end.
     void step(double t, double h, VecX& y, double& moved_energy, double& impact_energy);
+    // Project the end y of the last step, at t, tree by tree. Return false if constraints join the trees: the rows of
+    // the scene must project it then.
+    bool project(double t, VecX& y, double& moved_energy);
 
     // Contact whose laws the last step missed, as a block or -1, and the velocity by which it missed them [m/s].
     struct Relaxed {
@@ -98,6 +102,7 @@ private:
     VecX q_mid_, q_looked_, v0_, v1_, a_free_, lam_free_, w0_, w1_, f_, power_;
     VecX offset_, middle_, free_response_, guess_, relaxed_f_;
     SeparateTrees trees_;
+    ContactProjection projection_;
     bool separate_ = false, responded_ = false;  // solved tree by tree, responses of all rows are known
     VecX unit_, zero_, force_, lam_;
     MatX W_, response_, multipliers_;

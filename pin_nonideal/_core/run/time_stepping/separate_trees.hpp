@@ -2,14 +2,9 @@
 #pragma once
 
 #include "complementarity/blocks/solver.hpp"
-#include "dynamics/workspace.hpp"
+#include "run/time_stepping/tree_blocks.hpp"
 
 namespace pn {
-
-// Row k of a block, whose force is an unknown of the step.
-struct StepRow {
-    int block, k;
-};
 
 class SeparateTrees {
 public:
@@ -26,6 +21,8 @@ public:
     double solve(const std::vector<ConeElement>& cones, const VecX& middle, VecX& f);
     // Compute the acceleration a and the rows w under the forces f.
     void move(const VecX& f, VecX& a, VecX& w);
+    // Set the velocity v1 of trees to zero that were at rest, v0 = 0, and whose forces cancel over the step h.
+    void keep_rest(double h, const VecX& v0, VecX& v1) const;
     // Element that misses the laws most, and the velocity by which it misses them.
     const BlockSolver::Miss& miss() const { return solver_.miss(); }
     // Errors of the laws for the forces f.
@@ -33,14 +30,9 @@ public:
 
 private:
     bool applies(const Program& p, const Workspace& w) const;
-    bool is_well_conditioned(const Workspace& w, int root) const;
-    int node_of(const Program& p, const Workspace& w, int root);
     void shift(const VecX& middle);
 
-    std::vector<int> root_, local_, size_;  // by dof: first dof of its tree, index in it; by first dof: dofs of the tree
-    bool contiguous_ = true;                // the dofs of every tree follow one another
-    std::vector<std::vector<int>> trees_;   // first dofs of the trees that a block moves
-    std::vector<int> node_;                 // node of a tree by first dof, -1 if it takes no part
+    TreeBlocks blocks_;
     BlockSolver solver_;
     VecX a_free_, f_;
 };

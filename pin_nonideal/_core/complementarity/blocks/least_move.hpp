@@ -1,0 +1,43 @@
+// Least moves dx in the metric of M that reduce residuals r of rows to zero, J dx = -r, island by island.
+//
+// The rows count with weights G far above their inertia: (M + J^T G J) dx = -J^T G r. Redundant rows need no choice.
+// A move reduces the residual of a row by the ratio of its inertia to its weight, so two or three moves, with r evaluated
+// between them, reach rounding. Rows that contradict each other, or nearly do, would ask for a long move: with lower
+// weights they share the residual that is left.
+#pragma once
+
+#include "complementarity/blocks/factor.hpp"
+
+namespace pn {
+
+class LeastMove {
+public:
+    BlockProblem problem;  // nodes, elements, M and J are set by the caller
+
+    // Prepare the problem once it is set. Return false if an inertia is not positive definite.
+    bool pose();
+    // Compute the move that the residuals `r` ask for, by unknown of the whole scene. Islands whose residuals are at
+    // most `floor` do not move. Return false if there are none to move.
+    bool find(const VecX& r, double floor, VecX& move);
+    // Largest residual.
+    double largest(const VecX& r) const { return problem.rows > 0 ? r.head(problem.rows).cwiseAbs().maxCoeff() : 0.0; }
+    // Check if the rows leave a node no freedom.
+    bool is_held(int node);
+
+private:
+    bool factor(int island);
+    double longest_single(int island, const VecX& r);
+    bool seek(int island, const VecX& r, VecX& move);
+    void probe(int island);
+
+    Islands islands_;
+    std::vector<BlockFactor> factors_;    // one for each island
+    std::vector<char> factored_, probed_;  // by island
+    std::vector<int> island_of_;          // by node
+    std::vector<char> held_;              // by node of a probed island
+    std::vector<double> weight_;          // by island
+    std::vector<double> own_, G_;         // own response of each row, and weights, nine numbers an element
+    VecX probe_, scaled_, single_;
+};
+
+}  // namespace pn

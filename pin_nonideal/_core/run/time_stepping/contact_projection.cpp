@@ -1,0 +1,149 @@
+#include "run/time_stepping/contact_projection.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "contact/queries.hpp"
+#include "dynamics/evaluation.hpp"
+#include "dynamics/projection.hpp"
+#include "tree/lie_group.hpp"
+
+namespace pn {
+
+// Past the first moves, an iteration that keeps more than this part of the largest residual has reached rounding, or
+// rows that contradict each other.
+constexpr double stalled_part = 0.5;
+constexpr int sure_moves = 1, most_moves = 12;
+// Maximum choices of contacts that stay closed.
+constexpr int most_choices = 4;
+
+static void hold_locked(const Program& p, const Workspace& w, VecX& x) {
+    for (int dof = 0; dof < p.mechanism.nv; ++dof)
+        if (w.now.terms.locked[dof]) x[dof] = 0.0;
+}
+
+ContactProjection::ContactProjection(const Program& p)
+    : blocks_(p), r_(VecX::Zero(p.layout.rows)), move_(VecX::Zero(p.mechanism.nv)) {}
+
+// Add an element of the rows of a block, or join them to the last element.
+void ContactProjection::add(int block, int rows, bool joined) {
+    for (int k = 0; k < rows; ++k) rows_.push_back({block, k});
+    if (joined) elements_.back().dim += rows;
+    else elements_.push_back({ConeElement::Kind::equality, rows, 0.0});
+    gap_.resize(rows_.size(), -1);
+}
+
+// Collect the rows that hold, and set up the problem. `sticks`: sticking elements must not slide.
+bool ContactProjection::pose(const Program& p, Workspace& w, bool sticks) {
+    rows_.clear();
+    elements_.clear();
+    gap_.clear();
+    const auto kept = [&](int e) { return static_cast<int>(p.blocks[p.frictions[e].block].kept.size()); };
+    for (int i : w.now.touching) {
+        const Gap& gap = p.gaps[i];
+        if (is_bare(p, i)) continue;
+        add(gap.block, 1, false);
+        gap_.back() = i;
+        if (sticks && gap.sliding >= 0 && w.state.mode[gap.sliding] == sticking)
+            add(p.frictions[gap.sliding].block, kept(gap.sliding), true);
+    }
+    for (int e : w.now.loaded) {
+        const int gap = p.frictions[e].gap;
+        const bool slides = gap >= 0 && p.gaps[gap].sliding == e && !is_bare(p, gap);
+        if (sticks && !slides && w.state.mode[e] == sticking && kept(e) > 0) add(p.frictions[e].block, kept(e), false);
+    }
+    return blocks_.fill(p, w, rows_, elements_, least_.problem) && least_.pose();
+}
+
+// Move q until the gaps are closed. Return true if it moves.
+bool ContactProjection::close_gaps(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
+    const double floor = projection_floor * scene_size(p, w);
+    double last = HUGE_VAL;
+    bool moves = false;
+    for (int k = 0; k < most_moves; ++k) {
+        for (size_t r = 0; r < rows_.size(); ++r) r_[r] = gap_[r] < 0 ? 0.0 : gap_width(p, w, gap_[r]);
+        const double largest = least_.largest(r_);
+        if (k > sure_moves && largest > stalled_part * last) break;
+        last = largest;
+        if (!least_.find(r_, floor, move_)) break;
+        hold_locked(p, w, move_);
+        q_from_ = q;
+        retract(p.mechanism, q_from_.data(), move_.data(), q.data());
+        place_bodies(p.mechanism, w.now.terms, q);
+        for (int i : w.now.touching) measure_gap(p, w, t, v, i);
+        moves = true;
+    }
+    return moves;
+}
+
+// Open closed contacts whose gap other contacts keep open. Return true if there are any.
+bool ContactProjection::open_held_apart(const Program& p, Workspace& w) {
+    const double allowed = open_gap * scene_size(p, w);
+    const auto is_apart = [&](int i) { return !is_bare(p, i) && gap_width(p, w, i) > allowed; };
+    if (std::none_of(w.now.touching.begin(), w.now.touching.end(), is_apart)) return false;
+    closed_ = w.state.closed;
+    for (int i : w.now.touching)
+        if (is_apart(i)) closed_[i] = 0;
+    set_closed(p, w, closed_);
+    return true;
+}
+
+void ContactProjection::meet_rates(const Program& p, Workspace& w, VecX& v) {
+    double last = HUGE_VAL;
+    const double floor = projection_floor * std::max(1.0, v.cwiseAbs().maxCoeff());
+    for (int k = 0; k < most_moves; ++k) {
+        for (size_t r = 0; r < rows_.size(); ++r) {
+            const StepRow& row = rows_[r];
+            const Block& block = p.blocks[row.block];
+            if (row.k == 0) multiply(block, w.now.A, v, w.scratch.r);
+            r_[r] = w.scratch.r[block.row + row.k] + w.now.values[row.block].phi_t[block.kept[row.k]];
+        }
+        const double largest = least_.largest(r_);
+        if (k > sure_moves && largest > stalled_part * last) return;
+        last = largest;
+        if (!least_.find(r_, floor, move_)) return;
+        v += move_;
+    }
+}
+
+// Set velocities of rounding to zero where the rows leave no freedom.
+void ContactProjection::rest(const Program& p, Workspace& w, VecX& v) {
+    for (size_t n = 0; n < least_.problem.nodes.size(); ++n) {
+        const BlockNode& node = least_.problem.nodes[n];
+        const double speed = v.segment(node.first, node.size).cwiseAbs().maxCoeff();
+        if (speed > 0.0 && speed <= immobile_speed && least_.is_held(static_cast<int>(n)))
+            v.segment(node.first, node.size).setZero();
+    }
+    hold_locked(p, w, v);
+}
+
+bool ContactProjection::project(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
+    moved_energy_ = 0.0;
+    if (!blocks_.applies(p) || !p.affine_rates) return false;
+    w.now.renew();
+    place_bodies(p.mechanism, w.now.terms, q);
+    mass_matrix(p.mechanism, w.now.terms);
+    place_rows(p, w, t, v);
+    if (!pose(p, w, true)) return false;
+    const auto total = [&] {
+        return kinetic_energy(p.mechanism, w.now.terms, v) + potential_energy(p.mechanism, w.now.terms);
+    };
+    const double before = energy ? total() : 0.0;
+    bool moves = close_gaps(p, w, t, q, v), opens = false;
+    for (int k = 0; k < most_choices && open_held_apart(p, w); ++k) {
+        opens = true;
+        if (!pose(p, w, false)) break;
+        moves |= close_gaps(p, w, t, q, v);
+    }
+    if (moves) place_rows(p, w, t, v);
+    if (opens) pose(p, w, true);
+    meet_rates(p, w, v);
+    rest(p, w, v);
+    move_bodies(p.mechanism, w.now.terms, v);
+    for (int e : w.now.slipping) move_block(p, w, t, v, p.frictions[e].block);
+    if (energy) moved_energy_ = total() - before;
+    ++w.counters.projections;
+    return true;
+}
+
+}  // namespace pn

@@ -1,0 +1,40 @@
+// Projection after a time step onto closed contacts and sticking friction, on trees that no constraint joins.
+#pragma once
+
+#include "complementarity/blocks/least_move.hpp"
+#include "run/time_stepping/tree_blocks.hpp"
+
+namespace pn {
+
+class ContactProjection {
+public:
+    explicit ContactProjection(const Program& p);
+
+    // Project q and v onto the closed contacts and sticking elements of the workspace: gaps close, and v satisfies
+    // their rows. Contacts that cannot close because other ones hold their bodies apart become open. A tree that the
+    // rows hold, with a velocity of rounding, comes to rest. Return false, with q and v unchanged, if the trees cannot be
+    // projected one by one.
+    bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
+    double moved_energy() const { return moved_energy_; }  // energy that the last projection added, if `energy`
+
+    bool energy = false;  // measure the energy
+
+private:
+    bool pose(const Program& p, Workspace& w, bool sticks);
+    bool close_gaps(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
+    bool open_held_apart(const Program& p, Workspace& w);
+    void meet_rates(const Program& p, Workspace& w, VecX& v);
+    void rest(const Program& p, Workspace& w, VecX& v);
+    void add(int block, int rows, bool joined);
+
+    TreeBlocks blocks_;
+    LeastMove least_;
+    std::vector<StepRow> rows_;
+    std::vector<ConeElement> elements_;
+    std::vector<int> gap_;  // by row: gap whose residual it closes, -1 for sliding
+    VecX r_, move_, q_from_;
+    std::vector<char> closed_;
+    double moved_energy_ = 0.0;
+};
+
+}  // namespace pn

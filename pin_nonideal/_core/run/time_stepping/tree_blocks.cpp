@@ -1,0 +1,79 @@
+#include "run/time_stepping/tree_blocks.hpp"
+
+#include <algorithm>
+
+namespace pn {
+
+// Ratio of the pivots of one tree beyond which the forces on its bodies lose too many digits.
+constexpr double most_pivot_ratio = 1e6;
+
+TreeBlocks::TreeBlocks(const Program& p) : size_(p.mechanism.nv, 0), node_(p.mechanism.nv, -1) {
+    const Mechanism& m = p.mechanism;
+    for (int dof = 0; dof < m.nv; ++dof) {
+        const int root = m.dof_parent[dof] < 0 ? dof : root_[m.dof_parent[dof]];
+        if (root == dof) roots_.push_back(root);
+        root_.push_back(root);
+        local_.push_back(size_[root]++);
+        contiguous_ = contiguous_ && root + local_[dof] == dof;
+    }
+    for (const Block& block : p.blocks) {
+        std::vector<int> trees;
+        for (int dof : block.support)
+            if (std::find(trees.begin(), trees.end(), root_[dof]) == trees.end()) trees.push_back(root_[dof]);
+        trees_.push_back(trees);
+    }
+}
+
+// Check the ratio of the pivots of a tree. Those of different trees may differ by any factor.
+bool TreeBlocks::is_well_conditioned(const Workspace& w, int root) const {
+    const auto pivots = w.now.terms.D.segment(root, size_[root]);
+    return pivots.maxCoeff() <= most_pivot_ratio * pivots.minCoeff();
+}
+
+int TreeBlocks::node_of(const Program& p, const Workspace& w, int root, BlockProblem& problem) {
+    int& node = node_[root];
+    if (node >= 0) return node;
+    node = static_cast<int>(problem.nodes.size());
+    BlockMap M = problem.add_node(size_[root], root);
+    for (int dof = root; dof < root + size_[root]; ++dof) {
+        const int begin = p.mechanism.row_offset[dof];
+        for (int s = 0; s <= p.mechanism.depth[dof]; ++s) {
+            const int j = local_[p.mechanism.ancestors[begin + s]];
+            M(local_[dof], j) = M(j, local_[dof]) = w.now.terms.M[begin + s];
+        }
+    }
+    return node;
+}
+
+bool TreeBlocks::fill(const Program& p, const Workspace& w, const std::vector<StepRow>& rows,
+                      const std::vector<ConeElement>& cones, BlockProblem& problem) {
+    problem.clear();
+    std::fill(node_.begin(), node_.end(), -1);
+    size_t at = 0;
+    for (const ConeElement& cone : cones) {
+        int trees[2] = {-1, -1};
+        for (int k = 0; k < cone.dim; ++k)
+            for (int root : trees_[rows[at + k].block]) {
+                if (root == trees[0] || root == trees[1]) continue;
+                if (trees[1] >= 0) return false;
+                trees[trees[0] >= 0] = root;
+            }
+        if (trees[0] < 0) return false;
+        if (!is_well_conditioned(w, trees[0]) || (trees[1] >= 0 && !is_well_conditioned(w, trees[1]))) return false;
+        const int first = node_of(p, w, trees[0], problem);
+        const int second = trees[1] < 0 ? -1 : node_of(p, w, trees[1], problem);
+        BlockElement& e = problem.elements[problem.add_element(cone, first, second)];
+        for (int k = 0; k < cone.dim; ++k, ++at) {
+            const Block& block = p.blocks[rows[at].block];
+            const double* entry = w.now.A.data() + block.offset + rows[at].k;
+            for (int dof : block.support) {
+                problem.jacobian(e, root_[dof] != trees[0])(k, local_[dof]) = *entry;
+                entry += block.kept.size();
+            }
+            if (cone.dim == 1 && block.dof >= 0) e.column = local_[block.dof];
+        }
+    }
+    return true;
+}
+
+}  // namespace pn

@@ -1,0 +1,41 @@
+// Rows of contacts and dry friction as blocks of the trees that they move, if no constraint joins the trees.
+#pragma once
+
+#include "complementarity/blocks/problem.hpp"
+#include "dynamics/workspace.hpp"
+
+namespace pn {
+
+// Row k of a block, whose force is an unknown of the step.
+struct StepRow {
+    int block, k;
+};
+
+class TreeBlocks {
+public:
+    explicit TreeBlocks(const Program& p);
+
+    // Check if the inertia of every tree is a matrix, in which its dofs follow one another.
+    bool applies(const Program& p) const { return contiguous_ && p.mechanism.deep_dofs.empty(); }
+    // Set the nodes, elements and blocks of a problem in a workspace with M and the rows A. `rows` are those of the
+    // elements, one after the other. Return false if an element moves more than two trees, or if a tree is
+    // ill-conditioned.
+    bool fill(const Program& p, const Workspace& w, const std::vector<StepRow>& rows,
+              const std::vector<ConeElement>& cones, BlockProblem& problem);
+
+    // First dofs of all trees, and the number of dofs of a tree.
+    const std::vector<int>& roots() const { return roots_; }
+    int size(int root) const { return size_[root]; }
+
+private:
+    bool is_well_conditioned(const Workspace& w, int root) const;
+    int node_of(const Program& p, const Workspace& w, int root, BlockProblem& problem);
+
+    std::vector<int> root_, local_, size_;  // by dof: first dof of its tree, index in it; by first dof: dofs of the tree
+    std::vector<int> roots_;                // first dofs of all trees
+    bool contiguous_ = true;                // the dofs of every tree follow one another
+    std::vector<std::vector<int>> trees_;   // first dofs of the trees that a block moves
+    std::vector<int> node_;                 // node of a tree by first dof, -1 if it takes no part
+};
+
+}  // namespace pn
