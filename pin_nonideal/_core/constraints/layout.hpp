@@ -1,4 +1,4 @@
-// Positions of the rows of all blocks in the symmetric matrix B B^T, and the stored entries of this matrix.
+// Order in which the rows of blocks are eliminated in the symmetric matrix B B^T, and the entries that they need.
 #pragma once
 
 #include <cstddef>
@@ -9,24 +9,42 @@
 
 namespace pn {
 
-// Envelope storage: row i of the symmetric matrix keeps columns first[i] .. i. Blocks without a common dof need no
-// entries, and the Cholesky factor stays inside the envelope.
+// Order of all blocks, and the dofs that they share. Blocks with the same support are treated alike.
 struct RowLayout {
     int rows = 0;
-    std::vector<int> position;  // position of each kept row in elimination order
-    std::vector<int> row_at;    // inverse of position
-    std::vector<int> first;
-    std::vector<std::ptrdiff_t> start;
-    size_t entries = 0;
+    std::vector<int> place;      // position of each block in the order of elimination
+    std::vector<int> support;    // number of each block's support
     using Common = std::vector<std::pair<int, int>>;  // positions of common dofs in two supports
-    struct Pair {  // another block with common dofs
-        int other, common;
+    struct Neighbor {  // support with common dofs
+        int support, common;
     };
-    std::vector<Common> commons;  // one list for all pairs of blocks with the same two supports
-    std::vector<Pair> pairs;      // pairs of each block, in the order of the blocks
-    std::vector<int> first_pair;  // first pair of each block, and the end
+    std::vector<std::vector<Neighbor>> neighbors;  // of each support, itself included
+    std::vector<Common> commons;                   // one list for each two supports
 };
 
 RowLayout layout_rows(const std::vector<Block>& blocks, int nv);
+
+// Envelope storage of B B^T for the rows in use: row i of the symmetric matrix keeps columns first[i] .. i. Blocks
+// without a common dof need no entries, and the Cholesky factor stays inside the envelope.
+class Envelope {
+public:
+    struct Pair {  // block and an earlier one, or itself, with common dofs
+        int block, other, common;
+    };
+    std::vector<int> position;  // position of each kept row in use
+    std::vector<int> row_at;    // kept rows in the order of elimination
+    std::vector<int> first;     // by position
+    std::vector<std::ptrdiff_t> start;
+    std::vector<Pair> pairs;
+    size_t entries = 0;
+
+    int size() const { return static_cast<int>(row_at.size()); }
+    // Set up the envelope of the rows of some blocks.
+    void select(const RowLayout& layout, const std::vector<Block>& all, const std::vector<int>& used);
+
+private:
+    std::vector<int> order_;
+    std::vector<std::vector<int>> of_support_;  // blocks with the same support that have a place
+};
 
 }  // namespace pn

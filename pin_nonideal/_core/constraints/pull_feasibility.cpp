@@ -17,27 +17,30 @@ constexpr double rounding = 1e-12;   // rounding of a margin, relative to the lo
 // Return a basis of the multipliers of all described rows that together exert no force. The rows of Z follow the
 // described rows, and its columns are orthonormal. The other rows depend on the first described row of each row in use:
 // A_others = C A_first. Then y_first = -C^T z and y_others = z.
-MatX free_described(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
+MatX free_described(const std::vector<Block>& blocks, const std::vector<double>& B,
                     const DescribedRows& all, RowSystem& s) {
     const std::vector<int> dependent = dependent_rows(s);
-    const MatX W = dependence(layout, blocks, B, s, dependent);
-    std::vector<int> first(layout.rows, -1), place(layout.rows, -1), others;
-    for (size_t k = 0; k < dependent.size(); ++k) place[dependent[k]] = static_cast<int>(k);
+    const MatX W = dependence(blocks, B, s, dependent);
+    const int used = s.envelope.size();
+    std::vector<int> first(used, -1), place(used, -1), others;
+    for (size_t k = 0; k < dependent.size(); ++k) place[s.envelope.position[dependent[k]]] = static_cast<int>(k);
     for (int i = 0; i < static_cast<int>(all.rows.size()); ++i) {
         const int kept = all.rows[i].kept;
         if (kept < 0 || !s.required[kept]) continue;
-        if (s.active[kept] && first[kept] < 0 && all.rows[i].factor == 1.0) first[kept] = i;
+        int& represents = first[s.envelope.position[kept]];
+        if (s.active[kept] && represents < 0 && all.rows[i].factor == 1.0) represents = i;
         else others.push_back(i);
     }
     const int n = static_cast<int>(others.size());
-    MatX C = MatX::Zero(n, layout.rows);
+    MatX C = MatX::Zero(n, used);
     for (int k = 0; k < n; ++k) {
         const DescribedRows::Row& row = all.rows[others[k]];
-        if (place[row.kept] >= 0) C.row(k) = row.factor * W.row(place[row.kept]);
-        else C(k, row.kept) = row.factor;
+        const int at = s.envelope.position[row.kept];
+        if (place[at] >= 0) C.row(k) = row.factor * W.row(place[at]);
+        else C(k, at) = row.factor;
     }
     MatX Z = MatX::Zero(static_cast<Eigen::Index>(all.rows.size()), n);
-    for (int r = 0; r < layout.rows; ++r)
+    for (int r = 0; r < used; ++r)
         if (first[r] >= 0) Z.row(first[r]) = -C.col(r).transpose();
     for (int k = 0; k < n; ++k) Z(others[k], k) = 1.0;
     const MatX S = MatX::Identity(n, n) + C * C.transpose();
@@ -70,12 +73,12 @@ std::vector<int> sharing_with(int index, const MatX& Z) {
 
 }  // namespace
 
-Press press(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
+Press press(const std::vector<Block>& blocks, const std::vector<double>& B,
             const DescribedRows& all, const std::vector<int>& pressing, RowSystem& s, const VecX& shared, int index) {
     const double own = all.share(pressing[index], shared);
     const Press alone{own, {index}, {index}, own < 0.0};
     if (!s.redundant && !all.copied) return alone;
-    const MatX of_all = of_pressing(pressing, free_described(layout, blocks, B, all, s));
+    const MatX of_all = of_pressing(pressing, free_described(blocks, B, all, s));
     if (of_all.row(index).isZero(0.0)) return alone;
     Press found{own, sharing_with(index, of_all), {}, false};
     const int n = static_cast<int>(found.sharing.size());

@@ -15,7 +15,7 @@ struct Press {
 
 // Compute the margin of the described row pressing[index]. The multipliers of the rows `pressing` should not be
 // negative. `shared` holds the result of `share_multipliers`.
-Press press(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
+Press press(const std::vector<Block>& blocks, const std::vector<double>& B,
             const DescribedRows& all, const std::vector<int>& pressing, RowSystem& s, const VecX& shared, int index);
 
 }  // namespace pn

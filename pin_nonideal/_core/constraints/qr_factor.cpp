@@ -13,7 +13,7 @@ constexpr double tie = 1e-12;
 // Copy the rows in use, scaled to unit length, to the columns of Q.
 void dense_columns(const std::vector<Block>& blocks, const std::vector<double>& B,
                    const std::vector<char>& use, RowSystem& s) {
-    if (s.Q.cols() == 0) s.Q.resize(s.Q.rows(), s.scale.size());
+    if (s.Q.cols() < s.envelope.size()) s.Q.resize(s.Q.rows(), s.envelope.size());
     s.columns.clear();
     for (int index : s.blocks) {
         const Block& block = blocks[index];

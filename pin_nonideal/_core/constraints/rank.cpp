@@ -47,14 +47,15 @@ void decide_rows(const Mechanism& m, Terms& terms, const std::vector<Block>& blo
     s.chosen_pivot = 0.0;
 }
 
-bool is_choice_due(const RowLayout& layout, RowSystem& s) {
+bool is_choice_due(RowSystem& s) {
     if (!s.redundant) return false;
     bool due = s.min_pivot < faded_part * s.chosen_pivot;
     s.chosen_pivot = std::max(s.chosen_pivot, s.min_pivot);
-    for (int i = 0; i < layout.rows; ++i) {
-        const int row = layout.row_at[i];
+    const Envelope& at = s.envelope;
+    for (int i = 0; i < at.size(); ++i) {
+        const int row = at.row_at[i];
         if (!s.required[row]) continue;
-        const double square = s.G[layout.start[i] + i];
+        const double square = s.G[at.start[i] + i];
         s.longest[row] = std::max(s.longest[row], square);
         if (!s.active[row]) continue;
         due |= square < faded_part * s.longest_chosen[row];

@@ -19,6 +19,6 @@ void decide_rows(const Mechanism& m, Terms& terms, const std::vector<Block>& blo
                  int most);
 
 // Check if active rows have become short or nearly dependent since they were chosen. Another choice may then be better.
-bool is_choice_due(const RowLayout& layout, RowSystem& s);
+bool is_choice_due(RowSystem& s);
 
 }  // namespace pn

@@ -18,23 +18,23 @@ std::vector<int> dependent_rows(const RowSystem& s) {
     return dependent;
 }
 
-MatX dependence(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B, RowSystem& s,
+MatX dependence(const std::vector<Block>& blocks, const std::vector<double>& B, RowSystem& s,
                 const std::vector<int>& dependent) {
     const int d = static_cast<int>(dependent.size());
-    MatX W(d, layout.rows);
-    VecX column(s.Q.rows()), unit = VecX::Zero(layout.rows), products(layout.rows), weights(layout.rows);
+    const std::vector<int>& rows = s.envelope.row_at;
+    MatX W = MatX::Zero(d, s.envelope.size());
+    const Eigen::Index all = s.scale.size();
+    VecX column(s.Q.rows()), unit = VecX::Zero(all), products = unit, weights = unit;
     for (int k = 0; k < d; ++k) {
         column.setZero();
         unit[dependent[k]] = 1.0;
         for (int i : s.blocks) add_transpose(blocks[i], B, unit, column);
         unit[dependent[k]] = 0.0;
         const double least = spanned * column.norm();
-        W.row(k).setZero();
         for (int pass = 0; pass < most_passes && column.norm() > least; ++pass) {
-            products.setZero();
             for (int i : s.blocks) multiply(blocks[i], B, column, products);
-            solve_rows(layout, s, products, weights);
-            W.row(k) += weights.transpose();
+            solve_rows(s, products, weights);
+            for (size_t l = 0; l < rows.size(); ++l) W(k, l) += weights[rows[l]];
             for (int i : s.blocks) add_transpose(blocks[i], B, -weights, column);
         }
     }
@@ -52,30 +52,41 @@ void DescribedRows::finish(int kept) {
         if (row.kept >= 0) row.part = row.factor / weight[row.kept];
 }
 
-void share_multipliers(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
+void share_multipliers(const std::vector<Block>& blocks, const std::vector<double>& B,
                        const DescribedRows& all, RowSystem& s, const VecX& lam, VecX& shared) {
     shared = lam;
     const std::vector<int> dependent = dependent_rows(s);
     if (dependent.empty()) return;
     // With weights g and x + W^T y = lam, sum(x^2/g) + sum(y^2/g) is minimal if (1/g + W (1/g) W^T) y = W (1/g) lam.
-    const MatX W = dependence(layout, blocks, B, s, dependent);
-    const VecX inverse = all.weight.cwiseInverse();
+    const MatX W = dependence(blocks, B, s, dependent);
+    const std::vector<int>& rows = s.envelope.row_at;
+    VecX inverse(rows.size()), own(rows.size());
+    for (size_t l = 0; l < rows.size(); ++l) {
+        inverse[l] = 1.0 / all.weight[rows[l]];
+        own[l] = inverse[l] * lam[rows[l]];
+    }
     MatX S = W * inverse.asDiagonal() * W.transpose();
-    for (size_t k = 0; k < dependent.size(); ++k) S(k, k) += inverse[dependent[k]];
-    const VecX y = solve_semidefinite(S, W * inverse.cwiseProduct(lam));
-    shared -= W.transpose() * y;
+    for (size_t k = 0; k < dependent.size(); ++k) S(k, k) += 1.0 / all.weight[dependent[k]];
+    const VecX y = solve_semidefinite(S, W * own), taken = W.transpose() * y;
+    for (size_t l = 0; l < rows.size(); ++l) shared[rows[l]] -= taken[l];
     for (size_t k = 0; k < dependent.size(); ++k) shared[dependent[k]] = y[k];
 }
 
-MatX free_multipliers(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
+MatX free_multipliers(const std::vector<Block>& blocks, const std::vector<double>& B,
                       const DescribedRows& all, RowSystem& s) {
     const std::vector<int> dependent = dependent_rows(s);
-    MatX free = -dependence(layout, blocks, B, s, dependent).transpose();
-    for (size_t k = 0; k < dependent.size(); ++k) free(dependent[k], static_cast<Eigen::Index>(k)) = 1.0;
-    const MatX S = free.transpose() * all.weight.cwiseInverse().asDiagonal() * free;
+    const std::vector<int>& rows = s.envelope.row_at;
+    MatX used = -dependence(blocks, B, s, dependent).transpose();
+    for (size_t k = 0; k < dependent.size(); ++k) used(s.envelope.position[dependent[k]], static_cast<Eigen::Index>(k)) = 1.0;
+    VecX inverse(rows.size());
+    for (size_t l = 0; l < rows.size(); ++l) inverse[l] = 1.0 / all.weight[rows[l]];
+    const MatX S = used.transpose() * inverse.asDiagonal() * used;
     Cholesky factor;
     factor.compute(S);
-    return factor.solve_lower(free.transpose()).transpose();
+    used = factor.solve_lower(used.transpose()).transpose();
+    MatX free = MatX::Zero(s.scale.size(), used.cols());
+    for (size_t l = 0; l < rows.size(); ++l) free.row(rows[l]) = used.row(static_cast<Eigen::Index>(l));
+    return free;
 }
 
 }  // namespace pn

@@ -24,19 +24,20 @@ struct DescribedRows {
     double share(int row, const VecX& lam) const { return rows[row].kept < 0 ? 0.0 : rows[row].part * lam[rows[row].kept]; }
 };
 
-// Required rows that depend on the rows in use, and their coefficients: A_dependent = W A_active.
+// Required rows that depend on the active rows, and their coefficients: A_dependent = W A_active. The columns of W are
+// the rows in use, in the order of the envelope.
 std::vector<int> dependent_rows(const RowSystem& s);
-MatX dependence(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B, RowSystem& s,
+MatX dependence(const std::vector<Block>& blocks, const std::vector<double>& B, RowSystem& s,
                 const std::vector<int>& dependent);
 
 // Compute minimum-norm multipliers by kept row from the multipliers of the rows in use. The multiplier of a kept row is
 // the total of the rows that it represents.
-void share_multipliers(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
+void share_multipliers(const std::vector<Block>& blocks, const std::vector<double>& B,
                        const DescribedRows& all, RowSystem& s, const VecX& lam, VecX& shared);
 
 // Return a basis of the multipliers by kept row that together exert no force. It is orthonormal in the norm of the
 // described rows.
-MatX free_multipliers(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
+MatX free_multipliers(const std::vector<Block>& blocks, const std::vector<double>& B,
                       const DescribedRows& all, RowSystem& s);
 
 }  // namespace pn

@@ -16,7 +16,7 @@ constexpr double vanishing_square = 1e-28;
 // another, from p2. The sum runs over their common dofs.
 template <int n1, int n2>
 static void multiply_tile(const double* X, int r1, const double* Y, int r2, const RowLayout::Common& common,
-                          const RowLayout& layout, int p1, int p2, double* G) {
+                          const Envelope& at, int p1, int p2, double* G) {
     double sum[n1][n2] = {};
     for (const auto& [l, k] : common) {
         const double *x = X + l * r1, *y = Y + k * r2;
@@ -24,7 +24,7 @@ static void multiply_tile(const double* X, int r1, const double* Y, int r2, cons
             for (int j = 0; j < n2; ++j) sum[i][j] += x[i] * y[j];
     }
     for (int i = 0; i < n1; ++i) {
-        double* row = G + layout.start[p1 + i] + p2;
+        double* row = G + at.start[p1 + i] + p2;
         const int end = p1 + i - p2;  // the diagonal
         for (int j = 0; j < n2; ++j)
             if (j <= end) row[j] = sum[i][j];
@@ -33,50 +33,47 @@ static void multiply_tile(const double* X, int r1, const double* Y, int r2, cons
 
 // Multiply the rows of two blocks, one tile at a time. The rows of a block are adjacent in the layout, and those of the
 // first block do not precede those of the second.
-static PN_INLINE void multiply_blocks(const RowLayout& layout, const Block& b1, const Block& b2,
-                                      const RowLayout::Common& common, const std::vector<double>& B, RowSystem& s) {
+static PN_INLINE void multiply_blocks(const Block& b1, const Block& b2, const RowLayout::Common& common,
+                                      const std::vector<double>& B, RowSystem& s) {
     const int r1 = static_cast<int>(b1.kept.size()), r2 = static_cast<int>(b2.kept.size());
     const double *X = B.data() + b1.offset, *Y = B.data() + b2.offset;
     for (int i0 = 0; i0 < r1; i0 += tile)
         for (int j0 = 0; j0 < r2; j0 += tile) {
-            const int p1 = layout.position[b1.row] + i0, p2 = layout.position[b2.row] + j0;
+            const int p1 = s.envelope.position[b1.row] + i0, p2 = s.envelope.position[b2.row] + j0;
             with_constant(std::min(tile, r1 - i0), [&](auto n1) {
                 with_constant(std::min(tile, r2 - j0), [&](auto n2) {
-                    multiply_tile<n1, n2>(X + i0, r1, Y + j0, r2, common, layout, p1, p2, s.G.data());
+                    multiply_tile<n1, n2>(X + i0, r1, Y + j0, r2, common, s.envelope, p1, p2, s.G.data());
                 });
             });
         }
 }
 
 void delassus(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B, RowSystem& s) {
-    for (int b : s.blocks)
-        for (int i = layout.first_pair[b]; i < layout.first_pair[b + 1]; ++i) {
-            const auto& [other, common] = layout.pairs[i];
-            if (s.block_used[other]) multiply_blocks(layout, blocks[b], blocks[other], layout.commons[common], B, s);
-        }
+    for (const auto& [block, other, common] : s.envelope.pairs)
+        multiply_blocks(blocks[block], blocks[other], layout.commons[common], B, s);
 }
 
-void scale_to_unit_length(const RowLayout& layout, const std::vector<char>& use, RowSystem& s) {
-    for (int i = 0; i < layout.rows; ++i) {
-        const int row = layout.row_at[i];
+void scale_to_unit_length(const std::vector<char>& use, RowSystem& s) {
+    const Envelope& at = s.envelope;
+    for (int i = 0; i < at.size(); ++i) {
+        const int row = at.row_at[i];
         if (!use[row]) continue;
-        const double square = s.G[layout.start[i] + i];
+        const double square = s.G[at.start[i] + i];
         s.scale[row] = square > 0.0 ? 1.0 / std::sqrt(square) : 1.0;
     }
 }
 
 // Return the least square of a row's length over that of the longest row of its block, among blocks with comparable
 // rows. Sets `vanishes` if a row of any block is rounding beside another row.
-static PN_INLINE double shortest_row(const RowLayout& layout, const std::vector<Block>& blocks, const RowSystem& s,
-                                     bool& vanishes) {
+static PN_INLINE double shortest_row(const std::vector<Block>& blocks, const RowSystem& s, bool& vanishes) {
     double shortest = 1.0;
     for (int index : s.blocks) {
         const Block& block = blocks[index];
         double least = HUGE_VAL, most = 0.0;
         for (size_t k = 0; k < block.kept.size(); ++k) {
             if (!s.active[block.row + k]) continue;
-            const int i = layout.position[block.row + k];
-            const double square = s.G[layout.start[i] + i];
+            const int i = s.envelope.position[block.row + k];
+            const double square = s.G[s.envelope.start[i] + i];
             least = std::min(least, square);
             most = std::max(most, square);
         }
@@ -88,32 +85,34 @@ static PN_INLINE double shortest_row(const RowLayout& layout, const std::vector<
 
 // Return the least square of an active row's length over its greatest length in these modes. Used if other rows depend
 // on the active ones.
-static double shortest_passing(const RowLayout& layout, const RowSystem& s) {
+static double shortest_passing(const RowSystem& s) {
+    const Envelope& at = s.envelope;
     double shortest = 1.0;
-    for (int i = 0; i < layout.rows; ++i) {
-        const int row = layout.row_at[i];
-        const double square = s.G[layout.start[i] + i];
+    for (int i = 0; i < at.size(); ++i) {
+        const int row = at.row_at[i];
+        const double square = s.G[at.start[i] + i];
         if (s.active[row] && square < shortest * s.longest[row]) shortest = square / s.longest[row];
     }
     return shortest;
 }
 
 // Compute the Cholesky factor of the unit-diagonal B B^T inside the envelope. Returns true if its pivots are safe.
-static PN_INLINE bool factor_cholesky(const RowLayout& layout, RowSystem& s) {
+static PN_INLINE bool factor_cholesky(RowSystem& s) {
+    const Envelope& at = s.envelope;
     double* L = s.factor.data();
-    for (int i = 0; i < layout.rows; ++i) {
-        const int row = layout.row_at[i];
+    for (int i = 0; i < at.size(); ++i) {
+        const int row = at.row_at[i];
         if (!s.active[row]) continue;
-        double* Li = L + layout.start[i];
-        const double* Gi = s.G.data() + layout.start[i];
-        const int first = layout.first[i];
+        double* Li = L + at.start[i];
+        const double* Gi = s.G.data() + at.start[i];
+        const int first = at.first[i];
         const double scale = s.scale[row];
         double pivot = Gi[i] > 0.0 ? 1.0 : 0.0;  // zero row: its dofs are locked
         for (int j = first; j < i; ++j) {
-            const int column = layout.row_at[j];
+            const int column = at.row_at[j];
             if (!s.active[column]) { Li[j] = 0.0; continue; }
-            const double* Lj = L + layout.start[j];
-            const int common = std::max(first, layout.first[j]);
+            const double* Lj = L + at.start[j];
+            const int common = std::max(first, at.first[j]);
             const double sum = Gi[j] * scale * s.scale[column] - dot(Li + common, Lj + common, j - common);
             Li[j] = sum * Lj[j];  // the diagonal holds inverse roots of pivots
             pivot -= Li[j] * Li[j];
@@ -128,33 +127,34 @@ static PN_INLINE bool factor_cholesky(const RowLayout& layout, RowSystem& s) {
 PN_WIDE void factor_rows(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
                          RowSystem& s) {
     delassus(layout, blocks, B, s);
-    scale_to_unit_length(layout, s.active, s);
+    scale_to_unit_length(s.active, s);
     s.min_pivot = 1.0;
     bool vanishes = false;
-    const double shortest = shortest_row(layout, blocks, s, vanishes);
-    s.orthogonal = !factor_cholesky(layout, s) || vanishes;
+    const double shortest = shortest_row(blocks, s, vanishes);
+    s.orthogonal = !factor_cholesky(s) || vanishes;
     s.distance = std::min(shortest, s.min_pivot);
-    if (s.redundant) s.distance = std::min(s.distance, shortest_passing(layout, s));
+    if (s.redundant) s.distance = std::min(s.distance, shortest_passing(s));
     if (s.orthogonal) factor_orthogonally(blocks, B, s);
 }
 
-PN_WIDE void solve_rows(const RowLayout& layout, RowSystem& s, const VecX& r, VecX& lam) {
+PN_WIDE void solve_rows(RowSystem& s, const VecX& r, VecX& lam) {
     lam.setZero();
     if (s.orthogonal) return solve_orthogonally(s, r, lam);
+    const Envelope& at = s.envelope;
     const double* L = s.factor.data();
     double* __restrict y = s.work.data();
-    for (int i = 0; i < layout.rows; ++i) {
-        const int row = layout.row_at[i], first = layout.first[i];
-        const double* Li = L + layout.start[i];
+    for (int i = 0; i < at.size(); ++i) {
+        const int row = at.row_at[i], first = at.first[i];
+        const double* Li = L + at.start[i];
         y[i] = 0.0;
         if (s.active[row]) y[i] = (r[row] * s.scale[row] - dot(Li + first, y + first, i - first)) * Li[i];
     }
-    for (int i = layout.rows - 1; i >= 0; --i) {
-        const int row = layout.row_at[i];
+    for (int i = at.size() - 1; i >= 0; --i) {
+        const int row = at.row_at[i];
         if (!s.active[row]) continue;
-        const double* Li = L + layout.start[i];
+        const double* Li = L + at.start[i];
         const double yi = y[i] * Li[i];
-        for (int j = layout.first[i]; j < i; ++j) y[j] -= Li[j] * yi;
+        for (int j = at.first[i]; j < i; ++j) y[j] -= Li[j] * yi;
         lam[row] = yi * s.scale[row];
     }
 }

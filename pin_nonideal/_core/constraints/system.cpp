@@ -7,8 +7,6 @@ namespace pn {
 void RowSystem::allocate(const RowLayout& layout, int block_count, int nv) {
     blocks.reserve(block_count);
     block_used.assign(block_count, 0);
-    G.allocate(layout.entries);
-    factor.allocate(layout.entries);
     scale = longest = longest_chosen = VecX::Zero(layout.rows);
     active.assign(layout.rows, 0);
     required.assign(layout.rows, 0);
@@ -18,18 +16,23 @@ void RowSystem::allocate(const RowLayout& layout, int block_count, int nv) {
     columns.reserve(layout.rows);
 }
 
-void RowSystem::use_required(const std::vector<Block>& all) {
-    blocks.clear();
-    std::fill(block_used.begin(), block_used.end(), char(0));
-    const auto last = std::find(required.rbegin(), required.rend(), char(1));
-    const int end = static_cast<int>(required.rend() - last);  // end of the required rows
-    for (size_t i = 0; i < all.size() && all[i].row < end; ++i) {
-        for (size_t k = 0; k < all[i].kept.size(); ++k) block_used[i] |= required[all[i].row + k];
-        if (block_used[i]) blocks.push_back(static_cast<int>(i));
+void RowSystem::use_required(const RowLayout& layout, const std::vector<Block>& all, const std::vector<int>& among) {
+    for (int row : envelope.row_at) {
+        active[row] = 0;
+        longest[row] = longest_chosen[row] = 0.0;
     }
-    active = required;
-    longest.setZero();
-    longest_chosen.setZero();
+    for (int i : blocks) block_used[i] = 0;
+    blocks.clear();
+    for (int i : among) {
+        const auto first = required.begin() + all[i].row;
+        block_used[i] = std::find(first, first + all[i].kept.size(), char(1)) != first + all[i].kept.size();
+        if (block_used[i]) blocks.push_back(i);
+    }
+    envelope.select(layout, all, blocks);
+    for (int row : envelope.row_at) active[row] = required[row];
+    G.resize(std::max(G.size(), envelope.entries));
+    std::fill_n(G.begin(), envelope.entries, 0.0);
+    factor.resize(G.size());
     chosen_pivot = 0.0;
     redundant = false;
     orthogonal = false;

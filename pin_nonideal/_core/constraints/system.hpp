@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "constraints/layout.hpp"
-#include "math/untouched_zeros.hpp"
 
 namespace pn {
 
@@ -23,8 +22,8 @@ struct RowChoice {
 };
 
 struct RowSystem : RowChoice {
-    // B B^T and its Cholesky factor, in the envelope. Rows of contacts that never close take no memory.
-    UntouchedZeros G, factor;
+    Envelope envelope;              // of the blocks in use
+    std::vector<double> G, factor;  // B B^T and its Cholesky factor, in the envelope
     VecX scale;                     // 1 / length of each row of B
     std::vector<char> required;     // rows that must hold (constraints, sticking elements)
     std::vector<int> blocks;        // blocks with a required row
@@ -44,8 +43,8 @@ struct RowSystem : RowChoice {
     std::vector<int> columns;
 
     void allocate(const RowLayout& layout, int blocks, int nv);
-    // Select the blocks with a required row, and use all required rows.
-    void use_required(const std::vector<Block>& all);
+    // Select the blocks with a required row, which are `among` some blocks, and use all required rows.
+    void use_required(const RowLayout& layout, const std::vector<Block>& all, const std::vector<int>& among);
 };
 
 }  // namespace pn

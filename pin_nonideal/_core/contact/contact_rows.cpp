@@ -15,7 +15,7 @@ static void free_contacts(const Program& p, Workspace& w, const std::vector<char
     for (const Gap& gap : p.gaps)
         for (size_t k = 0; k < p.blocks[gap.block].kept.size(); ++k)
             w.now.rows.required[p.blocks[gap.block].row + k] = 0;
-    w.now.rows.use_required(p.blocks);
+    w.now.rows.use_required(p.layout, p.blocks, w.now.awake);
 }
 
 void free_contacts(const Program& p, Workspace& w, const std::vector<char>& touching) {

@@ -7,6 +7,7 @@
 #include "dynamics/friction_limit.hpp"
 #include "dynamics/step_start.hpp"
 #include "complementarity/cone/solver.hpp"
+#include "contact/rest_of_trees.hpp"
 #include "friction/stick_slip.hpp"
 
 namespace pn {
@@ -21,6 +22,7 @@ constexpr double breaking_by = 1e-6;  // relative reduction of the limit of elem
 constexpr int most_releases = 4;    // rounds that set kinetic limits of slipping contacts
 constexpr int most_turns = 100;     // maximum iterations of loads and their friction
 constexpr double settled = 1e-13;   // rounding of the loads' change, relative to the largest acceleration
+constexpr int many = 8;             // contacts whose rest is first sought without the matrix of their responses
 
 // Check if the cone problem applies. All friction must be sliding of contacts that grows from zero with the load, or have
 // a constant limit. No user law may depend on reactions.
@@ -41,6 +43,25 @@ bool is_at_rest(const Program& p, const Workspace& w, const VecX& v, const Closi
     const bool known = before.mode[e] == sticking || before.lingers[e];
     return e == question.arrived || (known && !question.struck) ||
            slip_velocity(w.now, p.frictions[e]).norm() <= rest_speed * (1.0 + v.cwiseAbs().maxCoeff());
+}
+
+// Coefficient of a contact, or limit of another element.
+double strength(const Friction& f) { return f.gap >= 0 ? f.mu : f.constant; }
+
+// Check if all contacts rest, and forces of the laws at rest hold them. Small problems need no help of this kind.
+bool rests_at_once(const Program& p, Workspace& w, const VecX& v, const ClosingQuestion& question,
+                   const std::vector<int>& gaps, const std::vector<int>& others) {
+    if (static_cast<int>(gaps.size()) < many || !question.breaking.empty() || p.moves_in_time) return false;
+    if ((v.array() != 0.0).any()) return false;
+    std::vector<ConeElement> cones;
+    for (int gap : gaps) {
+        const int e = p.gaps[gap].sliding;
+        if (e < 0) cones.push_back(ConeElement::contact(1, 0.0));
+        else cones.push_back(ConeElement::contact(1 + p.frictions[e].dim, p.frictions[e].holding_limit(p.frictions[e].mu)));
+    }
+    for (int e : others)
+        cones.push_back(ConeElement::box(p.frictions[e].dim, p.frictions[e].holding_limit(p.frictions[e].constant)));
+    return rest_on_trees(p, w, gaps, others, cones);
 }
 
 struct RestingProblem {
@@ -106,13 +127,10 @@ struct RestingProblem {
         return out;
     }
 
-    // Coefficient of a contact, or limit of another element.
-    double strength(int e) const { return p.frictions[e].gap >= 0 ? p.frictions[e].mu : p.frictions[e].constant; }
-
     double limit(int e) const {
         const std::vector<int>& list = question.breaking;
         const bool breaks = std::find(list.begin(), list.end(), e) != list.end();
-        return p.frictions[e].holding_limit(strength(e)) * (breaks ? 1.0 - breaking_by : 1.0);
+        return p.frictions[e].holding_limit(strength(p.frictions[e])) * (breaks ? 1.0 - breaking_by : 1.0);
     }
 
     // Rows of a cone that belong to a normal.
@@ -155,7 +173,7 @@ struct RestingProblem {
         for (size_t i = 0; i < cones.size(); ++i) {
             const int e = rows.element(i);
             if (tail(i) == 0 || e < 0 || !at_its_limit(i)) continue;
-            const double kinetic = p.frictions[e].kinetic_limit(strength(e), 0.0);
+            const double kinetic = p.frictions[e].kinetic_limit(strength(p.frictions[e]), 0.0);
             if (!(tail_of(a, i).norm() > slip_rounding(i)) || !(kinetic < cones[i].bound)) continue;
             cones[i].bound = kinetic;
             any = true;
@@ -277,11 +295,12 @@ void RestingMotion::answer(const Program& p, Workspace& w, ModeQuestion& questio
 
 namespace {
 
-// Call act(problem) with the contacts of `question.rest` and the other elements at rest as a cone problem. The workspace
-// is unchanged afterwards. Return false if they are no cone problem, or if other rows admit no motion.
-template <class Act>
+// Call act(problem) with the contacts of `question.rest` and the other elements at rest as a cone problem, or
+// rest(elements) if they rest at once. The workspace is unchanged afterwards. Return false if they are no cone problem,
+// or if other rows admit no motion.
+template <class Rest, class Act>
 bool with_problem(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, const ClosingQuestion& question,
-                  const Act& act) {
+                  const Rest& rest, const Act& act) {
     std::vector<int> gaps;
     for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i)
         if (question.rest[i]) gaps.push_back(i);
@@ -298,8 +317,13 @@ bool with_problem(const Program& p, Workspace& w, double t, const VecX& q, const
     bool found = false;
     try {
         release_contacts(p, w, t, q, v, question.rest, modes);
-        RestingProblem problem(p, w, v, gaps, others, question, before);
-        found = act(problem);
+        if (rests_at_once(p, w, v, question, gaps, others)) {
+            rest(others);
+            found = true;
+        } else {
+            RestingProblem problem(p, w, v, gaps, others, question, before);
+            found = act(problem);
+        }
     } catch (const Failure& failure) {  // the caller's own evaluation reports failures of other rows
         if (failure.kind == Failure::Kind::interrupted) throw;
     }
@@ -316,7 +340,14 @@ std::optional<RestingMotion> resting_motion(const Program& p, Workspace& w, doub
     RestingMotion out{std::vector<char>(p.gaps.size(), 0), std::vector<Mode>(p.frictions.size(), unloaded),
                       std::vector<Vec3>(p.frictions.size(), Vec3::Zero()), {}};
     out.friction = out.direction;
-    const bool found = with_problem(p, w, t, q, v, question, [&](RestingProblem& problem) {
+    const auto rest = [&](const std::vector<int>& others) {
+        out.closed = question.rest;
+        for (size_t i = 0; i < p.gaps.size(); ++i)
+            if (question.rest[i] && p.gaps[i].sliding >= 0) out.modes[p.gaps[i].sliding] = sticking;
+        for (int e : others) out.modes[e] = sticking;
+        out.shared = true;
+    };
+    const bool found = with_problem(p, w, t, q, v, question, rest, [&](RestingProblem& problem) {
         if (!problem.solve(out.shared)) return false;
         problem.read(out);
         out.several = problem.several;
@@ -329,7 +360,7 @@ std::optional<RestingMotion> resting_motion(const Program& p, Workspace& w, doub
 bool closed_contacts_hold(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
     ClosingQuestion question;
     question.rest = w.state.closed;
-    return with_problem(p, w, t, q, v, question, [](RestingProblem& problem) {
+    return with_problem(p, w, t, q, v, question, [](const std::vector<int>&) {}, [](RestingProblem& problem) {
         ConeComplementarity solver;
         return problem.hold(solver);
     });

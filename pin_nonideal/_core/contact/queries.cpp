@@ -106,7 +106,7 @@ int pulling_contact(const Program& p, Workspace& w) {
     const Reactions& r = reactions(p, w);
     if (r.presses && w.now.rows.redundant) return -1;
     VecX lam = r.lam;
-    if (w.now.rows.redundant) share_multipliers(p.layout, p.blocks, w.now.B, p.described, w.now.rows, w.now.lam, lam);
+    if (w.now.rows.redundant) share_multipliers(p.blocks, w.now.B, p.described, w.now.rows, w.now.lam, lam);
     int found = -1;
     double most = 0.0;
     for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {

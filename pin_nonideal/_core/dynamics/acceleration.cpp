@@ -36,7 +36,7 @@ static PN_INLINE void follow_rows(const Program& p, Workspace& w, VecX& x, const
     Evaluation& now = w.now;
     if (now.rows.blocks.empty()) return;
     row_residuals(p, now, now.B, x, b, w.scratch.r);
-    solve_rows(p.layout, now.rows, w.scratch.r, lam);  // J B^T (b - B a_s') = B^T lam, Eqs. (38), (39)
+    solve_rows(now.rows, w.scratch.r, lam);  // J B^T (b - B a_s') = B^T lam, Eqs. (38), (39)
     for (int i : now.rows.blocks) add_transpose(p.blocks[i], now.B, lam, x);  // scaled, Eq. (40)
 }
 

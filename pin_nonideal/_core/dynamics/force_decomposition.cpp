@@ -17,7 +17,7 @@ IdealMotion::IdealMotion(const Program& program, Workspace& workspace) : p(progr
         w.now.rows.refine = own.refine;
         if (!w.state.ideal_decided) {
             for (int r = 0; r < p.layout.rows; ++r) w.now.rows.required[r] = own.required[r] && r < p.constraint_rows();
-            w.now.rows.use_required(p.blocks);
+            w.now.rows.use_required(p.layout, p.blocks, w.now.awake);
         }
         if (!w.now.rows.blocks.empty()) {
             scale_rows(p, w);
@@ -59,7 +59,7 @@ void split_forces(const Program& p, Workspace& w, Split& out) {
         if (w.now.terms.locked[dof]) out.C[dof] += holding_forces(p, w)[dof] + left_over[dof];
     {
         const IdealMotion ideal(p, w);
-        share_multipliers(p.layout, p.blocks, w.now.B, p.described, w.now.rows, w.now.lam, shared);
+        share_multipliers(p.blocks, w.now.B, p.described, w.now.rows, w.now.lam, shared);
         out.F_ideal = VecX::Zero(nv);
         for (int i : w.now.rows.blocks) add_transpose(p.blocks[i], w.now.A, shared, out.F_ideal);
         if (w.now.rows.blocks.empty()) shared.setZero();

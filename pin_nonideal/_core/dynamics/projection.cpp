@@ -28,7 +28,7 @@ constexpr double no_floor = 1e-16;
 
 // Compute x := R^-T B^T (B B^T)^-1 r, the least move in the metric of M that changes A x by r.
 void least_move(const Program& p, Workspace& w, VecX& x) {
-    solve_rows(p.layout, w.now.rows, w.scratch.r, w.scratch.lam_step);
+    solve_rows(w.now.rows, w.scratch.r, w.scratch.lam_step);
     x.setZero();
     for (int i : w.now.rows.blocks) add_transpose(p.blocks[i], w.now.B, w.scratch.lam_step, x);
     solve_Rt(p.mechanism, w.now.terms, x);
@@ -93,9 +93,9 @@ double product(const Workspace& w, const VecX& x, const VecX& y) {
 // Compute the next step of the multipliers, s := (B B^T)^-1 r with Broyden's corrections. The factors belong to the
 // start of the move, and each step shows the change of the rows. [Kelley, Solving Nonlinear Equations with Newton's
 // Method, 2003, sec. 4.3.]
-void broyden_step(const Program& p, Workspace& w, int count) {
+void broyden_step(Workspace& w, int count) {
     VecX& step = w.scratch.position_lam_steps[count];
-    solve_rows(p.layout, w.now.rows, w.scratch.r, step);
+    solve_rows(w.now.rows, w.scratch.r, step);
     for (int j = 0; j < count; ++j) {
         const VecX& known = w.scratch.position_lam_steps[j];
         const double part = product(w, known, step) / product(w, known, known);
@@ -177,7 +177,7 @@ void follow_constraints(const Program& p, Workspace& w, double h, VecX& move) {
         for (size_t k = 0; k < block.kept.size(); ++k)
             if (block.holonomic[k]) w.scratch.r[block.row + k] = -0.5 * h * h * w.now.b[block.row + k];
     }
-    solve_rows(p.layout, w.now.rows, w.scratch.r, w.scratch.position_lam);
+    solve_rows(w.now.rows, w.scratch.r, w.scratch.position_lam);
     // The terms of the series do not decrease close to a singular position or at high speed. Drop the third order then.
     const double cube = h * h * h, second = product(w, w.scratch.position_lam, w.scratch.position_lam);
     const double third = product(w, w.state.third_order_lam, w.state.third_order_lam);
@@ -234,7 +234,7 @@ bool project_position(const Program& p, Workspace& w, double t, VecX& q, const V
             w.scratch.position_start = q;
             w.scratch.position_lam.setZero();
         }
-        broyden_step(p, w, count);
+        broyden_step(w, count);
         w.scratch.position_lam += w.scratch.position_lam_steps[count];
         w.now.closing_lam += w.scratch.position_lam_steps[count++];
         w.now.has_closing = true;

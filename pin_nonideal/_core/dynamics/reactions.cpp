@@ -84,7 +84,7 @@ static void press_all(const Program& p, Workspace& w, Reactions& r) {
         r.unloaded.assign(p.gaps.size(), 0);
         if (!pulls) return;
     }
-    const MatX free = free_multipliers(p.layout, p.blocks, now.B, p.described, w.now.rows);
+    const MatX free = free_multipliers(p.blocks, now.B, p.described, w.now.rows);
     MatX Z(gaps.size(), free.cols());
     VecX N(gaps.size());
     std::vector<char> held(gaps.size());
@@ -130,7 +130,7 @@ const Reactions& reactions(const Program& p, Workspace& w) {
     if (r.current) return r;
     r.current = true;
     r.swept = false;
-    share_multipliers(p.layout, p.blocks, w.now.B, p.described, w.now.rows, w.now.lam, r.lam);
+    share_multipliers(p.blocks, w.now.B, p.described, w.now.rows, w.now.lam, r.lam);
     r.presses = true;
     if (shares_pressing(p, w)) press_all(p, w, r);
     return r;
@@ -142,7 +142,7 @@ double normal_force(const Program& p, Workspace& w, int contact) {
 
 Press contact_press(const Program& p, Workspace& w, int contact) {
     const VecX& shared = reactions(p, w).lam;
-    return press(p.layout, p.blocks, w.now.B, p.described, p.pressing, w.now.rows, shared, contact);
+    return press(p.blocks, w.now.B, p.described, p.pressing, w.now.rows, shared, contact);
 }
 
 Force joint_wrench(const Program& p, Workspace& w, int joint) {

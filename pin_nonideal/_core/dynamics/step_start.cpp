@@ -92,7 +92,7 @@ bool configure_step(const Program& p, Workspace& w) {
     w.state.ideal_decided = false;
     if (w.now.rows.blocks.empty()) return false;
     const RowSystem& rows = w.now.rows;
-    const bool due = p.gaps.empty() && is_choice_due(p.layout, w.now.rows);  // contacts are chosen with their modes
+    const bool due = p.gaps.empty() && is_choice_due(w.now.rows);  // contacts are chosen with their modes
     if (!rows.orthogonal && !due) return false;
     // The Cholesky factor proves that the active rows are independent: a new choice has at most as many.
     const bool keeps_rank = !rows.orthogonal;

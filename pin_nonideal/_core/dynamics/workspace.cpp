@@ -97,7 +97,7 @@ static void select_contacts(const Program& p, Workspace& w) {
 
 void select_rows(const Program& p, Workspace& w) {
     const int before_gaps = p.gaps.empty() ? p.constraint_rows() : p.blocks[p.first_gap].row;
-    std::fill(w.now.rows.required.begin(), w.now.rows.required.end(), char(0));
+    for (int row : w.now.rows.envelope.row_at) w.now.rows.required[row] = 0;
     std::fill_n(w.now.rows.required.begin(), before_gaps, char(1));
     select_contacts(p, w);
     for (int i : w.now.touching) {
@@ -120,7 +120,7 @@ void select_rows(const Program& p, Workspace& w) {
         else
             for (size_t k = 0; k < block.kept.size(); ++k) w.now.rows.required[block.row + k] = 1;
     }
-    w.now.rows.use_required(p.blocks);
+    w.now.rows.use_required(p.layout, p.blocks, w.now.awake);
     w.state.ideal_decided = false;
     w.state.rank_tolerance = rank_tolerance_sticking;
 }

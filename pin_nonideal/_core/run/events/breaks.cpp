@@ -135,7 +135,7 @@ void Breaks::jump(const std::vector<double>& before, const std::vector<double>& 
     const VecX change = v - v_minus;
     VecX impulse = VecX::Zero(w.now.lam.size());
     for (int i : w.now.rows.blocks) multiply(p.blocks[i], w.now.A, change, w.scratch.r);
-    solve_rows(p.layout, w.now.rows, w.scratch.r, impulse);
+    solve_rows(w.now.rows, w.scratch.r, impulse);
     tell(before, after, v_minus, impulse);
     system_.write(now_.y);
     if (system_.energy) system_.work(now_.y)[constraint_power] += work;

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "complementarity/blocks/least_move.hpp"
-#include "run/time_stepping/tree_blocks.hpp"
+#include "contact/tree_blocks.hpp"
 
 namespace pn {
 

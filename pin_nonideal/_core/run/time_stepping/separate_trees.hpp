@@ -2,7 +2,7 @@
 #pragma once
 
 #include "complementarity/blocks/solver.hpp"
-#include "run/time_stepping/tree_blocks.hpp"
+#include "contact/tree_blocks.hpp"
 
 namespace pn {
 

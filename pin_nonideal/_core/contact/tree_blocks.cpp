@@ -1,4 +1,4 @@
-#include "run/time_stepping/tree_blocks.hpp"
+#include "contact/tree_blocks.hpp"
 
 #include <algorithm>
 

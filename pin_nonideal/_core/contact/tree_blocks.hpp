@@ -6,7 +6,7 @@
 
 namespace pn {
 
-// Row k of a block, whose force is an unknown of the step.
+// Row k of a block, whose force is an unknown.
 struct StepRow {
     int block, k;
 };

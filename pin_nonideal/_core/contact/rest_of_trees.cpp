@@ -1,0 +1,41 @@
+#include "contact/rest_of_trees.hpp"
+
+#include <algorithm>
+
+#include "complementarity/blocks/solver.hpp"
+#include "contact/tree_blocks.hpp"
+
+namespace pn {
+
+// Error of the forces, and acceleration relative to that without them, that count as rounding.
+constexpr double solved = 1e-10, canceled = 1e-9;
+
+bool rest_on_trees(const Program& p, Workspace& w, const std::vector<int>& gaps, const std::vector<int>& others,
+                   const std::vector<ConeElement>& cones) {
+    TreeBlocks blocks(p);
+    const std::vector<char>& locked = w.now.terms.locked;
+    const bool separate = w.now.rows.blocks.empty() && std::find(locked.begin(), locked.end(), char(1)) == locked.end();
+    if (!separate || !blocks.applies(p)) return false;
+    std::vector<StepRow> rows;
+    for (size_t i = 0; i < cones.size(); ++i) {
+        int k = 0;
+        if (i < gaps.size()) rows.push_back({p.gaps[gaps[i]].block, k++});
+        const int e = i < gaps.size() ? p.gaps[gaps[i]].sliding : others[i - gaps.size()];
+        for (int direction = 0; k < cones[i].dim; ++k, ++direction) rows.push_back({p.frictions[e].block, direction});
+    }
+    BlockSolver solver;
+    if (!blocks.fill(p, w, rows, cones, solver.problem)) return false;
+    solver.problem.free = w.now.a;
+    solver.problem.offset = VecX::Zero(solver.problem.rows);
+    if (!solver.pose()) return false;
+    VecX f = solver.problem.offset;
+    if (!(solver.solve(f) <= solved)) return false;
+    double rest = 0.0, moves = 0.0;
+    for (const BlockNode& node : solver.problem.nodes) {
+        rest = std::max(rest, w.now.a.segment(node.first, node.size).cwiseAbs().maxCoeff());
+        moves = std::max(moves, solver.x().segment(node.first, node.size).cwiseAbs().maxCoeff());
+    }
+    return moves <= canceled * rest;
+}
+
+}  // namespace pn
