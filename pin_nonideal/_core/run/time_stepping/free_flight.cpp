@@ -39,15 +39,14 @@ FreeFlight::FreeFlight(const Program& p, const JointDrives& drives) {
     const Mechanism& m = p.mechanism;
     std::vector<char> parents(m.joints.size(), 0), joined(m.nv, 0);
     for (const Joint& joint : m.joints) parents[joint.parent] = 1;
-    for (size_t i = 0; i < p.blocks.size(); ++i) {
-        const bool slides_on_gap = std::any_of(p.frictions.begin(), p.frictions.end(), [&](const Friction& f) {
-            return f.block == static_cast<int>(i) && f.gap >= 0;
-        });
-        const bool opens = std::any_of(p.gaps.begin(), p.gaps.end(),
-                                       [&](const Gap& gap) { return gap.block == static_cast<int>(i); });
-        if (slides_on_gap || opens) continue;
-        for (int dof : p.blocks[i].support) joined[dof] = 1;
+    std::vector<char> opens(p.blocks.size(), 0);
+    for (const Gap& gap : p.gaps) {
+        opens[gap.block] = 1;
+        for (int e : gap.elements) opens[p.frictions[e].block] = 1;
     }
+    for (size_t i = 0; i < p.blocks.size(); ++i)
+        if (!opens[i])
+            for (int dof : p.blocks[i].support) joined[dof] = 1;
     for (size_t i = 1; i < m.joints.size(); ++i) {
         const Joint& joint = m.joints[i];
         const bool lone = joint.kind == JointKind::free_flyer && joint.parent == 0 && !parents[i] && joint.mass > 0.0;
