@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
@@ -45,14 +46,12 @@ class Case:
     restitution: float = 0.0
 
 
-def free_body(inertia: Any, tilt: float = 0.0) -> Any:
-    """Return a model of one free body; gravity is tilted by `tilt` [rad] toward +x."""
+def one_body(shape: Any, tilt: float = 0.0) -> Any:
+    """Return a model of one free body of 1 kg; gravity is tilted by `tilt` [rad] toward +x."""
     model = pin.Model()
     down = GRAVITY * np.array([math.sin(tilt), 0.0, -math.cos(tilt)])
     model.gravity = pin.Motion(down, np.zeros(3))
-    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "body")
-    model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
-    model.addFrame(pin.Frame("middle", joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    pn.free_body(model, "body", shape, mass=1.0)
     return model
 
 
@@ -63,8 +62,8 @@ def at(height: float) -> Array:
 def bouncing() -> Case:
     """Return the case of a bouncing ball, which ends between the third and the fourth impact."""
     drop, duration = 1.0, 1.9
-    model = free_body(pin.Inertia.FromSphere(1.0, RADIUS))
-    contact = pn.PointContact("middle", radius=RADIUS, restitution=RESTITUTION)
+    model = one_body(coal.Sphere(RADIUS))
+    contact = pn.PointContact("body", radius=RADIUS, restitution=RESTITUTION)
     begin = math.sqrt(2.0 * drop / GRAVITY)
     speed = GRAVITY * begin * RESTITUTION
     while begin + 2.0 * speed / GRAVITY < duration:
@@ -77,8 +76,8 @@ def bouncing() -> Case:
 
 
 def box(mu: float, tilt: float, v0: Array) -> pn.Scene:
-    model = free_body(pin.Inertia.FromBox(1.0, *EDGES), tilt)
-    contacts = [c for c in pn.box_contacts("middle", EDGES, mu=mu) if c.offset[2] < 0.0]
+    model = one_body(coal.Box(*EDGES), tilt)
+    contacts = [c for c in pn.box_contacts("body", EDGES, mu=mu) if c.offset[2] < 0.0]
     return pn.Scene(model, contacts=contacts, q0=at(0.5 * EDGES[2]), v0=v0)
 
 

@@ -11,13 +11,14 @@ import math
 from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
+import coal
 import numpy as np
 import pinocchio as pin
 
 import pin_nonideal as pn
 
 from . import timing
-from .contact_cases import CASES, EDGES, GRAVITY, STANDING, Array, Case, at, free_body
+from .contact_cases import CASES, EDGES, GRAVITY, STANDING, Array, Case, at, one_body
 from .contact_rivals import Run, Stepping, drakes, mujoco_steps, mujocos
 
 TOLERANCES = (1e-4, 1e-6, 1e-8, 1e-10)
@@ -112,8 +113,8 @@ def impacts(quick: bool, say: Callable[[str], None]) -> list[dict[str, Any]]:
     """Measure the cost of an impact by number of contacts: a run past it minus a run that ends before."""
     rows = []
     for count in FALLS:
-        model = free_body(pin.Inertia.FromBox(1.0, *EDGES))
-        corners = pn.box_contacts("middle", EDGES, mu=STANDING, restitution=0.5)
+        model = one_body(coal.Box(*EDGES))
+        corners = pn.box_contacts("body", EDGES, mu=STANDING, restitution=0.5)
         lower = sorted(corners, key=lambda c: c.offset[2])[:4]
         contacts = [*lower, *beside(lower)][:count]
         scene = pn.Scene(model, contacts=contacts, q0=at(0.5 * EDGES[2] + 0.1), v0=[0.5, 0.1, 0, 0, 0, 0.3])

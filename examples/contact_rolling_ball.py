@@ -1,5 +1,6 @@
 """Billiard ball with side spin, which slides along a parabola and then rolls straight."""
 
+import coal
 import matplotlib.pyplot as plt
 import numpy as np
 import pinocchio as pin
@@ -8,11 +9,7 @@ import pin_nonideal as pn
 
 g, r, mu, v, w = 9.81, 0.0285, 0.2, np.array([2.0, 0.0, 0.0]), np.array([-30.0, 10.0, 0.0])
 model = pin.Model()
-joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "base")
-model.appendBodyToJoint(
-    joint, pin.Inertia(0.17, np.zeros(3), 0.4 * 0.17 * r * r * np.eye(3)), pin.SE3.Identity()
-)
-model.addFrame(pin.Frame("ball", joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME), False)
+pn.free_body(model, "ball", coal.Sphere(r), mass=0.17)
 cloth = pn.PointContact("ball", mu=mu, radius=r, name="cloth")
 scene = pn.Scene(model, contacts=[cloth], q0=[0.0, 0.0, r, 0.0, 0.0, 0.0, 1.0], v0=[*v, *w])
 run = pn.simulate(scene, 1.0, rtol=1e-11, atol=1e-12, output_dt=0.005, record="forces")

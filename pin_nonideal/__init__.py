@@ -44,7 +44,9 @@ from .errors import (
     UserFunctionError,
     WallTimeError,
 )
-from .geometry.from_model import GeometryContact, geometry_contacts
+from .geometry.bodies import free_body
+from .geometry.from_model import GeometryContact, geometry_contacts, ground_contacts
+from .geometry.ground import ground
 from .scene.scene import Scene
 from .scene.stepping import Stepper
 from .simulation.simulate import simulate
@@ -158,7 +160,10 @@ __all__ = [
     "cone_complementarity",
     "constant",
     "equilibrium",
+    "free_body",
     "geometry_contacts",
+    "ground",
+    "ground_contacts",
     "inverse_dynamics",
     "load",
     "plot",

@@ -9,7 +9,7 @@ capsules, boxes, convex meshes and each other with faces, sides, rims and tips.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
@@ -19,13 +19,24 @@ import pinocchio as pin
 
 from pin_nonideal.atomic_files import file_path
 from pin_nonideal.description.laws import static_ratio as ratio_of_static
-from pin_nonideal.errors import InputError, LoadingError, short_repr
-from pin_nonideal.validation import fraction, label, nonnegative, optional_text, positive, text
+from pin_nonideal.errors import InputError, LoadingError, UnknownNameError, nearest, short_repr
+from pin_nonideal.types import GeometryModel, GeometryObject, Model
+from pin_nonideal.validation import (
+    flag,
+    fraction,
+    label,
+    nonnegative,
+    optional_text,
+    positive,
+    sequence,
+    text,
+)
 
+from .ground import ground as plain_ground
 from .manifold import ManifoldContact, manifold
-from .shapes import shape_of
+from .shapes import Shape, object_named, shape_of
 
-__all__ = ["GeometryContact", "geometry_contacts"]
+__all__ = ["GeometryContact", "geometry_contacts", "ground_contacts"]
 
 
 @dataclass(frozen=True)
@@ -43,7 +54,8 @@ class GeometryContact:
 
     Args:
         geometry1: name of a geometry object of the collision model.
-        geometry2: name of a geometry object on another body.
+        geometry2: name of a geometry object on another body, or a pinocchio.GeometryObject on the world that
+            need not be in the collision model, such as `ground()`.
         mu: kinetic coefficient of friction.
         static_ratio: static over kinetic friction, at least 1.
         restitution: rate at which the gap opens after an impact over that at which it closed, 0 to 1.
@@ -56,7 +68,7 @@ class GeometryContact:
     """
 
     geometry1: str
-    geometry2: str
+    geometry2: str | GeometryObject
     mu: float = 0.0
     static_ratio: float = 1.0
     restitution: float = 0.0
@@ -67,7 +79,13 @@ class GeometryContact:
         optional_text("GeometryContact: name", self.name)
         who = label(self)
         text(f"{who}: geometry1", self.geometry1)
-        text(f"{who}: geometry2", self.geometry2)
+        if not isinstance(self.geometry2, pin.GeometryObject):
+            text(f"{who}: geometry2", self.geometry2)
+        elif self.geometry2.parentJoint:
+            raise InputError(
+                f'{who}: geometry2 as an object must be fixed to the world; "{self.geometry2.name}" is on a '
+                "moving body: add it to the collision model, and give its name"
+            )
         object.__setattr__(self, "mu", nonnegative(f"{who}: mu", self.mu))
         object.__setattr__(self, "static_ratio", ratio_of_static(who, self.static_ratio))
         object.__setattr__(self, "restitution", fraction(f"{who}: restitution", self.restitution))
@@ -76,21 +94,27 @@ class GeometryContact:
 
 
 def geometry_contacts(
-    model: pin.Model,
-    collision_model: pin.GeometryModel,
+    model: Model,
+    collision_model: GeometryModel,
     srdf: str | Path | None = None,
     *,
+    links: Sequence[str] | None = None,
+    adjacent: bool = True,
     mu: float = 0.0,
     static_ratio: float = 1.0,
     restitution: float = 0.0,
-) -> list[ManifoldContact]:
-    """Return the contacts of the pairs of a collision model.
+) -> list[GeometryContact]:
+    """Return a `GeometryContact` for each pair of shapes of a collision model that may touch.
 
     Args:
         model: pinocchio.Model.
         collision_model: pinocchio.GeometryModel. Its collision pairs are used, or all pairs on different
             bodies if it has no collision pairs.
         srdf: path of an SRDF file whose disabled pairs are excluded.
+        links: names of links; only pairs with a shape on one of these links are used. The name of a joint
+            selects all shapes that move with this joint. None selects all pairs.
+        adjacent: whether the shapes of two bodies with a common joint may touch. The shapes of most robots
+            overlap there; an SRDF file disables these pairs by name.
         mu: kinetic coefficient of friction of all contacts.
         static_ratio: static over kinetic friction of all contacts, at least 1.
         restitution: coefficient of restitution of all contacts, 0 to 1.
@@ -99,22 +123,16 @@ def geometry_contacts(
         Descriptions for `Scene(contacts=)`.
 
     Raises:
-        InputError: an argument is invalid, a pair has no analytic manifold, or a mesh is not convex.
+        InputError: an argument is invalid, or a link has no shape.
+        UnknownNameError: no link or joint has a name in `links`.
         LoadingError: the SRDF file cannot be read.
     """
-    for what, value, kind in (
-        ("model", model, pin.Model),
-        ("collision_model", collision_model, pin.GeometryModel),
-    ):
-        if not isinstance(value, kind):
-            raise InputError(
-                f"geometry_contacts: {what} must be a pinocchio.{kind.__name__}; got {short_repr(value)}"
-            )
-    mu = nonnegative("geometry_contacts: mu", mu)
-    static_ratio = ratio_of_static("geometry_contacts", static_ratio)
-    restitution = fraction("geometry_contacts: restitution", restitution)
+    _check_models("geometry_contacts", model, collision_model)
+    rubbing = _rubbing("geometry_contacts", mu, static_ratio, restitution)
     pairs = collision_model.copy()
     objects = list(pairs.geometryObjects)
+    chosen = None if links is None else set(_shapes_of_links("geometry_contacts", links, model, objects))
+    adjacent = flag("geometry_contacts: adjacent", adjacent)
     if len(pairs.collisionPairs) == 0:
         for i, j in combinations(range(len(objects)), 2):
             if objects[i].parentJoint != objects[j].parentJoint:
@@ -127,12 +145,124 @@ def geometry_contacts(
             raise LoadingError(f'geometry_contacts: srdf "{path}" must be an SRDF file: {error}') from error
     found = []
     for pair in pairs.collisionPairs:
-        names = objects[pair.first].name, objects[pair.second].name
-        found += _manifold(GeometryContact(*names, mu, static_ratio, restitution), model, pairs)
+        ends = pair.first, pair.second
+        if chosen is not None and chosen.isdisjoint(ends):
+            continue
+        if adjacent or not _share_a_joint(model, *(objects[i].parentJoint for i in ends)):
+            found.append(GeometryContact(*(objects[i].name for i in ends), **rubbing))
     return found
 
 
-def expand_geometry_contacts(contacts: Iterable[Any], model: pin.Model, geometry: Any) -> tuple[Any, ...]:
+def ground_contacts(
+    model: Model,
+    collision_model: GeometryModel,
+    links: Sequence[str] | None = None,
+    ground: str | GeometryObject | None = None,
+    *,
+    mu: float = 0.0,
+    static_ratio: float = 1.0,
+    restitution: float = 0.0,
+) -> list[GeometryContact]:
+    """Return a `GeometryContact` with the ground for each shape of some links, such as the feet of a robot.
+
+    A link with one shape gives the contact its name, "LINK on GROUND"; else the names of the shapes do.
+
+    Args:
+        model: pinocchio.Model.
+        collision_model: pinocchio.GeometryModel with the shapes of the links.
+        links: names of links. The name of a joint selects all shapes that move with this joint. None selects
+            the shapes of all moving bodies.
+        ground: name of a shape of the collision model, or a pinocchio.GeometryObject on the world; None for
+            `ground()`, the half-space z <= 0.
+        mu: kinetic coefficient of friction of all contacts.
+        static_ratio: static over kinetic friction of all contacts, at least 1.
+        restitution: coefficient of restitution of all contacts, 0 to 1.
+
+    Returns:
+        Descriptions for `Scene(contacts=)`.
+
+    Raises:
+        InputError: an argument is invalid, a link has no shape, or no shape is on a moving body.
+        UnknownNameError: no link or joint has a name in `links`, or no shape is named `ground`.
+    """
+    who = "ground_contacts"
+    _check_models(who, model, collision_model)
+    rubbing = _rubbing(who, mu, static_ratio, restitution)
+    objects = list(collision_model.geometryObjects)
+    if ground is None:
+        ground = plain_ground()
+    elif not isinstance(ground, pin.GeometryObject):
+        object_named(who, text(f"{who}: ground", ground), collision_model)
+    below = str(ground.name if isinstance(ground, pin.GeometryObject) else ground)
+    if links is None:
+        shapes = {i: "" for i, item in enumerate(objects) if item.parentJoint and item.name != below}
+        if not shapes:
+            raise InputError(f"{who}: collision_model must have a shape on a moving body; it has none")
+    else:
+        shapes = _shapes_of_links(who, links, model, objects)
+    alone = [link for link in shapes.values() if link and list(shapes.values()).count(link) == 1]
+    return [
+        GeometryContact(
+            objects[i].name, ground, name=f"{link} on {below}" if link in alone else None, **rubbing
+        )
+        for i, link in shapes.items()
+    ]
+
+
+def _check_models(who: str, model: Any, collision_model: Any) -> None:
+    for what, value, kind in (
+        ("model", model, pin.Model),
+        ("collision_model", collision_model, pin.GeometryModel),
+    ):
+        if not isinstance(value, kind):
+            raise InputError(f"{who}: {what} must be a pinocchio.{kind.__name__}; got {short_repr(value)}")
+
+
+def _rubbing(who: str, mu: object, static_ratio: Any, restitution: object) -> dict[str, Any]:
+    """Return the checked coefficients of contacts by name."""
+    return {
+        "mu": nonnegative(f"{who}: mu", mu),
+        "static_ratio": ratio_of_static(who, static_ratio),
+        "restitution": fraction(f"{who}: restitution", restitution),
+    }
+
+
+def _shapes_of_links(who: str, links: Any, model: Model, objects: Sequence[Any]) -> dict[int, str]:
+    """Return the names of links by the indices of their shapes.
+
+    Raises:
+        InputError: the names are invalid, or a link has no shape.
+        UnknownNameError: no link or joint has the name.
+    """
+    carriers = [set(_carriers(model, item)) for item in objects]
+    known = [str(f.name) for f in model.frames if f.type == pin.FrameType.BODY] + list(model.names)[1:]
+    found: dict[int, str] = {}
+    for link in sequence(f"{who}: links", links):
+        own = [i for i, names in enumerate(carriers) if text(f"{who}: link", link) in names]
+        if not own and link not in known:
+            raise UnknownNameError(f'{who}: no link or joint "{link}" in the model{nearest(link, known)}')
+        if not own:
+            shaped = sorted(set().union(*carriers) - {"universe"})
+            raise InputError(
+                f'{who}: link "{link}" has no shape in the collision model{nearest(link, shaped)}'
+            )
+        found |= {i: link for i in own if i not in found}
+    return found
+
+
+def _carriers(model: Model, item: Any) -> Iterator[str]:
+    """Yield the names of the joint and of the link that carry a geometry object."""
+    yield str(model.names[item.parentJoint])
+    if item.parentFrame < model.nframes:
+        yield str(model.frames[item.parentFrame].name)
+
+
+def _share_a_joint(model: Model, first: int, second: int) -> bool:
+    """Check if one of two moving bodies is the parent of the other."""
+    return bool(first and second and (model.parents[first] == second or model.parents[second] == first))
+
+
+def expand_geometry_contacts(contacts: Iterable[Any], model: Model, geometry: Any) -> tuple[Any, ...]:
     """Return contacts in which each `GeometryContact` is replaced by the contacts of its manifold.
 
     Args:
@@ -153,13 +283,18 @@ def expand_geometry_contacts(contacts: Iterable[Any], model: pin.Model, geometry
     return tuple(c for several in nested for c in several)
 
 
-def _manifold(c: GeometryContact, model: pin.Model, geometry: pin.GeometryModel) -> list[ManifoldContact]:
+def _manifold(c: GeometryContact, model: Model, geometry: GeometryModel) -> list[ManifoldContact]:
     """Return the contacts of one pair of shapes."""
     who = label(c)
-    first, second = (shape_of(who, name, model, geometry) for name in (c.geometry1, c.geometry2))
+    first, second = (_shape(who, given, model, geometry) for given in (c.geometry1, c.geometry2))
     if first.frame == second.frame:
         raise InputError(f"{who}: both geometries are on the same body, which cannot touch itself")
     ground, thing = (first, second) if first.normal is not None else (second, first)
     base = c.name or f"{thing.name} on {ground.name}"
     options = {"mu": c.mu, "static_ratio": c.static_ratio, "restitution": c.restitution}
     return manifold(who, first, second, c.rounding, base, options)
+
+
+def _shape(who: str, given: str | GeometryObject, model: Model, geometry: GeometryModel) -> Shape:
+    is_object = isinstance(given, pin.GeometryObject)
+    return shape_of(who, given if is_object else object_named(who, given, geometry), model)

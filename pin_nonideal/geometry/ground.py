@@ -1,4 +1,4 @@
-"""Heights of the lowest points of shapes above a plane."""
+"""The ground as a half-space, and heights of the lowest points of shapes above a plane."""
 
 from __future__ import annotations
 
@@ -6,9 +6,48 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
+from pin_nonideal.description.constraints import Axis
 from pin_nonideal.errors import InputError
-from pin_nonideal.types import Array, GeometryModel, Model, Placement
+from pin_nonideal.types import Array, GeometryModel, GeometryObject, Model, Placement
+from pin_nonideal.validation import number, text, unit_axis
+
+from .bodies import shape_color
+
+# Color of the ground in a viewer: red, green, blue and opacity.
+GROUND_COLOR = (0.62, 0.65, 0.69, 1.0)
+
+
+def ground(
+    name: str = "ground", *, height: float = 0.0, normal: Axis = "z", color: ArrayLike | None = None
+) -> GeometryObject:
+    """Return the ground, a half-space fixed to the world, as a shape for collision models and contacts.
+
+    The points x with n . x <= height belong to the ground. `GeometryContact("box", pn.ground())` takes it as
+    it is. `collision_model.addGeometryObject(pn.ground())` makes it a shape of the scene, which contacts find
+    by its name. A replay draws the floor in both cases.
+
+    Args:
+        name: name of the shape.
+        height: distance of the surface from the world's origin along the normal [m].
+        normal: outward normal in world axes: "x", "y", "z" or three numbers; scaled to length 1.
+        color: red, green, blue and optionally opacity, 0 to 1, (3,) or (4,); None for gray.
+
+    Returns:
+        pinocchio.GeometryObject on the world with a coal.Halfspace.
+
+    Raises:
+        InputError: an argument is invalid.
+    """
+    import coal
+
+    text("ground: name", name)
+    up, at = np.array(unit_axis("ground: normal", normal)), number("ground: height", height)
+    item = pin.GeometryObject(name, 0, 0, pin.SE3.Identity(), coal.Halfspace(up, at))
+    rgba = shape_color("ground: color", color)
+    item.meshColor = np.array(GROUND_COLOR) if rgba is None else rgba
+    return item
 
 
 def lowest_height(model: Model, shapes: GeometryModel, q: Array, plane: Placement) -> float:

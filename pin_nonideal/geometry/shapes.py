@@ -7,11 +7,10 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from pin_nonideal.description.contacts.convex_hull import check_convex, convex_hull
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
-from pin_nonideal.types import Array, Placement
+from pin_nonideal.types import Array, GeometryModel, GeometryObject, Model, Placement
 
 # Corners of a box of half edges 1.
 CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))
@@ -55,23 +54,35 @@ class Shape:
         return self.radius > 0.0
 
 
-def shape_of(who: str, name: str, model: pin.Model, geometry: pin.GeometryModel) -> Shape:
-    """Return a geometry object as a shape of a supported kind.
+def object_named(who: str, name: str, geometry: GeometryModel) -> GeometryObject:
+    """Return the geometry object of a name.
 
     Args:
         who: prefix of error messages.
         name: name of the geometry object.
-        model: pinocchio.Model.
         geometry: pinocchio.GeometryModel.
 
     Raises:
-        InputError: the kind is not supported, or a mesh is not convex.
         UnknownNameError: the collision model has no such object.
     """
     known = [g.name for g in geometry.geometryObjects]
     if name not in known:
         raise UnknownNameError(f'{who}: no geometry "{name}" in the collision model{nearest(name, known)}')
-    item = geometry.geometryObjects[known.index(name)]
+    return geometry.geometryObjects[known.index(name)]
+
+
+def shape_of(who: str, item: GeometryObject, model: Model) -> Shape:
+    """Return a geometry object as a shape of a supported kind.
+
+    Args:
+        who: prefix of error messages.
+        item: pinocchio.GeometryObject.
+        model: pinocchio.Model.
+
+    Raises:
+        InputError: the kind is not supported, or a mesh is not convex.
+    """
+    name = str(item.name)
     frame, shape, place = str(model.names[item.parentJoint]), item.geometry, item.placement.copy()
     kind = type(shape).__name__
 

@@ -165,11 +165,8 @@ def test_a_cube_on_a_cube(method):
     size = 0.2
     model, geometry = empty(), pin.GeometryModel()
     for k in range(2):
-        joint = body(model, 0, pin.JointModelFreeFlyer(), f"cube {k}", 1.0, inertia=np.eye(3) * size**2 / 6.0)
-        box = pin.GeometryObject(f"cube {k}", joint, pin.SE3.Identity(), coal.Box(size, size, size))
-        geometry.addGeometryObject(box)
-    floor = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
-    geometry.addGeometryObject(pin.GeometryObject("floor", 0, pin.SE3.Identity(), floor))
+        pn.free_body(model, f"cube {k}", coal.Box(size, size, size), mass=1.0, collision_model=geometry)
+    geometry.addGeometryObject(pn.ground("floor"))
     pairs = [pn.GeometryContact("cube 0", "floor", mu=0.5), pn.GeometryContact("cube 1", "cube 0", mu=0.5)]
     q0 = [0, 0, 0.5 * size, 0, 0, 0, 1, 0, 0, 1.5 * size, 0, 0, 0, 1]
     scene = pn.Scene(model, contacts=pairs, collision_model=geometry, q0=q0)

@@ -24,9 +24,8 @@ def scene(shape, inertia, *, gravity=(0.0, 0.0, -GRAVITY), **more):
     model, geometry = empty(gravity), pin.GeometryModel()
     joint = body(model, 0, pin.JointModelFreeFlyer(), "free", 1.0, inertia=np.diag(inertia))
     frame(model, "middle", joint)
-    floor = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
     geometry.addGeometryObject(pin.GeometryObject("thing", joint, pin.SE3.Identity(), shape))
-    geometry.addGeometryObject(pin.GeometryObject("floor", 0, pin.SE3.Identity(), floor))
+    geometry.addGeometryObject(pn.ground("floor"))
     contact = pn.GeometryContact("thing", "floor", **more)
     return pn.Scene(model, contacts=[contact], collision_model=geometry)
 

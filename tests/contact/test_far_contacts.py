@@ -78,9 +78,8 @@ def far_shapes(count):
     model, geometry = empty((0.0, 0.0, -GRAVITY)), pin.GeometryModel()
     ball = body(model, 0, pin.JointModelFreeFlyer(), "ball", 1.0, inertia=0.02 * np.eye(3))
     shapes = [coal.Sphere(0.25), coal.Box(0.5, 0.4, 0.3), coal.Cylinder(0.2, 0.4), coal.Cone(0.2, 0.4)]
-    floor = coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0)
     geometry.addGeometryObject(pin.GeometryObject("ball", ball, pin.SE3.Identity(), coal.Sphere(0.1)))
-    geometry.addGeometryObject(pin.GeometryObject("floor", 0, pin.SE3.Identity(), floor))
+    geometry.addGeometryObject(pn.ground("floor"))
     contacts = [pn.GeometryContact("ball", "floor", mu=0.5, restitution=0.6)]
     for k in range(count):
         at = pin.SE3(np.eye(3), np.array([3.0 + k % 20, float(k // 20), 0.3]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -19,19 +20,16 @@ def balls_in_a_box(count: int, seed: int, ratio: float = 1.0, mu: float = 0.4) -
     rng = np.random.default_rng(seed)
     model, q, contacts = pin.Model(), [], []
     for k in range(count):
-        joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), f"ball{k}")
-        mass = 0.5 * (ratio if k % 2 else 1.0)
-        model.appendBodyToJoint(joint, pin.Inertia.FromSphere(mass, RADIUS), pin.SE3.Identity())
-        model.addFrame(pin.Frame(f"center{k}", joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+        pn.free_body(model, f"ball{k}", coal.Sphere(RADIUS), mass=0.5 * (ratio if k % 2 else 1.0))
         place, layer = k % 9, k // 9
         across = 2.3 * RADIUS * np.array([place % 3 - 1, place // 3 - 1]) + 0.004 * rng.uniform(-1.0, 1.0, 2)
         q += [*across, 1.4 * RADIUS + 2.3 * RADIUS * layer, 0.0, 0.0, 0.0, 1.0]
-        contacts.append(pn.PointContact(f"center{k}", radius=RADIUS, mu=mu))
+        contacts.append(pn.PointContact(f"ball{k}", radius=RADIUS, mu=mu))
         contacts += [
-            pn.PointContact(f"center{k}", radius=RADIUS, mu=mu, normal=n, height=-WALL, name=f"wall {k} {i}")
+            pn.PointContact(f"ball{k}", radius=RADIUS, mu=mu, normal=n, height=-WALL, name=f"wall {k} {i}")
             for i, n in enumerate(SIDES)
         ]
-        contacts += [pn.SphereContact(f"center{k}", f"center{m}", RADIUS, RADIUS, mu=mu) for m in range(k)]
+        contacts += [pn.SphereContact(f"ball{k}", f"ball{m}", RADIUS, RADIUS, mu=mu) for m in range(k)]
     return pn.Scene(model, contacts=contacts, q0=np.array(q))
 
 
@@ -64,14 +62,10 @@ def test_separate_piles_move_as_if_alone() -> None:
         for copy in range(copies):
             for k, (x, z) in enumerate(((0.0, 1.0), (2.0, 1.0), (0.96, 2.8))):
                 name = f"{copy} {k}"
-                joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), name)
-                model.appendBodyToJoint(joint, pin.Inertia.FromSphere(0.5, RADIUS), pin.SE3.Identity())
-                model.addFrame(pin.Frame(f"c {name}", joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+                pn.free_body(model, name, coal.Sphere(RADIUS), mass=0.5)
                 q += [RADIUS * x + 3.0 * copy, 0.0, RADIUS * z, 0.0, 0.0, 0.0, 1.0]
-                contacts.append(pn.PointContact(f"c {name}", radius=RADIUS, mu=0.3))
-                contacts += [
-                    pn.SphereContact(f"c {name}", f"c {copy} {m}", RADIUS, RADIUS, mu=0.3) for m in range(k)
-                ]
+                contacts.append(pn.PointContact(name, radius=RADIUS, mu=0.3))
+                contacts += [pn.SphereContact(name, f"{copy} {m}", RADIUS, RADIUS, mu=0.3) for m in range(k)]
         return pn.Scene(model, contacts=contacts, q0=np.array(q))
 
     one, two = (pn.simulate(pile(copies), 0.3, method="moreau", dt=1e-3, output_dt=0.05) for copies in (1, 2))

@@ -40,9 +40,7 @@ class TestGeometry:
     def scene(shape, radius_or_half, **more):
         model = free_body()
         geometry = pin.GeometryModel()
-        geometry.addGeometryObject(
-            pin.GeometryObject("floor", 0, 0, place(), coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.1))
-        )
+        geometry.addGeometryObject(pn.ground("floor", height=0.1))
         geometry.addGeometryObject(pin.GeometryObject("thing", 1, place(), shape))
         contact = pn.GeometryContact("thing", "floor", **more)
         return model, geometry, contact
@@ -63,7 +61,9 @@ class TestGeometry:
         impact = next(e for e in run.events if e.kind == "impact")
         assert impact.time == pytest.approx(np.sqrt(0.2 / GRAVITY), abs=1e-11)
         assert run.q[-1, 2] == pytest.approx(height, abs=1e-10)
-        assert pn.geometry_contacts(model, geometry, mu=0.4) == [*scene.contacts]
+        pairs = pn.geometry_contacts(model, geometry, mu=0.4)
+        assert pairs == [pn.GeometryContact("floor", "thing", mu=0.4)]
+        assert pn.Scene(model, contacts=pairs, collision_model=geometry).contacts == scene.contacts
 
     @pytest.mark.parametrize(
         ("shape", "fixed", "height"),

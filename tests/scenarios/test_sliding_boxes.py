@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -9,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 import pin_nonideal as pn
 
-from ..support.mechanisms import GRAVITY, body, empty, frame
+from ..support.mechanisms import GRAVITY, empty
 from ..support.seeds import ranges
 
 KEPT = 1e-7  # [m, rad, m/s, rad/s] at tolerances of 1e-10, over a second
@@ -18,13 +19,11 @@ DEPTH = 1e-10  # [m], that no contact sinks below its plane
 
 def thrown(size, mass, mu, v0, q0=None, restitution=0.0):
     model = empty()
-    joint = body(model, 0, pin.JointModelFreeFlyer(), "box", 0.0)
-    model.appendBodyToJoint(joint, pin.Inertia.FromBox(mass, *size), pin.SE3.Identity())
-    frame(model, "middle", joint)
+    pn.free_body(model, "box", coal.Box(*size), mass=mass)
     if q0 is None:
         q0 = pin.neutral(model)
         q0[2] = 0.5 * size[2]
-    corners = pn.box_contacts("middle", size, mu=mu, restitution=restitution)
+    corners = pn.box_contacts("box", size, mu=mu, restitution=restitution)
     return pn.Scene(model, contacts=corners, q0=q0, v0=v0)
 
 

@@ -66,12 +66,9 @@ def shapes(model):
     """A ball at the coupler's tip and the ground."""
     frame = model.frames[model.getFrameId("coupler_tip")]
     ball = pin.GeometryObject("ball", frame.parentJoint, frame.placement, coal.Sphere(0.02))
-    ground = pin.GeometryObject(
-        "ground", 0, pin.SE3.Identity(), coal.Halfspace(np.array([0.0, 0.0, 1.0]), -1.0)
-    )
     collision = pin.GeometryModel()
     collision.addGeometryObject(ball)
-    collision.addGeometryObject(ground)
+    collision.addGeometryObject(pn.ground(height=-1.0))
     return collision
 
 
@@ -340,15 +337,31 @@ def test_cones(examples):
 
 
 @few_and_many
-def test_contacts_of_geometry(scene, examples):
-    good = {"model": [scene.model], "collision_model": [shapes(scene.model)]}
+@pytest.mark.parametrize("function", [pn.geometry_contacts, pn.ground_contacts], ids=lambda f: f.__name__)
+def test_contacts_of_geometry(function, scene, examples):
+    good = {
+        "model": [scene.model], "collision_model": [shapes(scene.model)], "links": [["crank"], None],
+        "ground": ["ground", pn.ground()], "adjacent": [True, False],
+    }  # fmt: skip
     for_all(
-        lambda data: result_or_named_error(
-            lambda: pn.geometry_contacts(**drawn(data, pn.geometry_contacts, good))
-        ),
+        lambda data: result_or_named_error(lambda: function(**drawn(data, function, good))),
         st.data(),
         examples=examples,
     )
+
+
+@few_and_many
+@pytest.mark.parametrize("function", [pn.free_body, pn.ground], ids=lambda f: f.__name__)
+def test_bodies_and_ground(function, examples):
+    def check(data):
+        good = {
+            "model": [pin.Model()], "name": ["box"], "shape": [coal.Box(0.1, 0.2, 0.3), coal.Sphere(0.1)],
+            "density": [1e3], "place": [pin.SE3.Identity(), (0.0, 0.0, 1.0)], "color": [(1.0, 0.5, 0.0)],
+            "collision_model": [pin.GeometryModel()], "visual_model": [pin.GeometryModel()], "normal": ["z"],
+        }  # fmt: skip
+        return result_or_named_error(lambda: function(**drawn(data, function, good)))
+
+    for_all(check, st.data(), examples=examples)
 
 
 @few_and_many
@@ -408,7 +421,10 @@ def test_the_public_names_are_all_drawn():
     }
     drawn_by_lot |= {
         "cone_complementarity",
+        "free_body",
         "geometry_contacts",
+        "ground",
+        "ground_contacts",
         "sweep_grid",
         "sweep_samples",
         "Sweep",
