@@ -16,6 +16,8 @@ import pytest
 
 from pin_nonideal.loading.load import load, robots
 
+from .test_stopped_runs import EXAMPLE
+
 ROOT = Path(__file__).resolve().parents[2]
 DOCUMENTS = [
     ROOT / "README.md",
@@ -57,6 +59,8 @@ def blocks() -> list[Block]:
 
 PYTHON = [block for block in blocks() if block.language == "python"]
 RUNNABLE = [block for block in PYTHON if block.mark == "runs"]
+# Pages whose blocks run elsewhere: in README.md, in `test_stopped_runs.py` and in `test_examples.py`.
+RUN_ELSEWHERE = {"docs/index.md", "docs/how_to/stopped_runs.md", "docs/tutorials/worked_examples.md"}
 
 
 def name(block: Block) -> str:
@@ -72,7 +76,7 @@ def test_python_block_compiles(block: Block) -> None:
     compile(block.text, name(block), "exec")
 
 
-@pytest.mark.parametrize("document", sorted({block.document for block in RUNNABLE}))
+@pytest.mark.parametrize("document", sorted({block.document for block in RUNNABLE} - RUN_ELSEWHERE))
 def test_marked_python_blocks_run(document: str, tmp_path: Path) -> None:
     for block in blocks():
         if block.document == document and block.mark.startswith("file: "):
@@ -92,6 +96,17 @@ def test_marked_python_blocks_run(document: str, tmp_path: Path) -> None:
         check=False,
     )
     assert done.returncode == 0, done.stderr
+
+
+def test_blocks_that_run_elsewhere_are_the_same() -> None:
+    texts: dict[str, set[str]] = {}
+    for block in RUNNABLE:
+        texts.setdefault(block.document, set()).add(block.text)
+    assert texts["docs/index.md"] <= texts["README.md"]
+    examples = {path.read_text(encoding="utf-8") for path in (ROOT / "examples").glob("*.py")}
+    assert texts["docs/tutorials/worked_examples.md"] <= examples
+    page = (ROOT / "docs" / "how_to" / "stopped_runs.md").read_text(encoding="utf-8")
+    assert texts["docs/how_to/stopped_runs.md"] == set(EXAMPLE.findall(page))
 
 
 @pytest.mark.parametrize("path", DOCUMENTS, ids=place)
