@@ -31,7 +31,7 @@ from .held import (
 from .loop_closure import CLOSURE_TOLERANCE, FAR, WELL_CONDITIONED, Closure, Rows, Search, conditioning
 from .report import ProjectionReport, report_of
 from .rows import copies, gap_rows, holonomic_rows, rows_at
-from .scales import VANISHING, chain, coordinate, slides
+from .scales import VANISHING, chain, coordinate, largest_body, slides
 
 # Largest remaining rate of consistent rows, relative to 1 + |v|.
 RATE_TOLERANCE = 1e-6
@@ -85,9 +85,9 @@ class Projection:
         self._slides = slides(model)
         self._chain = chain(model)
         self._measured = self._chain > 0.0 or is_start
-        self._measure(self._chain or (self._length_at(q0) if self._measured else 0.0))
         self._gaps = gap_rows(program, idle)
         self._loops = holonomic_rows(program)
+        self._measure(self._chain or (self._length_at(q0) if self._measured else 0.0))
         self._has_gaps = bool(self._gaps.any())
 
     def _measure(self, length: float) -> None:
@@ -279,10 +279,14 @@ class Projection:
         return on, v_on, failures
 
     def _length_at(self, q: Array) -> float:
-        """Return the largest sliding coordinate or residual, as the length of a mechanism without lengths."""
+        """Return the length of a mechanism without lengths: its largest sliding coordinate, residual or body.
+
+        The depth of a contact is no length. A start in contact may have no other residual.
+        """
         away = pin.difference(self.model, pin.neutral(self.model), q)[self._slides]
         phi = rows_at(self.program.runner(), q, np.zeros(self.model.nv), 0.0)[2]
-        return max(_largest(away), _largest(phi))
+        phi = phi[~(self._gaps & (phi <= INSIDE))]
+        return max(_largest(away), _largest(phi), largest_body(self.model))
 
     def _reached(self) -> float:
         """Return the largest residual from which Newton's method is tried."""

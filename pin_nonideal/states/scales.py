@@ -25,6 +25,17 @@ def chain(model: Model) -> float:
     return float(max([*way, *ends]))
 
 
+def largest_body(model: Model) -> float:
+    """Return the largest radius of gyration of a body about the axes of its joint, zero for point masses [m].
+
+    Args:
+        model: pinocchio.Model.
+    """
+    bodies = [body for body in list(model.inertias)[1:] if body.mass > 0.0]
+    squares = [body.lever @ body.lever + 0.5 * np.trace(body.inertia) / body.mass for body in bodies]
+    return float(np.sqrt(max(squares, default=0.0)))
+
+
 def slides(model: Model) -> NDArray[np.bool_]:
     """Return the mask of coordinates that are lengths, (nv,).
 

@@ -201,3 +201,17 @@ def test_what_finds_no_way_out_is_named() -> None:
         'contact "floor" starts 0.002 (m or rad) inside at t = 0 s, and no short move was found that leads '
         "out of all planes: change the start"
     ) in str(error.value)
+
+
+@pytest.mark.parametrize("depth", [0.0, 7e-18, 1e-12, 1e-7, 1e-4])
+@pytest.mark.parametrize(("radius", "inertia"), [(0.02, 2e-4), (0.4, 0.06), (0.1, 0.0)])
+def test_a_body_at_the_origin_is_moved_out_of_a_plane(radius: float, inertia: float, depth: float) -> None:
+    """Neither joints nor coordinates tell the length of this scene, and its residual is the depth itself."""
+    model = empty()
+    root = pin.JointModelFreeFlyer() if inertia else pin.JointModelPZ()
+    joint = body(model, 0, root, "ball", 1.0, inertia=inertia * np.eye(3))
+    height = model.joints[joint].idx_q + 2 * (model.nq > 1)
+    plane = pn.PointContact("ball", radius=radius, height=np.nextafter(depth - radius, 1.0))
+    run = pn.simulate(pn.Scene(model, contacts=[plane]), 0.01)
+    assert run.q[0, height] == pytest.approx(depth, abs=INSIDE)
+    assert np.abs(run.q - run.q[0]).max() <= INSIDE
