@@ -12,7 +12,7 @@ from pathlib import Path
 from playwright.sync_api import sync_playwright
 
 FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
-SCREENS = ((1400, 900, "light"), (1400, 900, "dark"), (420, 800, "light"))
+SCREENS = ((1400, 900, "light"), (1400, 900, "dark"), (900, 500, "light"), (420, 800, "light"))
 GRAVE = ("serious", "critical")
 
 

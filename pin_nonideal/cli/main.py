@@ -16,6 +16,7 @@ from pathlib import Path
 
 import pin_nonideal as pn
 from pin_nonideal.errors import InputError, PinNonidealError, RunInterrupted
+from pin_nonideal.loading.library.example_robots import example_robots
 from pin_nonideal.loading.load import robots
 from pin_nonideal.scene.evaluation import SEVERAL
 from pin_nonideal.trajectory.trajectory import Trajectory
@@ -153,6 +154,7 @@ def _parser() -> argparse.ArgumentParser:
     example.set_defaults(command=_example)
 
     listing = commands.add_parser("list", help="print the names of robots and examples")
+    listing.add_argument("--all", action="store_true", help="also print the robots of example-robot-data")
     listing.set_defaults(command=_list)
 
     info = commands.add_parser(
@@ -241,8 +243,9 @@ def _example(options: argparse.Namespace) -> int:
 
 
 def _list(options: argparse.Namespace) -> int:
-    del options
     groups = {"robots: pin-nonideal run NAME": robots(), "examples: pin-nonideal example NAME": examples()}
+    if options.all:
+        groups["robots of example-robot-data: pin-nonideal run NAME"] = example_robots()
     width = max((len(name) for listed in groups.values() for name, _ in listed), default=0)
     for title, listed in groups.items():
         print(title)

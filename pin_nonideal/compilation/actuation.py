@@ -62,10 +62,14 @@ class Spring(NamedTuple):
 
 
 class Called(NamedTuple):
-    """Torques of a function (t, q, v) -> tau, held between samples of `period` [s] if it is not None."""
+    """Torques of a function (t, q, v) -> tau, held between samples of `period` [s] if it is not None.
+
+    Steps end at the times `breaks` [s], (n,), where torques that are not held may jump.
+    """
 
     function: Callable[..., Any]
     period: float | None
+    breaks: Array = np.zeros(0)
 
 
 Part = Constant | Timed | Spring | Called
@@ -110,6 +114,7 @@ def _write(part: Part, out: core.Builder) -> None:
         out.set_hold_position(kp=part.kp, kd=part.kd, q=part.q)
     elif part.period is None:
         out.set_torque_function(part.function)
+        out.add_breaks(part.breaks.tolist())
     else:
         out.set_sampled_torque(part.function, part.period)
 
@@ -126,8 +131,8 @@ def _lowered(u: Any, where: Resolution, said: Any, who: str) -> tuple[Part, Mask
             return Called(lambda t, q, v: initial, u.period), everything
         return Called(_sampled_torque(u, model), u.period), everything
     if isinstance(u, SceneDrive):
-        function, acts = u.bound(model, where.q0, said)
-        return Called(_Identified(checked(function, words(u), (model.nv,)), u), u.period), acts
+        function, acts, breaks = u.bound(model, where.q0, said)
+        return Called(_Identified(checked(function, words(u), (model.nv,)), u), u.period, breaks), acts
     if isinstance(u, HoldPosition):
         q = where.q0 if u.q is None else named_configuration(model, u.q, where.q0, f"{words(u)}: q")
         kp, kd = (gains_of(model, getattr(u, key), f"{words(u)}: {key}") for key in ("kp", "kd"))
@@ -354,7 +359,9 @@ def _sum(parts: Sequence[Part], drives: Sequence[Any], model: Model) -> Part:
 
     periods = {part.period for part in parts if isinstance(part, Called)} - {None}
     if not periods:
-        return Called(total, None)
+        times = [part.times for part in parts if isinstance(part, Timed)]
+        times += [part.breaks for part in parts if isinstance(part, Called)]
+        return Called(total, None, np.unique(np.concatenate([np.zeros(0), *times])))
     steady = [isinstance(part, Constant) or getattr(part, "period", None) is not None for part in parts]
     if len(periods) > 1 or not all(steady):
         sampled = next(k for k, part in enumerate(parts) if getattr(part, "period", None) is not None)

@@ -137,7 +137,7 @@ class Table:
     """Torques at given times, interpolated linearly or held until the next time.
 
     With interpolation "hold", values[k] acts from times[k] up to times[k + 1] (zero-order hold). Steps of the
-    core's methods end at every time of the table, also in a list of tables and constant torques. The first
+    core's methods end at every time of the table, also in a list of drives. The first
     value acts before the first time and the last value after the last time.
 
     Args:

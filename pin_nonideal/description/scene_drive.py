@@ -4,12 +4,26 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pin_nonideal.types import Array, Model
+
+
+class BoundDrive(NamedTuple):
+    """A drive of one scene.
+
+    Attributes:
+        function: function (t, q, v) -> tau, (nv,).
+        acts: mask of the degrees of freedom that it drives, (nv,).
+        breaks: times at which the torque or its rate jumps [s], ascending, (n,). Steps end there.
+    """
+
+    function: Callable[[float, Array, Array], Array]
+    acts: NDArray[np.bool_]
+    breaks: Array
 
 
 class SceneDrive(ABC):
@@ -24,10 +38,8 @@ class SceneDrive(ABC):
     name: str | None
 
     @abstractmethod
-    def bound(
-        self, model: Model, q0: Array, said: Any
-    ) -> tuple[Callable[[float, Array, Array], Array], NDArray[np.bool_]]:
-        """Return the function (t, q, v) -> tau, and the mask of the degrees of freedom that it drives, (nv,).
+    def bound(self, model: Model, q0: Array, said: Any) -> BoundDrive:
+        """Return the torques of the drive in a scene.
 
         Args:
             model: pinocchio.Model of the scene.

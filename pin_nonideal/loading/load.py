@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Mapping
+import warnings
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pin_nonideal.compilation.contacts import has_stops
-from pin_nonideal.description.contacts import JointLimit
+from pin_nonideal.description.contacts import JointLimit, UserContact
 from pin_nonideal.errors import InputError, LoadingError, nearest, short_repr
 from pin_nonideal.loading.library.example_robots import example_names, example_robot
 from pin_nonideal.loading.library.generators import GENERATORS
@@ -67,7 +68,8 @@ def load(
         assembly_tolerance: accuracy of the frames of the file's loops [m or rad], for rounded CAD exports.
             Rows that depend on others to this tolerance are removed and listed in `notes`.
         limits: whether the position limits of the file become stops of the joints, each a `JointLimit`
-            without restitution; `notes` lists unused limits.
+            without restitution; `notes` lists unused limits. Ranges of ball joints and tendons of MJCF files
+            become stops too, each a `UserContact`.
         **parameters: parameters of a generated robot, such as N for "n_four_bar". URDF files and folders:
             `free_flyer` (bool, a floating base), `package_dirs` (folders for package:// paths),
             `merge_ball_joints` (bool, True), `density` (density of links without an inertia [kg/m^3], to
@@ -110,7 +112,8 @@ def load(
         given["assembly_tolerance"] = assembly_tolerance
     if flag("load: limits", limits):
         given["limits"] = True
-    _add_limits(arguments, limits)
+    _add_limits(arguments, limits, found.robot.ranges)
+    _warn_of_open_loops(arguments, found.robot.open_loops)
     arguments["terms"] = terms
     scene = Scene(**arguments, assembly_tolerance=assembly_tolerance)
     parts = remove_dependent_rows(scene, assembly_tolerance)
@@ -122,8 +125,23 @@ def load(
     return _with_origin(scene, _origin(text, given), found, held)
 
 
-def _add_limits(arguments: Table, used: bool) -> None:
-    """Add stops to the joints with position limits, or a note that such limits exist."""
+def _warn_of_open_loops(arguments: Table, loops: Sequence[str]) -> None:
+    """Warn of loops that only elements of other tools declare, unless robot.yaml declares constraints."""
+    if not loops:
+        return
+    note = f"loops that elements of other tools declare are not read, so they are open: {', '.join(loops)}"
+    arguments["notes"] = (*arguments.get("notes", ()), note)
+    if not arguments["constraints"]:
+        warnings.warn(
+            f"load: {note}; close them by constraints in a robot.yaml beside the URDF, or by "
+            "scene.replace(add_constraints=...)",
+            UserWarning,
+            stacklevel=3,
+        )
+
+
+def _add_limits(arguments: Table, used: bool, ranges: Sequence[UserContact]) -> None:
+    """Add stops to the joints and tendons with limits, or a note that such limits exist."""
     model = arguments["model"]
     single = [(i, j.idx_q) for i, j in enumerate(model.joints) if i and j.nq == j.nv == 1]
     low, high = model.lowerPositionLimit, model.upperPositionLimit
@@ -134,9 +152,13 @@ def _add_limits(arguments: Table, used: bool) -> None:
             note = f"joints without a range (their bounds are equal) get no stops: {listed(empty)}"
             arguments["notes"] = (*arguments.get("notes", ()), note)
         stops = [JointLimit(name) for name in bounded]
-        arguments["contacts"] = (*arguments.get("contacts", ()), *stops)
-    elif bounded:
-        note = f"bounds of the positions of {len(bounded)} joints are not used; limits=True makes them stops"
+        arguments["contacts"] = (*arguments.get("contacts", ()), *stops, *ranges)
+        return
+    unused = [f"of the positions of {len(bounded)} joints"] if bounded else []
+    if ranges:
+        unused.append(f"of ball joints and tendons ({listed([str(one.name) for one in ranges])})")
+    if unused:
+        note = f"bounds {' and '.join(unused)} are not used; limits=True makes them stops"
         arguments["notes"] = (*arguments.get("notes", ()), note)
 
 

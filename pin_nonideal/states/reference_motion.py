@@ -30,13 +30,17 @@ class ReferenceMotion:
         times: increasing sample times [s], (nt,) with nt >= 1.
         q: configurations, (nt, nq).
         v: velocities, (nt, nv), or None.
+        rounding: distance of times outside the samples that count as an end, relative and in seconds below
+            1 s.
     """
 
-    def __init__(self, model: Model, times: Array, q: Array, v: Array | None = None) -> None:
+    def __init__(
+        self, model: Model, times: Array, q: Array, v: Array | None = None, rounding: float = TIME_ROUNDING
+    ) -> None:
         self._model, self._times, self._q = model, times, q
-        self._curved = any(place.nq != place.nv and place.nv > 1 for place in joint_places(model))
+        self._curved = _is_curved(model)
         self._still = np.zeros(model.nv)
-        self._room = TIME_ROUNDING * max(1.0, float(np.abs(times).max()))
+        self._room = rounding * max(1.0, float(np.abs(times).max()))
         if times.size == 1:
             return
         lengths = np.diff(times)[:, None]
@@ -71,6 +75,30 @@ class ReferenceMotion:
         step = DIFFERENCE / max(1.0, float(np.abs(rate).max()))
         before, at, after = (_jacobian(self._model, start, x + d * rate) for d in (-step, 0.0, step))
         return q, at @ rate, at @ change + (after - before) @ rate / (2.0 * step)
+
+
+def break_times(model: Model, times: Array, with_rates: bool) -> Array:
+    """Return times at which the velocity or acceleration of a reference may jump [s], ascending, (n,).
+
+    These are the ends of the samples. The velocity jumps at an end within one floating-point spacing, between
+    two of the times. Inner samples are times of the result unless the acceleration is continuous.
+
+    Args:
+        model: pinocchio.Model.
+        times: increasing sample times [s], (nt,).
+        with_rates: whether velocities are given at the samples.
+    """
+    if times.size == 1:
+        return np.zeros(0)
+    first, last = float(times[0]), float(times[-1])
+    before, after = (np.spacing(max(abs(end), last - first)) for end in (first, last))
+    inner = times[1:-1] if with_rates or _is_curved(model) else times[:0]
+    return np.array([first - before, first, *inner, last, last + after])
+
+
+def _is_curved(model: Model) -> bool:
+    """Check if the configurations of a joint are no vectors and turn about more than one axis."""
+    return any(place.nq != place.nv and place.nv > 1 for place in joint_places(model))
 
 
 def _jacobian(model: Model, q: Array, x: Array) -> Array:

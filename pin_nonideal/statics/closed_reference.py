@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pin_nonideal.errors import InputError
 from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.states.held import Held, settled
-from pin_nonideal.states.reference_motion import ReferenceMotion
+from pin_nonideal.states.reference_motion import TIME_ROUNDING, ReferenceMotion
 from pin_nonideal.states.rows import DEPENDENT, holonomic_rows, rows_at
 from pin_nonideal.states.scales import coordinate, slides
 from pin_nonideal.types import Array
@@ -44,6 +44,7 @@ class ClosedReference:
         dofs: mask of their degrees of freedom, (nv,).
         who: words for messages.
         by_name: whether the coordinates are given by name, so that all of them must be kept, up to rounding.
+        rounding: rounding of times at the ends, see `ReferenceMotion`.
 
     Raises:
         InputError: the given coordinates do not determine the motion, or no configuration on the constraints
@@ -61,6 +62,7 @@ class ClosedReference:
         dofs: Mask,
         who: str,
         by_name: bool = True,
+        rounding: float = TIME_ROUNDING,
     ) -> None:
         self._scene, self._driven, self._who = scene, driven, who
         compiled = compiled_scene(scene)
@@ -81,7 +83,7 @@ class ClosedReference:
         if on_rates is not None:
             for k, t in enumerate(times.tolist()):
                 on_rates[k] = self._velocity(on[k], on_rates[k], t)
-        self._motion = ReferenceMotion(scene.model, times, on, on_rates)
+        self._motion = ReferenceMotion(scene.model, times, on, on_rates, rounding)
 
     def __call__(self, t: float) -> tuple[Array, Array, Array]:
         """Return q (nq,), v (nv,) and a (nv,) on the constraints at time t [s]."""

@@ -17,11 +17,11 @@ from pin_nonideal.description.actuation import (
     checked_samples,
     sample_times,
 )
-from pin_nonideal.description.scene_drive import SceneDrive
+from pin_nonideal.description.scene_drive import BoundDrive, SceneDrive
 from pin_nonideal.errors import InputError
 from pin_nonideal.states.joint_layout import joint_places
 from pin_nonideal.states.parsing import joint_named, named_configuration_samples, named_joint_samples
-from pin_nonideal.states.reference_motion import ReferenceMotion
+from pin_nonideal.states.reference_motion import TIME_ROUNDING, ReferenceMotion, break_times
 from pin_nonideal.types import Array, Model
 from pin_nonideal.validation import by_name, choice, label, optional_text, positive, sequence, text
 
@@ -39,7 +39,8 @@ class TrackTrajectory(SceneDrive):
     The difference q_r - q is computed in the tangent space (pinocchio.difference). v_r - v is the difference
     of the components of both velocities. The reference passes through the samples: q_r is a cubic in
     tangent coordinates between two samples, v_r and a_r are its derivatives. Before the first and after the
-    last sample, the reference rests at the end of the samples: v_r = a_r = 0.
+    last sample, the reference rests at the end of the samples: v_r = a_r = 0. Steps end at the first and the
+    last sample. They end at all samples if v is given, or if the configurations of a joint are no vectors.
 
     The drive commands the joints of `joints`. If `joints` is None, it commands the joints that q names. If q
     is an array, it commands the joints that kp or kd name, a number acts on joints with one degree of
@@ -104,10 +105,8 @@ class TrackTrajectory(SceneDrive):
         for key, value in given.items():
             object.__setattr__(self, key, value)
 
-    def bound(
-        self, model: Model, q0: Array, said: Any
-    ) -> tuple[Callable[[float, Array, Array], Array], Mask]:
-        """Return the function (t, q, v) -> tau, and the mask of the degrees of freedom that it drives, (nv,).
+    def bound(self, model: Model, q0: Array, said: Any) -> BoundDrive:
+        """Return the torques of the drive in a scene.
 
         Args:
             model: pinocchio.Model of the scene.
@@ -125,16 +124,20 @@ class TrackTrajectory(SceneDrive):
         gains = [gains_of(model, getattr(self, key), f"{who}: {key}") for key in ("kp", "kd")]
         driven = self._driven(model, given, gains, who)
         kp, kd = (np.where(driven, gain, 0.0) for gain in gains)
+        breaks = break_times(model, times, v is not None)
+        rounding = 0.0 if self.period is None else TIME_ROUNDING  # continuous torques jump at breaks
         if self.feedforward != "constrained":
-            motion = ReferenceMotion(model, times, q, v)
-            return _Tracking(model, motion, given, driven, kp, kd, self.feedforward), driven
+            motion = ReferenceMotion(model, times, q, v, rounding)
+            tracking = _Tracking(model, motion, given, driven, kp, kd, self.feedforward)
+            return BoundDrive(tracking, driven, breaks)
         scene = without_drives(model, q0, said, who)
         names = [place.name for place in joint_places(model) if driven[place.v_first]]
 
         def reference() -> ClosedReference:
-            return ClosedReference(scene, times, q, v, given, names, driven, who, by_name(self.q) is not None)
+            named = by_name(self.q) is not None
+            return ClosedReference(scene, times, q, v, given, names, driven, who, named, rounding)
 
-        return _ConstrainedTracking(model, reference, kp, kd), driven
+        return BoundDrive(_ConstrainedTracking(model, reference, kp, kd), driven, breaks)
 
     def _driven(self, model: Model, given: Mask, gains: Sequence[Array], who: str) -> Mask:
         """Return the mask of the degrees of freedom that are driven, (nv,).

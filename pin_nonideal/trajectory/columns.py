@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import Any
 
 import numpy as np
@@ -36,7 +36,24 @@ def columns(run: Any) -> dict[str, Array]:
     Args:
         run: trajectory of the run.
     """
-    return {name: values for name, (values, _) in _with_units(run).items()}
+    return {name: values for name, (values, _) in _with_units(_all(run)).items()}
+
+
+def motion_columns(run: Any, fields: Collection[str]) -> dict[str, Array]:
+    """Return the columns of some fields of the joints and of the energies, (nt,) each.
+
+    Args:
+        run: trajectory of the run.
+        fields: fields out of "q", "v", "a", "tau" and "energy".
+    """
+    table = {
+        column_name(name): values
+        for name, values, _ in _joints(run)
+        if name.removesuffix(_number(name)).rpartition(".")[2] in fields
+    }
+    if "energy" in fields:
+        table |= {column_name(f"energy.{name}"): values for name, values in (run.energy or {}).items()}
+    return table
 
 
 def units(run: Any) -> dict[str, str]:
@@ -45,7 +62,7 @@ def units(run: Any) -> dict[str, str]:
     Args:
         run: the Trajectory.
     """
-    return {name: unit for name, (_, unit) in _with_units(run).items()}
+    return {name: unit for name, (_, unit) in _with_units(_all(run)).items()}
 
 
 def column_name(name: str) -> str:
@@ -57,10 +74,16 @@ def column_name(name: str) -> str:
     return "_".join(name.split())
 
 
-def _with_units(run: Any) -> dict[str, tuple[Array, str]]:
+def _number(name: str) -> str:
+    """Return the number of a component at the end of a column's name, such as ".2", or ""."""
+    _, dot, last = name.rpartition(".")
+    return dot + last if last.isdigit() else ""
+
+
+def _with_units(found: Iterator[tuple[str, Array, str]]) -> dict[str, tuple[Array, str]]:
     """Columns and their units by name without spaces."""
     table: dict[str, tuple[Array, str]] = {}
-    for given, values, unit in _all(run):
+    for given, values, unit in found:
         base = column_name(given)
         name, number = base, 1
         while name in table:
@@ -73,6 +96,17 @@ def _with_units(run: Any) -> dict[str, tuple[Array, str]]:
 def _all(run: Any) -> Iterator[tuple[str, Array, str]]:
     """Each column as its name, its values and its unit."""
     yield "t", run.t, "s"
+    yield from _joints(run)
+    places = [(p.name, p.v_first, p.nv, [FORCE_OF.get(u, "") for u in _motion(p)[1]]) for p in run.joints]
+    for field, values in _by_dof(run):
+        for joint, first, nv, forces in places:
+            part = values[:, first] if nv == 1 else values[:, first : first + nv]
+            yield from _numbered(f"{joint}.{field}", part, forces)
+    yield from _others(run)
+
+
+def _joints(run: Any) -> Iterator[tuple[str, Array, str]]:
+    """Yield the motion and the actuation of each joint."""
     for place in run.joints:
         record = run.joint(place.name)
         position, rate = _motion(place)
@@ -81,11 +115,10 @@ def _all(run: Any) -> Iterator[tuple[str, Array, str]]:
         per |= {key: [unit and unit + end for unit in rate] for key, end in RATES.items()}
         for field in ("q", "v", "a", "tau"):
             yield from _numbered(f"{place.name}.{field}", getattr(record, field), per[field])
-    for field, values in _by_dof(run):
-        for place in run.joints:
-            part = values[:, place.v_first : place.v_first + place.nv]
-            forces = [FORCE_OF.get(unit, "") for unit in _motion(place)[1]]
-            yield from _numbered(f"{place.name}.{field}", part[:, 0] if place.nv == 1 else part, forces)
+
+
+def _others(run: Any) -> Iterator[tuple[str, Array, str]]:
+    """Yield values of rows, elements, reactions and laws, energies, powers and violations."""
     for name, (first, end, _) in run.rows.items():
         for field in ("lam", "lam_ideal"):
             multipliers = getattr(run, field)

@@ -237,6 +237,16 @@ class TestListInfoBench:
         assert {"four_bar", "slider_crank", "five_bar", "andrews_squeezer"} <= set(names[0])
         assert {"paper_a_particle", "paper_b_ring", "paper_c_incline", "gripper"} <= set(names[1])
 
+    def test_list_all_names_the_robots_of_example_robot_data(
+        self, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        """All names that `load` reads; robots of SDF files are not among them."""
+        assert main(["list", "--all"]) == 0
+        title = "robots of example-robot-data: pin-nonideal run NAME\n"
+        names = {line.split()[0] for line in capsys.readouterr().out.split(title)[1].splitlines()}
+        assert {"panda", "talos", "ur5"} <= names
+        assert "cassie" not in names
+
     def test_an_example_writes_its_figure(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
     ) -> None:

@@ -203,7 +203,7 @@ def test_notes_of_what_plays_no_part(tmp_path):
         "sensors (1) are not read",
         'tendons that wrap around geoms are left out: "tendon_0"',
         "bounds of the positions of 1 joints are not used; limits=True makes them stops",
-        'ranges of tendons are left out: "tendon_0"',
+        'ranges of tendons that wrap around geoms are left out: "tendon_0"',
         "bodies do not fall asleep here",
         "contacts between geoms (1 pairs) are not carried over",
     ):

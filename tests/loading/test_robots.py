@@ -321,3 +321,10 @@ def test_rough_four_bar_coasts_to_rest(rtol):
     after = run.t > run.events[-1].time
     np.testing.assert_array_equal(run.v[after], 0.0)
     np.testing.assert_array_equal(run.q[after], np.broadcast_to(run.q[-1], run.q[after].shape))
+
+
+def test_a_robot_that_is_an_sdf_file_is_refused_with_its_mjcf():
+    with pytest.raises(pn.LoadingError) as error:
+        pn.load("cassie")
+    assert "SDF files are not read" in str(error.value)
+    assert 'pn.load("agility_cassie/cassie.xml")' in str(error.value)

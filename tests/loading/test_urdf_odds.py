@@ -300,3 +300,35 @@ def test_a_collada_mesh_has_the_unit_that_its_file_states(tmp_path, unit, scale,
     assert mass == pytest.approx(1000.0 * edge**3, rel=1e-6)
     told = [note for note in scene.notes if "are drawn in units of" in note]
     assert len(told) == (edge not in (4.0,))
+
+
+LOOPS = {
+    '<loop_joint name="knee" type="continuous"><link1 link="base"/><link2 link="x"/></loop_joint>': (
+        '<loop_joint> "knee"'
+    ),
+    '<gazebo><joint name="rod" type="ball"><parent>base</parent><child>x</child></joint></gazebo>': (
+        '<joint> in <gazebo> "rod"'
+    ),
+    '<drake:ball_constraint xmlns:drake="http://drake.mit.edu"/>': "<ball_constraint>",
+}
+
+
+@pytest.mark.parametrize("element", LOOPS)
+def test_loops_of_other_tools_are_a_warning_that_names_them(tmp_path, element):
+    file = tmp_path / "robot.urdf"
+    file.write_text(robot(*ARM, link("x"), joint("j", "base", "x"), element))
+    with pytest.warns(UserWarning, match="load: loops that elements of other tools") as caught:
+        scene = pn.load(file)
+    assert LOOPS[element] in str(caught[0].message)
+    assert caught[0].filename == __file__
+    assert LOOPS[element] in "\n".join(scene.notes)
+
+
+def test_loops_that_robot_yaml_closes_are_a_note(tmp_path, recwarn):
+    element = next(iter(LOOPS))
+    (tmp_path / "robot.urdf").write_text(robot(*ARM, link("x"), joint("j", "base", "x"), element))
+    (tmp_path / "robot.yaml").write_text(
+        "constraints:\n  - PrescribedMotion: {joint: j, function: {constant: {value: 0.0}}}\n"
+    )
+    assert '<loop_joint> "knee"' in "\n".join(pn.load(tmp_path).notes)
+    assert not recwarn.list

@@ -158,16 +158,49 @@ def test_drives_of_different_kinds_add():
     np.testing.assert_allclose(several.q[-1], one.q[-1], rtol=0.0, atol=1e-9)
 
 
-def test_jumps_beside_a_spring_are_found_by_the_error_control():
-    """Steps do not end at the times of a table beside a spring, and the tolerance holds all the same."""
+BESIDE = {
+    "spring": SHOULDER,
+    "reference": pn.TrackTrajectory([0.0, 0.5, 0.9], {"shoulder": [0.0, 0.3, 0.1]}, kp=30.0, kd=3.0),
+}
+
+
+@pytest.mark.parametrize("beside", BESIDE)
+@pytest.mark.parametrize("method", METHODS)
+def test_steps_end_at_the_times_of_a_table_beside_another_drive(method, beside):
+    """A held table in a list is a sequence of constant torques, also for methods of fixed steps."""
+    options, drive = METHODS[method], BESIDE[beside]
     table = pn.Table(TIMES, {"elbow": VALUES[:, 1]}, interpolation="hold")
-    tight = {"rtol": 1e-10, "atol": 1e-11}
-    whole = run([SHOULDER, table], **tight)
+    whole = run([drive, table], **options)
+    assert set(TIMES[1:]) <= set(whole.t)
     t, q, v = 0.0, np.zeros(2), np.zeros(2)
     for tau, stop in zip(VALUES[:, 1], [*TIMES[1:], END], strict=True):
-        piece = run([SHOULDER, {"elbow": tau}], duration=stop - t, q=q, v=v, t0=t, **tight)
+        piece = run([drive, {"elbow": tau}], duration=stop - t, q=q, v=v, t0=t, **options)
         t, q, v = stop, piece.q[-1], piece.v[-1]
-    np.testing.assert_allclose(whole.q[-1], q, rtol=0.0, atol=1e-7)
+    np.testing.assert_allclose(whole.q[-1], q, rtol=0.0, atol=1e-10)
+    np.testing.assert_allclose(whole.v[-1], v, rtol=0.0, atol=1e-9)
+
+
+def test_steps_end_at_the_kinks_of_a_linear_table_beside_a_spring():
+    """The recorded torque at each time is that of the table, on the grid of a fixed step too."""
+    table = pn.Table(TIMES, {"elbow": VALUES[:, 1]})
+    for options in ({}, {"method": "rk4", "dt": 0.05}, {"method": "moreau", "dt": 0.05}):
+        one = run([SHOULDER, table], record="tau", **options)
+        for time, value in zip(TIMES, VALUES[:, 1], strict=True):
+            assert one.tau[np.flatnonzero(one.t == time)[0], 1] == value
+
+
+def test_steps_end_where_a_reference_begins_and_ends_in_motion():
+    times = np.array([0.1, 0.23, 0.4, 0.55])
+    for v, expected in ((None, times[[0, -1]]), ([1.0, 0.5, -2.0, 1.0], times)):
+        rates = None if v is None else {"shoulder": v}
+        track = pn.TrackTrajectory(times, {"shoulder": [0.0, 0.3, 0.1, 0.2]}, rates, kp=30.0, kd=3.0)
+        for drives in (track, [track, {"elbow": 1.0}]):
+            one = run(drives, method="rk4", dt=0.04, record="tau")
+            assert set(expected) <= set(one.t)
+        at = int(np.flatnonzero(one.t == 0.55)[-1])
+        assert one.t[at + 1] - 0.55 < 1e-15
+        if v is not None:  # the velocity of the reference falls to zero within one spacing
+            np.testing.assert_allclose(one.tau[at, 0] - one.tau[at + 1, 0], 3.0 * v[-1], atol=1e-9)
 
 
 def test_limits_of_one_drive_apply_to_its_joints():

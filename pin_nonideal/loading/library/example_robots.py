@@ -16,6 +16,9 @@ from pin_nonideal.loading.urdf.geometry_sources import Shapes, cached_models, ca
 from pin_nonideal.loading.urdf.reader import RobotFile, read_mimics
 from pin_nonideal.types import Model
 
+# Files of the robots that example-robot-data has as SDF only, for messages.
+MJCF_INSTEAD = {"cassie": ': pn.load("agility_cassie/cassie.xml"), a file of MuJoCo Menagerie'}
+
 
 def example_names() -> Sequence[str]:
     """Return the names of example-robot-data, or an empty tuple if it is not installed."""
@@ -24,6 +27,27 @@ def example_names() -> Sequence[str]:
     except ImportError:
         return ()
     return tuple(robots_loader.ROBOTS)
+
+
+def example_robots() -> list[tuple[str, str]]:
+    """Return the robots of example-robot-data that `load` reads, as (name, its file), in alphabetical order.
+
+    Raises:
+        LoadingError: example-robot-data is not installed.
+    """
+    try:
+        from example_robot_data import robots_loader
+    except ImportError as error:
+        raise LoadingError(
+            f"example-robot-data cannot be imported ({error}); pip install example-robot-data-loaders"
+        ) from None
+    kinds = sorted(robots_loader.ROBOTS.items())
+    return [(name, kind.urdf_filename) for name, kind in kinds if not _is_sdf(kind)]
+
+
+def _is_sdf(kind: Any) -> bool:
+    """Check if a robot of example-robot-data is an SDF file."""
+    return bool(kind.sdf_filename) and not kind.urdf_filename
 
 
 def example_robot(name: str, others: list[str]) -> RobotFile:
@@ -42,6 +66,13 @@ def example_robot(name: str, others: list[str]) -> RobotFile:
         ) from None
     if name not in robots_loader.ROBOTS:
         raise UnknownNameError(f'no robot "{name}"{nearest(name, [*others, *robots_loader.ROBOTS])}')
+    kind = robots_loader.ROBOTS[name]
+    if _is_sdf(kind):
+        raise LoadingError(
+            f'example-robot-data has "{name}" as an SDF file only ({kind.sdf_filename}), '
+            "and SDF files are not read, since the pin wheel has no SDF parser; load the robot from MJCF or "
+            f"URDF instead{MJCF_INSTEAD.get(name, '')}"
+        )
     try:
         robot, path = _load_lazily(robots_loader, name)
     except Exception as error:  # any error of the loaders' parsers

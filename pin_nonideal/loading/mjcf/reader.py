@@ -28,6 +28,7 @@ from .forces import (
     joint_springs,
 )
 from .motion import Tendon
+from .ranges import read_ranges
 from .shapes import geom_names, read_shapes
 from .tendons import read_tendons, tendon_forces
 from .transmissions import read_transmission
@@ -98,6 +99,7 @@ def translate(
         unsupported.add_note("the file's flags switch its equalities off")
     if compiled.nactuator and not flags & off.mjDSBL_ACTUATION:
         robot.actuation = _actuators(tree, tendons, through_drives, not flags & off.mjDSBL_CLAMPCTRL)
+    robot.ranges = read_ranges(tree, tendons)
     robot.to_float = "give a body a <freejoint/>"
     robot.contact_friction = {
         name: (float(a), float(b), float(c))

@@ -18,7 +18,7 @@ from .shapes import colliding_pairs
 from .tendons import tendon_name
 from .transmissions import BODY
 from .transmissions import TENDON as BY_TENDON
-from .tree import BALL, GROUND, Tree, actuator_share
+from .tree import GROUND, Tree, actuator_share
 
 ALLOWED = ("actuator", "flex", "fluid", "muscle", "plasticity", "plugin", "tendon")
 MUSCLE = 2  # MuJoCo's mjtGain and mjtBias
@@ -79,7 +79,7 @@ def report_unsupported(
     _check_bodies(tree, unsupported)
     _check_equalities(tree, tendons, unsupported)
     _check_contacts(mujoco, tree, unsupported)
-    _check_limits(tree, unsupported)
+    _check_limits(tree, tendons, unsupported)
     _check_options(mujoco, tree, unsupported)
 
 
@@ -222,14 +222,11 @@ def _check_contacts(mujoco: Any, tree: Tree, unsupported: UnsupportedFeatures) -
         )
 
 
-def _check_limits(tree: Tree, unsupported: UnsupportedFeatures) -> None:
-    m = tree.compiled
-    balls = [tree.joint_name(j) for j in np.flatnonzero(m.jnt_limited).tolist() if m.jnt_type[j] == BALL]
-    if balls:
-        unsupported.add_note(f"ranges of ball joints have no place in the model: {listed(balls)}")
-    tendons = [tendon_name(tree, i) for i in np.flatnonzero(m.tendon_limited).tolist()]
-    if tendons:
-        unsupported.add_note(f"ranges of tendons are left out: {listed(tendons)}")
+def _check_limits(tree: Tree, tendons: list[Tendon | None], unsupported: UnsupportedFeatures) -> None:
+    limited = np.flatnonzero(tree.compiled.tendon_limited).tolist()
+    wrapping = [tendon_name(tree, i) for i in limited if tendons[i] is None]
+    if wrapping:
+        unsupported.add_note(f"ranges of tendons that wrap around geoms are left out: {listed(wrapping)}")
 
 
 def _check_options(mujoco: Any, tree: Tree, unsupported: UnsupportedFeatures) -> None:

@@ -16,12 +16,14 @@ import numpy as np
 import pinocchio as pin
 
 from pin_nonideal.description.constraints import Constraint, JointCoupling, PrescribedMotion
+from pin_nonideal.description.contacts import UserContact
 from pin_nonideal.description.time_functions import Constant
 from pin_nonideal.errors import LoadingError, nearest
 from pin_nonideal.types import Array, GeometryModel, Model
 
 from .density import add_inertias, links_without_inertia
 from .geometry_sources import Shapes, cached_models, cached_shapes, file_stamps
+from .loop_tags import open_loops
 from .meshes import resolve_meshes
 from .repair import repair_urdf
 from .validation import check_urdf
@@ -64,6 +66,8 @@ class RobotFile:
         to_float: advice on a floating base for a robot without degrees of freedom, or "".
         contact_friction: coefficients of sliding, torsional and rolling friction by the geometry's name.
         joint_order: names of the joints in the order of the file.
+        ranges: contacts that keep the file's ranges of tendons and ball joints.
+        open_loops: loops that elements of other tools declare in the file, and that are not read.
     """
 
     model: Model
@@ -82,6 +86,8 @@ class RobotFile:
     to_float: str = ""
     contact_friction: dict[str, tuple[float, float, float]] = field(default_factory=dict)
     joint_order: tuple[str, ...] = ()
+    ranges: list[UserContact] = field(default_factory=list)
+    open_loops: list[str] = field(default_factory=list)
 
 
 def read_urdf(
@@ -106,6 +112,7 @@ def read_urdf(
     root = parse_xml(urdf_text(path, package_dirs), path, "robot")
     name = root.get("name") or path.parent.name
     root.set("name", name)
+    loops = open_loops(root)
     notes = repair_urdf(root)
     check_urdf(root, path, ("universe", "root_joint") if free_flyer else ("universe",))
     shaped = links_without_inertia(root)
@@ -127,6 +134,7 @@ def read_urdf(
     motors = [j.get("name", "") for j in root.findall("transmission/joint")]
     robot = RobotFile(model, visual, collision, constraints=_mimics(root, path), motors=motors, notes=notes)
     robot.to_float = "load(..., free_flyer=True) gives the root link a floating base"
+    robot.open_loops = loops
     robot.joint_order = tuple(j.get("name", "") for j in root.findall("joint"))
     lost = [link for link in shaped if link not in bare]
     if lost and (density is not None or not bare):

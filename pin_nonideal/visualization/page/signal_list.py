@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pin_nonideal.trajectory.columns import column_name, columns
+from pin_nonideal.trajectory.columns import column_name, columns, motion_columns
 from pin_nonideal.types import Array
 
 from .coordinates import positions, velocities
@@ -68,7 +68,8 @@ class _Found:
 def signals_of(run: Trajectory, finer: Trajectory) -> list[Signal]:
     """Return all scalars of a run that can be plotted, thinned with their extremes.
 
-    Every column of `Trajectory.columns` is one of them, or the angle or rate that it holds is.
+    Every column of `Trajectory.columns` is one of them, or the angle or rate that it holds is. Forces of laws
+    in joints on which they do not act are no signals.
 
     Args:
         run: run of the replay.
@@ -78,13 +79,12 @@ def signals_of(run: Trajectory, finer: Trajectory) -> list[Signal]:
         run = finer
     found = [*_labelled(run, finer), *_loads(run)]
     known = {word for item in found for word in item.words.split("\n")}
-    fine = columns(finer)
-    names = {column_name(name): name for name in (*run.scene.model.names, *run.rows, *run.element_names)}
+    fine, reader = motion_columns(finer, SMOOTH), _Columns(run)
     for name, values in columns(run).items():
-        if name == "t" or name in known:
+        if name == "t" or name in known or reader.is_idle(name):
             continue
-        item = _Column(run, name, names).signal(values)
-        smooth = item.words.split("\n")[-1] in SMOOTH
+        item = reader.signal(name, values)
+        smooth = item.words.split("\n")[-1] in SMOOTH and name in fine
         found.append(replace(item, values=fine[name] if smooth else item.values, smooth=smooth))
     order = {section: place for place, section in enumerate(SECTIONS)}
     found.sort(key=lambda item: order[item.section])
@@ -127,41 +127,73 @@ def _loads(run: Trajectory) -> Iterator[_Found]:
             yield _Found(f"{name}, load, |{what}|", unit, REACTIONS, "reaction bearing wrench", size)
 
 
-class _Column:
-    """Content of a column of a run.
+class _Columns:
+    """Content of the columns of a run.
 
     Args:
         run: run of the replay.
-        name: name of the column.
-        names: names of joints, constraints and elements by their names in columns.
     """
 
-    def __init__(self, run: Trajectory, name: str, names: Mapping[str, str]) -> None:
-        self.run, self.name, self.names = run, name, names
+    def __init__(self, run: Trajectory) -> None:
+        self.run = run
+        every = (*run.scene.model.names, *run.rows, *run.element_names)
+        self._names = {column_name(name): name for name in every}
+        # Names of columns of the ledger, with the field and the name of the entry.
+        self._ledger = {
+            column_name(f"{field}.{own}"): (field, str(own))
+            for field in ("energy", "power")
+            for own in getattr(run, field, None) or {}
+        }
+        self._laws = {column_name(law): str(law) for law in getattr(run, "law_forces", None) or {}}
+        joint_of = np.repeat(np.arange(len(run.joints)), [place.nv for place in run.joints])
+        dofs = dict(zip(run.law_names, run.law_dofs, strict=True)) if self._laws else {}
+        # Pairs of a law and a joint on which it acts.
+        self._acting = {
+            (law, column_name(run.joints[joint].name))
+            for law in self._laws.values()
+            for joint in set(joint_of[dofs[law]].tolist())
+        }
 
-    def signal(self, values: Array) -> _Found:
-        """Return the signal of the column; its words end with the field."""
-        for field, unit, words in (("energy", "J", "work"), ("power", "W", "")):
-            for own in getattr(self.run, field, None) or {}:
-                if self.name == column_name(f"{field}.{own}"):
-                    return self._found(f"{field}: {own}", unit, ENERGY, words, field, values)
-        for law in getattr(self.run, "law_forces", None) or {}:
-            owner, _, number = self.name.partition(f".C.{column_name(law)}")
-            if owner != self.name and (not number or number[0] == "."):
-                owner = self.names.get(owner, owner)
-                label, unit = f"{law}, on {owner}{number.replace('.', ' ')}", self._unit(owner, number)
-                return self._found(label, unit, FRICTION, "friction force law torque", "C", values)
-        number = (re.search(r"\.\d+$", self.name) or [""])[0]
-        owner, _, field = self.name.removesuffix(number).rpartition(".")
-        return self._of_field(self.names.get(owner, owner), field, number, values)
+    def is_idle(self, name: str) -> bool:
+        """Check if a column is the force of a law in a joint on which the law does not act."""
+        owner, law, _ = self._law_force(name)
+        return law is not None and (law, owner) not in self._acting
 
-    def _of_field(self, owner: str, field: str, number: str, values: Array) -> _Found:
+    def signal(self, name: str, values: Array) -> _Found:
+        """Return the signal of a column; its words end with the field."""
+        if name in self._ledger:
+            field, own = self._ledger[name]
+            unit, words = ("J", "work") if field == "energy" else ("W", "")
+            return _found(name, f"{field}: {own}", unit, ENERGY, words, field, values)
+        owner, law, number = self._law_force(name)
+        if law is not None:
+            owner = self._names.get(owner, owner)
+            label, unit = f"{law}, on {owner}{number.replace('.', ' ')}", self._unit(owner, number)
+            return _found(name, label, unit, FRICTION, "friction force law torque", "C", values)
+        number = (re.search(r"\.\d+$", name) or [""])[0]
+        owner, _, field = name.removesuffix(number).rpartition(".")
+        return self._of_field(name, self._names.get(owner, owner), field, number, values)
+
+    def _law_force(self, name: str) -> tuple[str, str | None, str]:
+        """Return joint, law and number of the component of a law's force; no law for other columns."""
+        place = name.find(".C.")
+        while place >= 0:
+            rest = name[place + 3 :]
+            if rest in self._laws:
+                return name[:place], self._laws[rest], ""
+            law, dot, number = rest.rpartition(".")
+            if law in self._laws:
+                return name[:place], self._laws[law], dot + number
+            place = name.find(".C.", place + 1)
+        return "", None, ""
+
+    def _of_field(self, name: str, owner: str, field: str, number: str, values: Array) -> _Found:
         part, unit = number.replace(".", " "), self._unit(owner, number)
         if field == "reaction":
             place = int(number[1:])
             unit = "N" if place < 3 else "N m"
             label = f"{owner}, reaction, {WRENCH[place]}"
-            return self._found(label, unit, REACTIONS, "load bearing wrench component", field, values)
+            return _found(name, label, unit, REACTIONS, "load bearing wrench component", field, values)
         known = {
             "q": (f"{owner}, q{part}", "", MOTION, "position configuration"),
             "v": (f"{owner}, v{part}", "", MOTION, "velocity"),
@@ -176,12 +208,9 @@ class _Column:
         }
         if field in known and owner:
             label, unit, section, words = known[field]
-            return self._found(label, unit, section, words, field, values)
+            return _found(name, label, unit, section, words, field, values)
         rates = {"violation": "m, rad", "violation_rate": "m/s, rad/s"}
-        return self._found(self.name.replace("_", " "), rates.get(self.name, ""), OTHERS, "", field, values)
-
-    def _found(self, label: str, unit: str, section: str, words: str, field: str, values: Array) -> _Found:
-        return _Found(label, unit, section, f"{self.name}\n{words}\n{field}", np.asarray(values, dtype=float))
+        return _found(name, name.replace("_", " "), rates.get(name, ""), OTHERS, "", field, values)
 
     def _unit(self, joint: str, number: str) -> str:
         """Return the unit of a generalized force in a joint, or of one component."""
@@ -195,6 +224,11 @@ class _Column:
         if kind == "JointModelFreeFlyer" and number:
             return "N" if int(number[1:]) < 3 else "N m"
         return {"JointModelTranslation": "N"}.get(kind, "N m" if "Spherical" in kind else "N, N m")
+
+
+def _found(name: str, label: str, unit: str, section: str, words: str, field: str, values: Array) -> _Found:
+    """Return the signal of a column by its name."""
+    return _Found(label, unit, section, f"{name}\n{words}\n{field}", np.asarray(values, dtype=float))
 
 
 def _thinned(item: _Found, t: Array, points: int) -> Signal:

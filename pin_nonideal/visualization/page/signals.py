@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from pin_nonideal.errors import InputError, UnknownNameError, nearest, short_repr
 from pin_nonideal.types import Array
@@ -58,22 +57,17 @@ class Plot:
         count = len(self.t)
         if count <= 2 * intervals:
             return self
-        starts = np.linspace(0, count, intervals, endpoint=False).astype(int)
+        length = -(-count // intervals)
+        starts = np.arange(0, count, length)
         kept = np.zeros(count, dtype=bool)
         kept[[0, -1]] = True
         for values in self.curves.values():
-            for extreme in (np.minimum, np.maximum):
-                kept[_first_of(values, extreme.reduceat(values, starts), starts)] = True
+            whole = np.append(values, np.full(len(starts) * length - count, values[-1]))
+            rows = whole.reshape(-1, length)  # an interval each; the first extreme or NaN of a row counts
+            kept[starts + rows.argmin(axis=1)] = True
+            kept[starts + rows.argmax(axis=1)] = True
         index = np.flatnonzero(kept)
         return replace(self, t=self.t[index], curves={k: v[index] for k, v in self.curves.items()})
-
-
-def _first_of(values: Array, wanted: Array, starts: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the first index of a value in each interval, or of the first NaN if the value is NaN."""
-    piece = np.repeat(np.arange(len(starts)), np.diff(np.append(starts, len(values))))
-    places = np.flatnonzero((values == wanted[piece]) | np.isnan(values))
-    _, first = np.unique(piece[places], return_index=True)
-    return np.asarray(places[first])
 
 
 def parse_plots(what: str, chosen: Any) -> list[Any]:
