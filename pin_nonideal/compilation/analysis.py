@@ -80,22 +80,22 @@ def check_model(model: Model) -> None:
         )
 
 
-def without_functions(said: Descriptions, nv: int) -> Descriptions | None:
+def without_functions(spec: Descriptions, nv: int) -> Descriptions | None:
     """Return a scene with the same rows but without user functions, or None if no description has one.
 
     Args:
-        said: descriptions of the scene.
+        spec: descriptions of the scene.
         nv: number of degrees of freedom.
     """
-    constraints = tuple(_without_function(c, nv) for c in said.constraints)
-    contacts = tuple(_without_function(c, nv) for c in said.contacts)
-    laws = tuple(_without_function(law, nv) for law in said.laws)
+    constraints = tuple(_without_function(c, nv) for c in spec.constraints)
+    contacts = tuple(_without_function(c, nv) for c in spec.contacts)
+    laws = tuple(_without_function(law, nv) for law in spec.laws)
     pairs = zip(
-        (*constraints, *contacts, *laws), (*said.constraints, *said.contacts, *said.laws), strict=True
+        (*constraints, *contacts, *laws), (*spec.constraints, *spec.contacts, *spec.laws), strict=True
     )
     if all(one is other for one, other in pairs):
         return None
-    return said._replace(constraints=constraints, contacts=contacts, laws=laws)
+    return spec._replace(constraints=constraints, contacts=contacts, laws=laws)
 
 
 def _without_function(c: Any, nv: int) -> Any:
@@ -126,7 +126,7 @@ def _without_function(c: Any, nv: int) -> Any:
     return c
 
 
-def idle_rows(
+def zero_rows(
     model: Model,
     q0: Array,
     program: core.Program,

@@ -25,14 +25,14 @@ class SceneDrive(ABC):
 
     @abstractmethod
     def bound(
-        self, model: Model, q0: Array, said: Any
+        self, model: Model, q0: Array, spec: Any
     ) -> tuple[Callable[[float, Array, Array], Array], NDArray[np.bool_]]:
         """Return the function (t, q, v) -> tau, and the mask of the degrees of freedom that it drives, (nv,).
 
         Args:
             model: pinocchio.Model of the scene.
             q0: initial configuration of the scene, (nq,).
-            said: the `compilation.lowering.Descriptions` of the scene.
+            spec: the `compilation.lowering.Descriptions` of the scene.
 
         Raises:
             InputError, UnknownNameError: the drive does not fit the model.

@@ -46,7 +46,7 @@ def parts_after(
         InputError: a list is no list of descriptions.
         UnknownNameError: there is no description of a name in `remove`.
     """
-    spec = compiled.said
+    spec = compiled.spec
     now: dict[str, tuple[Any, ...]] = {kind: tuple(getattr(spec, kind)) for kind in KINDS}
     names = dict(
         zip(("laws", "forces"), (unique_names(now[k], set()) for k in ("laws", "forces")), strict=True)

@@ -40,7 +40,18 @@ from .stepping import SceneStepper, Stepper
 TERMS = tuple(provider.name for provider in core.Provider)
 IMPACTS = tuple(law.name for law in core.ImpactLaw)
 # Fields that cannot change after compilation.
-TAKEN = ("model", "constraints", "laws", "contacts", "forces", "actuation", "terms", "impact", "q0", "v0")
+FROZEN_FIELDS = (
+    "model",
+    "constraints",
+    "laws",
+    "contacts",
+    "forces",
+    "actuation",
+    "terms",
+    "impact",
+    "q0",
+    "v0",
+)
 
 
 @dataclass(frozen=True)
@@ -177,7 +188,7 @@ class Scene:
         self._compiled = compiled
 
     def __setattr__(self, key: str, value: Any) -> None:
-        if key in TAKEN and "_compiled" in self.__dict__:
+        if key in FROZEN_FIELDS and "_compiled" in self.__dict__:
             raise InputError(
                 f'{key} of scene "{self.name}" is what the scene was made of and cannot be exchanged; make a '
                 f"new Scene with another {key}"

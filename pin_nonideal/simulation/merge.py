@@ -20,7 +20,7 @@ COUNTERS = ("steps", "rejected", "evaluations", "factorizations", "projections",
 Motion = tuple[Array, Array, Array, Array, Array]  # states, modes, directions, sought, moved
 
 
-class JoinedEvent(NamedTuple):
+class MergedEvent(NamedTuple):
     """An event of one component, with the element index of the whole scene."""
 
     time: float
@@ -29,7 +29,7 @@ class JoinedEvent(NamedTuple):
     of_contact: bool = False
 
 
-def joined_outcome(
+def merge_outcomes(
     scene: Scene,
     parts: Sequence[Component],
     outcomes: Sequence[core.Outcome],
@@ -53,7 +53,7 @@ def joined_outcome(
     ]
     events = sorted(
         (
-            JoinedEvent(event.time, event.kind, int(part.elements[event.element]))
+            MergedEvent(event.time, event.kind, int(part.elements[event.element]))
             for one, part in zip(outcomes, parts, strict=True)
             for event in one.events
         ),

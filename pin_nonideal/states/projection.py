@@ -14,8 +14,8 @@ from pin_nonideal.core_loader import core
 from pin_nonideal.errors import InputError, PinNonidealError, UserFunctionError
 from pin_nonideal.types import Array, Model
 
-from .contact_closure import SearchOutside
-from .errors import largest_loop_gap, lost_velocity, no_way_out, open_loops, refuse_deep_starts
+from .contact_closure import UnilateralClosure
+from .errors import largest_loop_gap, open_loops, penetration_error, refuse_deep_starts, velocity_error
 from .held import (
     NOTHING_HELD,
     Held,
@@ -28,7 +28,7 @@ from .held import (
     told_coordinates,
     with_entries,
 )
-from .loop_closure import CLOSURE_TOLERANCE, FAR, WELL_CONDITIONED, Closure, Rows, Search, conditioning
+from .loop_closure import CLOSURE_TOLERANCE, FAR, MIN_RCOND, Closure, Rows, Search, conditioning
 from .report import ProjectionReport, report_of
 from .rows import copies, gap_rows, holonomic_rows, rows_at
 from .scales import VANISHING, chain, coordinate, slides
@@ -152,7 +152,7 @@ class Projection:
                 iterations, nearest = iterations + search[0], search[1]
             _, v_on, _, _, rate = runner.project(on, v, t, np.inf)
         if not rate <= RATE_TOLERANCE * min(1.0, self.length) * (1.0 + _largest(v_on)):
-            raise lost_velocity(rows_at(runner, on, v_on, t)[3], self.program, t)
+            raise velocity_error(rows_at(runner, on, v_on, t)[3], self.program, t)
         mass = _mass(self.model, runner)
         if held.v is not None and changes(v, v_on, held.v):
             with suppress(*(() if held.firm_v else (InputError,))):
@@ -218,7 +218,7 @@ class Projection:
         inside = not self._is_outside(q, phi) and largest_loop_gap(phi, self.program) <= self._closed
         far = (np.abs(pin.difference(self.model, q, found)) > FAR * self.unit).any()
         if inside and (not met or (far and not nearest)):
-            raise no_way_out(phi, self.program, t)
+            raise penetration_error(phi, self.program, t)
         if not met:
             raise open_loops(now, self.program, t)
 
@@ -343,7 +343,7 @@ class Projection:
             )
             if not self._has_gaps:
                 return Search(*given).nearest()
-            return SearchOutside(self._rows(runner, q, t, unit, self._gaps, own), *given).nearest()
+            return UnilateralClosure(self._rows(runner, q, t, unit, self._gaps, own), *given).nearest()
         except np.linalg.LinAlgError:  # a number overflowed: no closure
             return Closure(q, np.inf, 0.0, False, 0), False
 
@@ -395,7 +395,7 @@ class Projection:
 
     def _metric(self, M: Array) -> Array:
         """Return M, with a small inertia added to each coordinate if M is singular."""
-        if conditioning(M) > WELL_CONDITIONED:
+        if conditioning(M) > MIN_RCOND:
             return M
         return M + np.diag(LEAST_INERTIA * (np.diag(M) * self.unit**2).max() / self.unit**2)
 

@@ -185,13 +185,13 @@ class ClosedReference:
         return np.asarray(x)
 
 
-def without_drives(model: Any, q0: Array, said: Any, who: str) -> Scene:
+def without_drives(model: Any, q0: Array, spec: Any, who: str) -> Scene:
     """Return a scene with the constraints, laws and forces of another, without contacts and actuation.
 
     Args:
         model: pinocchio.Model.
         q0: initial configuration, (nq,).
-        said: descriptions of the other scene.
+        spec: descriptions of the other scene.
         who: words for messages.
 
     Raises:
@@ -199,12 +199,12 @@ def without_drives(model: Any, q0: Array, said: Any, who: str) -> Scene:
     """
     scene = Scene(
         model,
-        constraints=said.constraints,
-        laws=said.laws,
-        forces=said.forces,
+        constraints=spec.constraints,
+        laws=spec.laws,
+        forces=spec.forces,
         q0=q0,
-        terms=said.terms,
-        assembly_tolerance=said.assembly_tolerance,
+        terms=spec.terms,
+        assembly_tolerance=spec.assembly_tolerance,
     )
     program = compiled_scene(scene).program
     for c in program.constraints:

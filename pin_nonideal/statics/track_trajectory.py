@@ -105,14 +105,14 @@ class TrackTrajectory(SceneDrive):
             object.__setattr__(self, key, value)
 
     def bound(
-        self, model: Model, q0: Array, said: Any
+        self, model: Model, q0: Array, spec: Any
     ) -> tuple[Callable[[float, Array, Array], Array], Mask]:
         """Return the function (t, q, v) -> tau, and the mask of the degrees of freedom that it drives, (nv,).
 
         Args:
             model: pinocchio.Model of the scene.
             q0: initial configuration of the scene, (nq,).
-            said: the `compilation.lowering.Descriptions` of the scene.
+            spec: the `compilation.lowering.Descriptions` of the scene.
 
         Raises:
             InputError, UnknownNameError: the drive does not fit the model.
@@ -128,7 +128,7 @@ class TrackTrajectory(SceneDrive):
         if self.feedforward != "constrained":
             motion = ReferenceMotion(model, times, q, v)
             return _Tracking(model, motion, given, driven, kp, kd, self.feedforward), driven
-        scene = without_drives(model, q0, said, who)
+        scene = without_drives(model, q0, spec, who)
         names = [place.name for place in joint_places(model) if driven[place.v_first]]
 
         def reference() -> ClosedReference:

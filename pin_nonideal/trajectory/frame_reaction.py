@@ -16,7 +16,7 @@ import pinocchio as pin
 
 from pin_nonideal.compilation.constraints import frames_of
 from pin_nonideal.compilation.contacts import lower_gaps
-from pin_nonideal.compilation.resolver import WORLD, Frame, Resolution
+from pin_nonideal.compilation.resolver import WORLD, Frame, Resolver
 from pin_nonideal.description.constraints import KnifeEdge, Rolling
 from pin_nonideal.description.forces import SpringDamper, Wrench
 from pin_nonideal.description.laws import Drag
@@ -313,18 +313,18 @@ def _shape_beyond(scene: Scene, joint: int, contact: str, index: int) -> bool | 
 def _loads(run: Any) -> Iterator[Load]:
     """Yield the wrenches on all bodies: of constraints and contacts, of applied forces and of drags."""
     scene: Scene = run.scene
-    where = Resolution(scene.model, scene.q0)
+    resolver = Resolver(scene.model, scene.q0)
     for name, c in compiled_scene(scene).described.items():
-        if name in run.reactions and (frames := _frames(c, name, where)):
+        if name in run.reactions and (frames := _frames(c, name, resolver)):
             yield from _pair(run, name, c, *frames)
     for f in scene.forces:
         if isinstance(f, Wrench):
-            yield _pushed(run, f, where.frame(f.frame, "reaction"))
+            yield _pushed(run, f, resolver.frame(f.frame, "reaction"))
         elif isinstance(f, SpringDamper):
-            yield from _sprung(f, *where.pair(f, "reaction"))
+            yield from _sprung(f, *resolver.pair(f, "reaction"))
     for law in scene.laws:
         if isinstance(law, Drag):
-            yield _dragged(law, where.frame(law.frame, "reaction"))
+            yield _dragged(law, resolver.frame(law.frame, "reaction"))
 
 
 class _Frames:
@@ -341,18 +341,18 @@ class _Frames:
         return note
 
 
-def _frames(c: Any, name: str, where: Resolution) -> tuple[Frame, Frame] | None:
+def _frames(c: Any, name: str, resolver: Resolver) -> tuple[Frame, Frame] | None:
     """Return both frames of a constraint or contact in the form of the core, or None without frames."""
     if isinstance(c, KnifeEdge):
-        return where.frame(c.frame, name), WORLD
+        return resolver.frame(c.frame, name), WORLD
     if isinstance(c, Rolling):
-        return where.frame(c.frame, name), where.plane(c.plane, name)
+        return resolver.frame(c.frame, name), resolver.plane(c.plane, name)
     if hasattr(c, "joint1_placement") or (hasattr(c, "frame1") and not hasattr(c, "restitution")):
-        return frames_of(c, where, name)
+        return frames_of(c, resolver, name)
     if not (hasattr(c, "frame") or hasattr(c, "frame1")):
         return None
     noted: Any = _Frames()
-    lower_gaps(c, name, noted, where)
+    lower_gaps(c, name, noted, resolver)
     first, second = noted.found
     return first, second
 

@@ -26,7 +26,7 @@ from .by_name import force_of, frame_record, joint_record, law_record, reaction_
 from .columns import columns, units
 from .dense_output import DenseOutput
 from .groups import RECORD_OF, GroupField
-from .lazy_fields import MadeLater
+from .lazy_fields import LazyFields
 from .records import Event, FrameRecord, JointRecord, LawRecord, Sample, Stats, UserEventRecord
 from .summary import summary
 
@@ -35,7 +35,7 @@ SUMMARY_LINE = re.compile(r"([a-z]+(?: [a-z]+)*(?: \[J\])?)(?:: +| +(?=\d))(.*)"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Trajectory(MadeLater):
+class Trajectory(LazyFields):
     """Samples of a run; fields that were not recorded are None or empty tables.
 
     Attributes:
