@@ -19,6 +19,7 @@ from pin_nonideal.description.actuation import (
     requesting_drives,
 )
 from pin_nonideal.description.scene_drive import SceneDrive
+from pin_nonideal.description.scene_spec import SceneSpec
 from pin_nonideal.errors import InputError
 from pin_nonideal.states.joint_layout import joint_places
 from pin_nonideal.states.parsing import (
@@ -71,7 +72,7 @@ class Called(NamedTuple):
 Part = Constant | Timed | Spring | Called
 
 
-def lower_actuation(u: Any, out: core.Builder, resolver: Resolver, spec: Any) -> None:
+def lower_actuation(u: Any, out: core.Builder, resolver: Resolver, spec: SceneSpec) -> None:
     """Set the actuation of the scene.
 
     Args:
@@ -117,7 +118,7 @@ def _write(part: Part, out: core.Builder) -> None:
 # --- one drive ----------------------------------------------------------------------------------------------
 
 
-def _lowered(u: Any, resolver: Resolver, spec: Any, who: str) -> tuple[Part, Mask]:
+def _lowered(u: Any, resolver: Resolver, spec: SceneSpec, who: str) -> tuple[Part, Mask]:
     """Return the torques of one drive, and the mask of the degrees of freedom that it commands, (nv,)."""
     model, everything = resolver.model, np.ones(resolver.model.nv, dtype=bool)
     if isinstance(u, SampledControl):

@@ -18,14 +18,13 @@ from pin_nonideal.core_loader import core
 from pin_nonideal.description.constraints import Distance, PrescribedMotion, UserConstraint
 from pin_nonideal.description.contacts import UserContact
 from pin_nonideal.description.laws import UserFriction
+from pin_nonideal.description.scene_spec import SceneSpec
 from pin_nonideal.description.time_functions import Constant, Polynomial, Sinusoid, Spline
 from pin_nonideal.errors import InconsistentConstraintsError, InputError, LoopClosureError, UserFunctionError
 from pin_nonideal.states.loop_closure import CLOSURE_TOLERANCE
 from pin_nonideal.states.rows import copies, row_lengths, row_slices, rows_at
 from pin_nonideal.types import Array, Model
 from pin_nonideal.validation import array
-
-from .lowering import Descriptions
 
 Rows = NDArray[np.bool_]
 
@@ -80,7 +79,7 @@ def check_model(model: Model) -> None:
         )
 
 
-def without_functions(spec: Descriptions, nv: int) -> Descriptions | None:
+def without_functions(spec: SceneSpec, nv: int) -> SceneSpec | None:
     """Return a scene with the same rows but without user functions, or None if no description has one.
 
     Args:

@@ -9,6 +9,7 @@ from typing import Any
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.actuation import SampledControl, delayed_control, switching_drives
 from pin_nonideal.description.constraints import UserConstraint
+from pin_nonideal.description.scene_spec import SceneSpec
 from pin_nonideal.errors import InputError, RunError
 from pin_nonideal.states.held import NOTHING_HELD, Held
 from pin_nonideal.states.joint_layout import joint_places
@@ -22,14 +23,14 @@ from .analysis import check_user_functions, has_rates, without_functions, zero_r
 from .constraints import anchor_frames
 from .delay import DelayedTorque
 from .error_context import Circumstances, named_failure
-from .lowering import Descriptions, lower
+from .lowering import lower
 from .resolver import Resolver, unique_names
 
 MOST_QUOTED = 4  # names in a message
 
 
 class CompiledScene:
-    """Descriptions compiled into the core's program.
+    """SceneSpec compiled into the core's program.
 
     Args:
         model: pinocchio.Model.
@@ -60,7 +61,7 @@ class CompiledScene:
         unchecked: whether derivatives of user functions are still unchecked.
     """
 
-    def __init__(self, model: Model, q0: Array, spec: Descriptions, is_start: bool = True) -> None:
+    def __init__(self, model: Model, q0: Array, spec: SceneSpec, is_start: bool = True) -> None:
         self.model, self.q0, self.spec = model, q0, spec
         try:
             builder = core.Builder(model, core.Provider[spec.terms])

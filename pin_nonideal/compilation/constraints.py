@@ -24,9 +24,10 @@ from pin_nonideal.description.constraints import (
     Rolling,
     UserConstraint,
 )
+from pin_nonideal.description.contacts import UserContact
 from pin_nonideal.description.time_functions import Constant
 from pin_nonideal.errors import InputError, UnknownNameError, short_repr
-from pin_nonideal.types import Array
+from pin_nonideal.types import Array, PinocchioConstraint
 from pin_nonideal.validation import axis_triad, unit_axis
 
 from .callbacks import breaks, checked, time_function
@@ -41,7 +42,7 @@ TIME_DIFFERENCE = 1e-6
 
 
 @singledispatch
-def lower_constraint(c: Any, name: str, out: core.Builder, resolver: Resolver) -> None:
+def lower_constraint(c: PinocchioConstraint, name: str, out: core.Builder, resolver: Resolver) -> None:
     """Add one constraint to the program: a description of this package, or a constraint model of Pinocchio.
 
     Args:
@@ -69,7 +70,7 @@ def lower_constraint(c: Any, name: str, out: core.Builder, resolver: Resolver) -
         out.add_frame(name, f1, f2)
 
 
-def frames_of(c: Any, resolver: Resolver, who: str) -> tuple[Frame, Frame]:
+def frames_of(c: PinocchioConstraint, resolver: Resolver, who: str) -> tuple[Frame, Frame]:
     """Return both frames of an anchor, or of a constraint model of Pinocchio.
 
     Args:
@@ -186,7 +187,7 @@ def _(c: UserConstraint, name: str, out: core.Builder, resolver: Resolver) -> No
     out.add_user(name, c.size, rows=rows, residual=residual, rate=rate)
 
 
-def user_rows(c: Any, size: int, who: str, resolver: Resolver) -> Callable[..., Any]:
+def user_rows(c: UserConstraint | UserContact, size: int, who: str, resolver: Resolver) -> Callable[..., Any]:
     """Wrap the user's rows as a function of (t, q, v) that computes Pinocchio's data for them.
 
     Args:
@@ -214,7 +215,11 @@ def user_rows(c: Any, size: int, who: str, resolver: Resolver) -> Callable[..., 
 
 
 def user_rate(
-    c: Any, size: int, who: str, rows: Callable[..., Any], residual: Callable[..., Array] | None
+    c: UserConstraint | UserContact,
+    size: int,
+    who: str,
+    rows: Callable[..., Any],
+    residual: Callable[..., Array] | None,
 ) -> Callable[..., Array] | None:
     """Return the user's rate, or A v plus a time difference of the residual, or None without a residual.
 

@@ -4,12 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any, get_args
+from typing import get_args
 
 import numpy as np
 
 from pin_nonideal.core_loader import core
-from pin_nonideal.description.contacts import BoxContact, Contact, JointLimit, PointContact, UserContact
+from pin_nonideal.description.contacts import (
+    BoxContact,
+    CapsuleContact,
+    Contact,
+    JointLimit,
+    PointContact,
+    SphereContact,
+    UserContact,
+)
 from pin_nonideal.description.contacts.solids import (
     CylinderContact,
     EllipsoidContact,
@@ -24,13 +32,15 @@ from .callbacks import checked
 from .constraints import user_rate, user_rows
 from .resolver import Resolver, turned, words
 
+RoundContact = HullContact | BoxContact | RevolvedContact | SphereContact | CapsuleContact
+
 # Value of Pinocchio for joints without limits [rad or m].
 NO_LIMIT = np.finfo(float).max
 
 
 def lower_contacts(
-    contacts: Sequence[tuple[str, Any]], out: core.Builder, resolver: Resolver
-) -> Iterator[tuple[str, Any]]:
+    contacts: Sequence[tuple[str, Contact]], out: core.Builder, resolver: Resolver
+) -> Iterator[tuple[str, Contact]]:
     """Add the normal rows of all contacts; `lower_contact_friction` adds their friction after all rows.
 
     Bilateral contacts are added before unilateral contacts. Their rows are in the order of the descriptions.
@@ -61,7 +71,7 @@ def lower_contacts(
     out.order_contacts([block for i in range(len(contacts)) for block in blocks[i]])
 
 
-def lower_gaps(c: Any, name: str, out: core.Builder, resolver: Resolver) -> list[int]:
+def lower_gaps(c: Contact, name: str, out: core.Builder, resolver: Resolver) -> list[int]:
     """Add the normal rows of one contact and return the indices of its blocks.
 
     Args:
@@ -101,7 +111,7 @@ def lower_gaps(c: Any, name: str, out: core.Builder, resolver: Resolver) -> list
     return [block]
 
 
-def _round_gap(c: Any, name: str, out: core.Builder, resolver: Resolver) -> int:
+def _round_gap(c: RoundContact, name: str, out: core.Builder, resolver: Resolver) -> int:
     """Add the row of a contact between two solids with rounding radii."""
     who, radius = words(c, name), c.radius1 + c.radius2
     if isinstance(c, HullContact):

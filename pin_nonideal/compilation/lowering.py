@@ -7,8 +7,9 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from pin_nonideal.core_loader import core
-from pin_nonideal.description.constraints import Rolling
-from pin_nonideal.description.contacts import JointLimit
+from pin_nonideal.description.constraints import Constraint, Rolling
+from pin_nonideal.description.contacts import Contact, JointLimit
+from pin_nonideal.description.scene_spec import SceneSpec
 from pin_nonideal.states.rows import row_slices
 
 from .actuation import lower_actuation
@@ -19,31 +20,6 @@ from .forces import lower_force
 from .friction import LoweringContext, lower_contact_friction
 from .laws import lower_law
 from .resolver import Resolver, unique_names
-
-
-class Descriptions(NamedTuple):
-    """Descriptions of a scene, without its model.
-
-    Attributes:
-        constraints: descriptions, or constraint models of Pinocchio.
-        contacts: descriptions.
-        laws: descriptions.
-        forces: descriptions.
-        actuation: None, an array (nv,), a table by joint name, a function, a description, or a tuple of
-            drives.
-        terms: provider of M and the bias forces, "core" or "pinocchio".
-        impact: the law of restitution, "newton" or "poisson".
-        assembly_tolerance: residual that a vanishing row may have [m or rad].
-    """
-
-    constraints: tuple[Any, ...]
-    contacts: tuple[Any, ...]
-    laws: tuple[Any, ...]
-    forces: tuple[Any, ...]
-    actuation: Any
-    terms: str
-    impact: str
-    assembly_tolerance: float
 
 
 class LoweredItem(NamedTuple):
@@ -62,7 +38,7 @@ class LoweredItem(NamedTuple):
     again: Callable[[Any, Any], object]
 
 
-def lower(spec: Descriptions, builder: core.Builder, resolver: Resolver) -> dict[str, Any]:
+def lower(spec: SceneSpec, builder: core.Builder, resolver: Resolver) -> dict[str, Constraint | Contact]:
     """Add one scene to the core's builder.
 
     Args:
@@ -80,7 +56,7 @@ def lower(spec: Descriptions, builder: core.Builder, resolver: Resolver) -> dict
     return {each.name: each.description for each in written if each.kind in ("constraint", "contact")}
 
 
-def lowered(spec: Descriptions, builder: core.Builder, resolver: Resolver) -> Iterator[LoweredItem]:
+def lowered(spec: SceneSpec, builder: core.Builder, resolver: Resolver) -> Iterator[LoweredItem]:
     """Add one scene to the core's builder and yield each description after it is added.
 
     A contact is yielded twice: after its normal rows and after its friction.
@@ -97,8 +73,10 @@ def lowered(spec: Descriptions, builder: core.Builder, resolver: Resolver) -> It
     for c, name in zip(spec.constraints, constraint_names, strict=True):
         lower_constraint(c, name, builder, resolver)
         yield LoweredItem("constraint", name, c, partial(_again, lower_constraint, name, resolver))
-    for name, c in lower_contacts(list(zip(contact_names, spec.contacts, strict=True)), builder, resolver):
-        yield LoweredItem("contact", name, c, partial(_again, lower_gaps, name, resolver))
+    for name, contact in lower_contacts(
+        list(zip(contact_names, spec.contacts, strict=True)), builder, resolver
+    ):
+        yield LoweredItem("contact", name, contact, partial(_again, lower_gaps, name, resolver))
     joints = {name: i for i, name in enumerate(resolver.model.names) if i}
     blocks = {c.name: block for block, c in enumerate(builder.constraints)}
     names = ReactionNames(row_slices(builder), blocks, joints)
@@ -112,9 +90,9 @@ def lowered(spec: Descriptions, builder: core.Builder, resolver: Resolver) -> It
         if isinstance(c, Rolling)
     ]
     contacts = zip(spec.contacts, contact_names, strict=True)
-    for c, name in [*rolling, *(pair for pair in contacts if not isinstance(pair[0], JointLimit))]:
-        lower_contact_friction(c, name, builder, context)
-        yield LoweredItem("contact", name, c, partial(_again, lower_contact_friction, name, context))
+    for rubbing, name in [*rolling, *(pair for pair in contacts if not isinstance(pair[0], JointLimit))]:
+        lower_contact_friction(rubbing, name, builder, context)
+        yield LoweredItem("contact", name, rubbing, partial(_again, lower_contact_friction, name, context))
     for name, f in zip(unique_names(spec.forces, set()), spec.forces, strict=True):
         lower_force(f, builder, resolver)
         yield LoweredItem("force", name, f, lambda f, out: lower_force(f, out, resolver))
@@ -128,5 +106,5 @@ def _again(write: Callable[..., object], name: str, context: Any, description: A
     write(description, name, out, context)
 
 
-def _actuation_again(resolver: Resolver, spec: Descriptions, actuation: Any, out: Any) -> None:
+def _actuation_again(resolver: Resolver, spec: SceneSpec, actuation: Any, out: Any) -> None:
     lower_actuation(actuation, out, resolver, spec)

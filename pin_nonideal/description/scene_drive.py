@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pin_nonideal.types import Array, Model
+
+from .scene_spec import SceneSpec
 
 
 class SceneDrive(ABC):
@@ -25,14 +26,14 @@ class SceneDrive(ABC):
 
     @abstractmethod
     def bound(
-        self, model: Model, q0: Array, spec: Any
+        self, model: Model, q0: Array, spec: SceneSpec
     ) -> tuple[Callable[[float, Array, Array], Array], NDArray[np.bool_]]:
         """Return the function (t, q, v) -> tau, and the mask of the degrees of freedom that it drives, (nv,).
 
         Args:
             model: pinocchio.Model of the scene.
             q0: initial configuration of the scene, (nq,).
-            spec: the `compilation.lowering.Descriptions` of the scene.
+            spec: descriptions of the scene.
 
         Raises:
             InputError, UnknownNameError: the drive does not fit the model.

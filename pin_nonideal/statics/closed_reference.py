@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from pin_nonideal.description.scene_spec import SceneSpec
 from pin_nonideal.errors import InputError
 from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.states.held import Held, settled
@@ -185,7 +186,7 @@ class ClosedReference:
         return np.asarray(x)
 
 
-def without_drives(model: Any, q0: Array, spec: Any, who: str) -> Scene:
+def without_drives(model: Any, q0: Array, spec: SceneSpec, who: str) -> Scene:
     """Return a scene with the constraints, laws and forces of another, without contacts and actuation.
 
     Args:

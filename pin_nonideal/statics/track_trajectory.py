@@ -18,6 +18,7 @@ from pin_nonideal.description.actuation import (
     sample_times,
 )
 from pin_nonideal.description.scene_drive import SceneDrive
+from pin_nonideal.description.scene_spec import SceneSpec
 from pin_nonideal.errors import InputError
 from pin_nonideal.states.joint_layout import joint_places
 from pin_nonideal.states.parsing import joint_named, named_configuration_samples, named_joint_samples
@@ -105,14 +106,14 @@ class TrackTrajectory(SceneDrive):
             object.__setattr__(self, key, value)
 
     def bound(
-        self, model: Model, q0: Array, spec: Any
+        self, model: Model, q0: Array, spec: SceneSpec
     ) -> tuple[Callable[[float, Array, Array], Array], Mask]:
         """Return the function (t, q, v) -> tau, and the mask of the degrees of freedom that it drives, (nv,).
 
         Args:
             model: pinocchio.Model of the scene.
             q0: initial configuration of the scene, (nq,).
-            spec: the `compilation.lowering.Descriptions` of the scene.
+            spec: descriptions of the scene.
 
         Raises:
             InputError, UnknownNameError: the drive does not fit the model.

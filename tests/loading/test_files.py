@@ -16,7 +16,7 @@ import pin_nonideal as pn
 from pin_nonideal.atomic_files import whole_file
 from pin_nonideal.cli.main import main
 from pin_nonideal.errors import InputError, LoadingError, OutputError, UserFunctionError
-from pin_nonideal.scene.scene import FROZEN_FIELDS
+from pin_nonideal.scene.base import FROZEN_FIELDS
 
 from ..support.refusals import refuses
 from ..support.small_robots import folder, joint, link, robot
