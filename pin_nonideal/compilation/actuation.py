@@ -152,7 +152,7 @@ def delayed_torque(u: SampledControl, model: Model, t0: float, by_thread: bool) 
         u: a sampled control with a delay.
         model: pinocchio.Model.
         t0: start time of the runs [s].
-        by_thread: whether runs go on in several threads at once, each run in one thread.
+        by_thread: whether several threads run at once, each with runs of its own.
     """
     function, initial = _sampled_torque(u, model), initial_torque(u, model)
     return DelayedTorque(function, u.delay_in_samples, initial, t0, by_thread)

@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from pin_nonideal.core_loader import core
 from pin_nonideal.errors import InputError, UnknownNameError, nearest, short_repr
-from pin_nonideal.types import Array
+from pin_nonideal.types import Array, Table
 from pin_nonideal.validation import array, label
 
 from .compiled_scene import CompiledScene
@@ -38,7 +38,7 @@ class Call(NamedTuple):
     name: str
     number: int
     positional: tuple[Any, ...]
-    named: dict[str, Any]
+    named: Table
     result: Any
 
 
@@ -235,10 +235,10 @@ class _Relower:
 
     def __init__(self, builder: Any, calls: list[Call]) -> None:
         self._builder, self.calls = builder, calls
-        self._told: list[dict[str, Any]] = []
+        self._told: list[Table] = []
         self._differs = False
 
-    def told(self, written: LoweredItem, other: Any, name: str) -> list[dict[str, Any]]:
+    def told(self, written: LoweredItem, other: Any, name: str) -> list[Table]:
         """Return the keyword arguments of the calls of another description.
 
         Raises:

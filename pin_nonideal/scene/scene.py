@@ -369,11 +369,10 @@ class Scene(SceneBase):
         v0: State | None = None,
         name: str | None = None,
     ) -> Scene:
-        """A new scene with some parts replaced, added or removed; this one stays as it is.
+        """Return a new scene with some parts replaced, added or removed. The present scene does not change.
 
-        Everything else is kept: model, shapes, notes, source and licence, named entries of the initial state.
-        `resume` and `Trajectory.load` cannot make the new scene from the robot's file alone: give them the
-        scene.
+        The new scene has the same model, shapes, notes, source, licence and named entries of the initial
+        state. `resume` and `Trajectory.load` cannot create it from the robot's file; pass the scene to them.
 
         Args:
             constraints: all constraints of the new scene; the present ones when None.
@@ -408,7 +407,7 @@ class Scene(SceneBase):
         return rebuilt(type(self), parts)  # type: ignore[no-any-return]
 
     def put_on_ground(self, plane: str | None = None) -> Scene:
-        """A new scene whose floating robot is moved along a normal until its lowest collision shape touches.
+        """Return a new scene with its floating robot moved along a normal until a collision shape touches.
 
         The initial configuration is taken with loops closed. All floating bodies move by the same distance.
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from types import SimpleNamespace
-from typing import Any, NamedTuple, cast
+from typing import NamedTuple, cast
 
 import numpy as np
 
 from pin_nonideal.core_loader import core
 from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.trajectory.dense_output import DenseOutput, dense_output, inside_steps
-from pin_nonideal.types import Array
+from pin_nonideal.types import Array, Table
 
 from .components import Component
 from .options import RunOptions
@@ -120,7 +120,7 @@ def _samples(
     directions: Array,
     sought: Array,
     moved: Array,
-) -> dict[str, Any]:
+) -> Table:
     """Return the samples as fields of a core outcome; states of a tree alone need no evaluation."""
     program, (nq, nv) = compiled_scene(scene).program, (scene.model.nq, scene.model.nv)
     asked = (

@@ -85,8 +85,8 @@ def simulate(
             the grid.
         callback: function called as callback(t, q, v) before every step. True ends the run, torques (nv,)
             replace the actuation from this time on, and None changes nothing. Methods of the core only.
-        several: behavior if the laws admit several motions. "error" raises a FrictionParadoxError that holds
-            two of them. "continue" selects the motion nearest to the previous motion (at the start, the
+        several: behavior if the laws admit several motions. "error" raises a FrictionParadoxError with two
+            of the motions. "continue" selects the motion nearest to the previous motion (at the start, the
             motion of least friction) and records an event of kind "several". An element at rest that may
             also slip stays at rest in both cases, with such an event.
         strict: whether an impact that gains energy raises an ImpactEnergyError; Newton's law of restitution

@@ -44,7 +44,7 @@ class ClosedReference:
         driven: names of the driven joints.
         dofs: mask of their degrees of freedom, (nv,).
         who: words for messages.
-        by_name: whether the coordinates are given by name, so that all of them must be kept, up to rounding.
+        by_name: whether the coordinates are given by name; projection then holds all of them up to rounding.
 
     Raises:
         InputError: the given coordinates do not determine the motion, or no configuration on the constraints

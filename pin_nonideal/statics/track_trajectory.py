@@ -23,7 +23,7 @@ from pin_nonideal.errors import InputError
 from pin_nonideal.states.joint_layout import joint_places
 from pin_nonideal.states.parsing import joint_named, named_configuration_samples, named_joint_samples
 from pin_nonideal.states.reference_motion import ReferenceMotion
-from pin_nonideal.types import Array, Model
+from pin_nonideal.types import Array, Model, Table
 from pin_nonideal.validation import by_name, choice, label, optional_text, positive, sequence, text
 
 from .closed_reference import ClosedReference, without_drives
@@ -91,7 +91,7 @@ class TrackTrajectory(SceneDrive):
         optional_text("TrackTrajectory: name", self.name)
         who = label(self)
         times = sample_times(who, self.times)
-        given: dict[str, Any] = {"times": times, "q": checked_samples(f"{who}: q", self.q, times.size)}
+        given: Table = {"times": times, "q": checked_samples(f"{who}: q", self.q, times.size)}
         if self.v is not None:
             given["v"] = checked_samples(f"{who}: v", self.v, times.size)
             _require_same_joints(who, given["q"], given["v"])

@@ -269,7 +269,7 @@ def _mimics(root: ElementTree.Element, path: Path) -> list[Constraint]:
 
 
 def _geometry(model: Model, root: ElementTree.Element, path: Path, kind: str, notes: list[str]) -> Any:
-    """Return the geometry of one kind, without unreadable meshes; each of them gives a note."""
+    """Return the geometry of one kind, without unreadable meshes; each such mesh gives a note."""
     geometry_type = pin.GeometryType.VISUAL if kind == "visual" else pin.GeometryType.COLLISION
     try:
         return pin.buildGeomFromUrdfString(
