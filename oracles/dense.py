@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.linalg import qr
 
+from .applied_forces import applied_force
 from .frames import Frame
-from .given import applied_force
 from .rows import rows_of_frames, skew
 
 Array = NDArray[np.float64]

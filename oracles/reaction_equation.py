@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import pinocchio as pin
 
+from .applied_forces import applied_force, mass_matrix
 from .frames import Frames
-from .given import applied_force, mass_matrix
 from .rows import rows
 
 # Points of the scan along each axis, by the number of unknowns: about 10^4 values of g in total.

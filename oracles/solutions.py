@@ -6,8 +6,8 @@ import numpy as np
 
 import pin_nonideal as pn
 
+from .applied_forces import given_force, mass_matrix
 from .differences import MET, rows_at
-from .given import given_force, mass_matrix
 from .rows import rows
 
 # Tolerances of a dense KKT solution of condition 1e4; multipliers have the squared condition.

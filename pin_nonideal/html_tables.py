@@ -27,7 +27,7 @@ def table(title: str, rows: Sequence[Sequence[object]], header: Sequence[str] = 
 
 
 def names(listed: Sequence[str]) -> str:
-    """Return the number of some names and the first of them, for a cell.
+    """Return the number of names and the first names, for a cell.
 
     Args:
         listed: the names.

@@ -17,3 +17,7 @@ JointModel: TypeAlias = Any  # pinocchio.JointModel
 GeometryModel: TypeAlias = Any  # pinocchio.GeometryModel
 GeometryObject: TypeAlias = Any  # pinocchio.GeometryObject
 Placement: TypeAlias = Any  # pinocchio.SE3
+Inertia: TypeAlias = Any  # pinocchio.Inertia
+CollisionGeometry: TypeAlias = Any  # coal.CollisionGeometry
+# pinocchio.RigidConstraintModel, PointAnchorConstraintModel or FrameAnchorConstraintModel
+PinocchioConstraint: TypeAlias = Any

@@ -41,7 +41,7 @@ def plain_value(text: str) -> Any:
     return {"true": True, "false": False}.get(text, text)
 
 
-def named_values(words: Sequence[str], option: str) -> dict[str, Any] | None:
+def named_values(words: Sequence[str], option: str) -> Table | None:
     """Return JOINT=NUMBER[,NUMBER...] and JOINT.PIECE=... as a table by joint name, or None without words.
 
     Args:
@@ -51,7 +51,7 @@ def named_values(words: Sequence[str], option: str) -> dict[str, Any] | None:
     Raises:
         InputError: a word has another form.
     """
-    table: dict[str, Any] = {}
+    table: Table = {}
     for word in words:
         name, separator, text = word.partition("=")
         try:
@@ -165,7 +165,7 @@ def sweep_file(options: argparse.Namespace) -> int:
     make = _Robot(str(beside.resolve()) if beside.exists() else robot, fixed)
     store = path.parent / str(table.get("store", path.stem + ".runs"))
     jobs = options.jobs if options.jobs is not None else table.get("jobs")
-    settings: dict[str, Any] = {
+    settings: Table = {
         key: tuple(x) if isinstance(x, list) else x for key, x in (table.get("options") or {}).items()
     }
     keep = str(table.get("failures", "keep"))

@@ -1,6 +1,6 @@
-"""The command `pin-nonideal`: run robots and examples, resume, replay, sweep, describe, find states of rest.
+"""Command line `pin-nonideal`: run robots and examples, resume, replay, sweep, describe, find equilibria.
 
-Exit codes: 0 done; 2 an error of the package, in one line on standard error; 130 interrupted by Ctrl-C.
+Exit codes: 0 for success, 2 for an error of the package with one line on standard error, 130 for Ctrl-C.
 A run that fails or is interrupted writes its samples to the requested files.
 """
 
@@ -83,7 +83,7 @@ def _discard_output() -> None:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="pin-nonideal",
-        description="Robots with loops, contacts and friction, simulated through their explicit equation.",
+        description="Simulate robots with closed loops, contacts and dry friction.",
     )
     parser.add_argument("--version", action="version", version=f"%(prog)s {pn.__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
@@ -91,9 +91,9 @@ def _parser() -> argparse.ArgumentParser:
     run = commands.add_parser("run", help="simulate a robot and write files")
     _add_robot(run)
     run.add_argument(
-        "--duration", type=float, default=5.0, metavar="S", help="length of time [s] (default: 5)"
+        "--duration", type=float, default=5.0, metavar="S", help="duration of the run [s] (default: 5)"
     )
-    run.add_argument("--method", help="integrator, e.g. dop853 (default), dopri5, rk4, Radau")
+    run.add_argument("--method", help="integration method: dop853 (default), dopri5, rk4, Radau, ...")
     run.add_argument("--rtol", type=float, help="relative tolerance of adaptive methods")
     run.add_argument("--atol", type=float, help="absolute tolerance of adaptive methods")
     run.add_argument("--dt", type=float, metavar="S", help="step of fixed-step methods [s]")
@@ -112,10 +112,10 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--several",
         choices=SEVERAL,
-        help="if friction allows several motions: error (default), or continue with the nearest",
+        help="if friction admits several motions: stop with an error (default), or continue with the nearest",
     )
     run.add_argument(
-        "--checkpoint", type=Path, metavar="FILE", help="file with the state of the run, for `resume`"
+        "--checkpoint", type=Path, metavar="FILE", help="file that stores the state of the run, for `resume`"
     )
     _add_start(run)
     run.add_argument("--v", **_start("velocity"))
@@ -127,29 +127,38 @@ def _parser() -> argparse.ArgumentParser:
     _add_writers(resume)
     resume.set_defaults(command=resume_run)
 
-    replay = commands.add_parser("replay", help="write the page of a saved run")
+    replay = commands.add_parser("replay", help="write the replay page of a saved run")
     replay.add_argument(
         "run", type=Path, metavar="RUN.npz", help="file of `run --save`, or folder of `sweep`"
     )
-    replay.add_argument("page", type=Path, nargs="?", metavar="PAGE.html", help="default: the run's name")
-    replay.add_argument("--run", type=int, dest="number", metavar="K", help="number of the run in a sweep")
+    replay.add_argument(
+        "page", type=Path, nargs="?", metavar="PAGE.html", help="page to write (default: beside the run)"
+    )
+    replay.add_argument("--run", type=int, dest="number", metavar="K", help="index of the run in a sweep")
     replay.add_argument("--robot", metavar="NAME_OR_PATH", help="robot of a run whose file does not name it")
     replay.set_defaults(command=replay_file)
 
     sweep = commands.add_parser(
-        "sweep", help="run a robot with many parameters and store the runs in a folder"
+        "sweep", help="run a robot with many sets of parameters and store the runs in a folder"
     )
-    sweep.add_argument("file", type=Path, metavar="SWEEP.yaml", help="robot, duration, grid or samples, ...")
-    sweep.add_argument("--jobs", type=int, metavar="N", help="parallel jobs; -1 for all processors")
+    sweep.add_argument(
+        "file",
+        type=Path,
+        metavar="SWEEP.yaml",
+        help="file with the robot, the duration, and a grid or samples",
+    )
+    sweep.add_argument(
+        "--jobs", type=int, metavar="N", help="number of parallel processes; -1 for all processors"
+    )
     sweep.set_defaults(command=sweep_file)
 
-    equilibrium = commands.add_parser("equilibrium", help="find a state of rest of a robot")
+    equilibrium = commands.add_parser("equilibrium", help="compute an equilibrium of a robot")
     _add_robot(equilibrium)
     _add_start(equilibrium)
-    equilibrium.add_argument("--json", action="store_true", help="print JSON, for programs")
+    equilibrium.add_argument("--json", action="store_true", help="print JSON")
     equilibrium.set_defaults(command=_equilibrium)
 
-    example = commands.add_parser("example", help="run an example, which draws a figure")
+    example = commands.add_parser("example", help="run an example and write its figure")
     example.add_argument("name", metavar="NAME", help="name of an example from `list`")
     example.set_defaults(command=_example)
 
@@ -157,33 +166,39 @@ def _parser() -> argparse.ArgumentParser:
     listing.add_argument("--all", action="store_true", help="also print the robots of example-robot-data")
     listing.set_defaults(command=_list)
 
-    info = commands.add_parser(
-        "info", help="print joints, loops, rows, rank, mobility and skipped operations"
-    )
+    info = commands.add_parser("info", help="print joints, constraints, rows, rank and mobility of a robot")
     _add_robot(info)
-    info.add_argument("--json", action="store_true", help="print all tables as JSON, for programs")
+    info.add_argument("--json", action="store_true", help="print all tables as JSON")
     info.set_defaults(command=_info)
 
-    picture = commands.add_parser("render", help="picture or video of a run: .png, .gif, .webm, .mp4")
-    picture.add_argument("run", metavar="RUN", help="file that `run --save` wrote (.npz)")
+    picture = commands.add_parser(
+        "render", help="render a picture or a video of a run (.png, .gif, .webm, .mp4)"
+    )
+    picture.add_argument("run", metavar="RUN", help="file of `run --save` (.npz)")
     picture.add_argument("out", type=Path, metavar="OUT", help="file to write")
     picture.add_argument(
         "--robot", metavar="NAME_OR_PATH", help="robot of the run (default: the name in the file)"
     )
-    picture.add_argument("--width", type=int, default=960, help="of the picture [pixels] (default: 960)")
-    picture.add_argument("--height", type=int, default=540, help="of the picture [pixels] (default: 540)")
-    picture.add_argument("--seconds", type=float, default=6.0, help="length of a video [s] (default: 6)")
-    picture.add_argument("--fps", type=float, default=25.0, help="pictures a second (default: 25)")
+    picture.add_argument(
+        "--width", type=int, default=960, help="width of the picture [pixels] (default: 960)"
+    )
+    picture.add_argument(
+        "--height", type=int, default=540, help="height of the picture [pixels] (default: 540)"
+    )
+    picture.add_argument("--seconds", type=float, default=6.0, help="duration of the video [s] (default: 6)")
+    picture.add_argument(
+        "--fps", type=float, default=25.0, help="frames per second of the video (default: 25)"
+    )
     picture.add_argument("--time", type=float, metavar="S", help="time of a still picture [s]")
-    picture.add_argument("--set", action="append", default=[], dest="settings", metavar="KEY=VALUE")
+    _add_setting(picture)
     picture.set_defaults(command=_render)
 
-    complete = commands.add_parser("completion", help="print a script that completes words in a shell")
+    complete = commands.add_parser("completion", help="print a completion script for a shell")
     complete.add_argument("shell", choices=("bash", "zsh", "fish"))
     complete.set_defaults(command=_complete)
 
     bench = commands.add_parser(
-        "bench", help="run the benchmarks of a checkout, with their own arguments", add_help=False
+        "bench", help="run the benchmarks of a checkout; see `bench --help`", add_help=False
     )
     bench.set_defaults(command=_bench)
     return parser
@@ -193,6 +208,10 @@ def _add_robot(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "robot", metavar="NAME_OR_PATH", help="name from `list`, robot folder, .urdf or .xml (MJCF)"
     )
+    _add_setting(parser)
+
+
+def _add_setting(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--set",
         action="append",
@@ -209,7 +228,7 @@ def _start(what: str) -> Table:
         "action": "append",
         "default": [],
         "metavar": "JOINT=NUMBER",
-        "help": f"{what} of a joint at the start, e.g. elbow=0.5 or base.xyz=0,0,1; may be repeated",
+        "help": f"initial {what} of a joint, e.g. elbow=0.5 or base.xyz=0,0,1; may be repeated",
     }
 
 
@@ -218,11 +237,11 @@ def _add_start(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_writers(parser: argparse.ArgumentParser) -> None:
-    page = "write the replay, one page that needs no network"
+    page = "write the replay as one HTML file"
     parser.add_argument("--html", type=Path, metavar="FILE", help=page)
     parser.add_argument("--plot", type=Path, metavar="FILE", help="write a figure (.png, .pdf, .svg)")
     parser.add_argument("--save", type=Path, metavar="FILE", help="write the arrays (.npz)")
-    parser.add_argument("--events", action="store_true", help="print the events, a line each")
+    parser.add_argument("--events", action="store_true", help="print the events, one per line")
     parser.add_argument("--quiet", action="store_true", help="print only requested output")
 
 

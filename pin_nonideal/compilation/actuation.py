@@ -19,6 +19,7 @@ from pin_nonideal.description.actuation import (
     requesting_drives,
 )
 from pin_nonideal.description.scene_drive import SceneDrive
+from pin_nonideal.description.scene_spec import SceneSpec
 from pin_nonideal.errors import InputError
 from pin_nonideal.states.joint_layout import joint_places
 from pin_nonideal.states.parsing import (
@@ -32,7 +33,7 @@ from pin_nonideal.validation import by_name, label
 
 from .callbacks import checked
 from .delay import DelayedTorque
-from .resolver import Resolution, words
+from .resolver import Resolver, words
 
 Mask = NDArray[np.bool_]
 
@@ -75,25 +76,25 @@ class Called(NamedTuple):
 Part = Constant | Timed | Spring | Called
 
 
-def lower_actuation(u: Any, out: core.Builder, where: Resolution, said: Any) -> None:
+def lower_actuation(u: Any, out: core.Builder, resolver: Resolver, spec: SceneSpec) -> None:
     """Set the actuation of the scene.
 
     Args:
         u: None, an array (nv,), a table by joint name, a function, a description, or a list of drives.
         out: the program under construction.
-        where: frames and joints by name.
-        said: descriptions of the scene.
+        resolver: frames and joints by name.
+        spec: descriptions of the scene.
 
     Raises:
         InputError: shapes do not fit the model, two drives command the same joint, or drives cannot be added.
         UnknownNameError: a joint does not exist.
     """
-    model, drives = where.model, requesting_drives(u)
+    model, drives = resolver.model, requesting_drives(u)
     if not drives:
         return
     listed = len(drives) > 1
     lowered = [
-        _lowered(drive, where, said, f"actuation[{k}]" if listed else "actuation")
+        _lowered(drive, resolver, spec, f"actuation[{k}]" if listed else "actuation")
         for k, drive in enumerate(drives)
     ]
     if listed:
@@ -122,19 +123,19 @@ def _write(part: Part, out: core.Builder) -> None:
 # --- one drive ----------------------------------------------------------------------------------------------
 
 
-def _lowered(u: Any, where: Resolution, said: Any, who: str) -> tuple[Part, Mask]:
+def _lowered(u: Any, resolver: Resolver, spec: SceneSpec, who: str) -> tuple[Part, Mask]:
     """Return the torques of one drive, and the mask of the degrees of freedom that it commands, (nv,)."""
-    model, everything = where.model, np.ones(where.model.nv, dtype=bool)
+    model, everything = resolver.model, np.ones(resolver.model.nv, dtype=bool)
     if isinstance(u, SampledControl):
         if u.delay_in_samples:  # runs have their own delayed torques, see `delayed_torque`
             initial = initial_torque(u, model)
             return Called(lambda t, q, v: initial, u.period), everything
         return Called(_sampled_torque(u, model), u.period), everything
     if isinstance(u, SceneDrive):
-        function, acts, breaks = u.bound(model, where.q0, said)
+        function, acts, breaks = u.bound(model, resolver.q0, spec)
         return Called(_Identified(checked(function, words(u), (model.nv,)), u), u.period, breaks), acts
     if isinstance(u, HoldPosition):
-        q = where.q0 if u.q is None else named_configuration(model, u.q, where.q0, f"{words(u)}: q")
+        q = resolver.q0 if u.q is None else named_configuration(model, u.q, resolver.q0, f"{words(u)}: q")
         kp, kd = (gains_of(model, getattr(u, key), f"{words(u)}: {key}") for key in ("kp", "kd"))
         _require_vectors(model, kp, f"{words(u)}: kp")
         acts = commanded(model, u.kp) | commanded(model, u.kd)
@@ -156,7 +157,7 @@ def delayed_torque(u: SampledControl, model: Model, t0: float, by_thread: bool) 
         u: a sampled control with a delay.
         model: pinocchio.Model.
         t0: start time of the runs [s].
-        by_thread: whether runs go on in several threads at once, each run in one thread.
+        by_thread: whether several threads run at once, each with runs of its own.
     """
     function, initial = _sampled_torque(u, model), initial_torque(u, model)
     return DelayedTorque(function, u.delay_in_samples, initial, t0, by_thread)

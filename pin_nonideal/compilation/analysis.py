@@ -18,14 +18,13 @@ from pin_nonideal.core_loader import core
 from pin_nonideal.description.constraints import Distance, PrescribedMotion, UserConstraint
 from pin_nonideal.description.contacts import UserContact
 from pin_nonideal.description.laws import UserFriction
+from pin_nonideal.description.scene_spec import SceneSpec
 from pin_nonideal.description.time_functions import Constant, Polynomial, Sinusoid, Spline
 from pin_nonideal.errors import InconsistentConstraintsError, InputError, LoopClosureError, UserFunctionError
 from pin_nonideal.states.loop_closure import CLOSURE_TOLERANCE
 from pin_nonideal.states.rows import copies, row_lengths, row_slices, rows_at
 from pin_nonideal.types import Array, Model
 from pin_nonideal.validation import array
-
-from .lowering import Descriptions
 
 Rows = NDArray[np.bool_]
 
@@ -80,22 +79,22 @@ def check_model(model: Model) -> None:
         )
 
 
-def without_functions(said: Descriptions, nv: int) -> Descriptions | None:
+def without_functions(spec: SceneSpec, nv: int) -> SceneSpec | None:
     """Return a scene with the same rows but without user functions, or None if no description has one.
 
     Args:
-        said: descriptions of the scene.
+        spec: descriptions of the scene.
         nv: number of degrees of freedom.
     """
-    constraints = tuple(_without_function(c, nv) for c in said.constraints)
-    contacts = tuple(_without_function(c, nv) for c in said.contacts)
-    laws = tuple(_without_function(law, nv) for law in said.laws)
+    constraints = tuple(_without_function(c, nv) for c in spec.constraints)
+    contacts = tuple(_without_function(c, nv) for c in spec.contacts)
+    laws = tuple(_without_function(law, nv) for law in spec.laws)
     pairs = zip(
-        (*constraints, *contacts, *laws), (*said.constraints, *said.contacts, *said.laws), strict=True
+        (*constraints, *contacts, *laws), (*spec.constraints, *spec.contacts, *spec.laws), strict=True
     )
     if all(one is other for one, other in pairs):
         return None
-    return said._replace(constraints=constraints, contacts=contacts, laws=laws)
+    return spec._replace(constraints=constraints, contacts=contacts, laws=laws)
 
 
 def _without_function(c: Any, nv: int) -> Any:
@@ -126,7 +125,7 @@ def _without_function(c: Any, nv: int) -> Any:
     return c
 
 
-def idle_rows(
+def zero_rows(
     model: Model,
     q0: Array,
     program: core.Program,

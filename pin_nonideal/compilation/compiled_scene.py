@@ -9,6 +9,7 @@ from typing import Any
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.actuation import SampledControl, delayed_control, switching_drives
 from pin_nonideal.description.constraints import UserConstraint
+from pin_nonideal.description.scene_spec import SceneSpec
 from pin_nonideal.errors import InputError, RunError
 from pin_nonideal.states.held import NOTHING_HELD, Held
 from pin_nonideal.states.joint_layout import joint_places
@@ -18,23 +19,23 @@ from pin_nonideal.states.rows import block_names, row_slices
 from pin_nonideal.types import Array, Model
 
 from .actuation import delayed_torque
-from .analysis import check_user_functions, has_rates, idle_rows, without_functions
+from .analysis import check_user_functions, has_rates, without_functions, zero_rows
 from .constraints import anchor_frames
 from .delay import DelayedTorque
 from .error_context import Circumstances, named_failure
-from .lowering import Descriptions, lower
-from .resolver import Resolution, unique_names
+from .lowering import lower
+from .resolver import Resolver, unique_names
 
 MOST_QUOTED = 4  # names in a message
 
 
 class CompiledScene:
-    """Descriptions compiled into the core's program.
+    """SceneSpec compiled into the core's program.
 
     Args:
         model: pinocchio.Model.
         q0: configuration at which `frame2=None` and lengths left out are read, (nq,).
-        said: descriptions of the scene.
+        spec: descriptions of the scene.
         is_start: whether q0 was given as a start, so that user functions may be called there.
 
     Raises:
@@ -44,7 +45,7 @@ class CompiledScene:
     Attributes:
         model: pinocchio.Model.
         q0: see above.
-        said: see above.
+        spec: see above.
         program: the core's program, without the rows that can never act.
         slices: rows of `lam` of each constraint and contact, by name.
         rows: (first row, end, whether it is a contact) of each constraint and contact, by name.
@@ -60,17 +61,17 @@ class CompiledScene:
         unchecked: whether derivatives of user functions are still unchecked.
     """
 
-    def __init__(self, model: Model, q0: Array, said: Descriptions, is_start: bool = True) -> None:
-        self.model, self.q0, self.said = model, q0, said
+    def __init__(self, model: Model, q0: Array, spec: SceneSpec, is_start: bool = True) -> None:
+        self.model, self.q0, self.spec = model, q0, spec
         try:
-            builder = core.Builder(model, core.Provider[said.terms])
+            builder = core.Builder(model, core.Provider[spec.terms])
         except ValueError as error:
             raise InputError(str(error)) from None
-        where = Resolution(model, q0)
-        described = lower(said, builder, where)
+        resolver = Resolver(model, q0)
+        described = lower(spec, builder, resolver)
         self.program = builder.finish()
         self.slices = row_slices(self.program)
-        constraints = len(said.constraints)  # contacts follow
+        constraints = len(spec.constraints)  # contacts follow
         self.rows = {
             name: (s.start, s.stop, k >= constraints) for k, (name, s) in enumerate(self.slices.items())
         }
@@ -81,20 +82,20 @@ class CompiledScene:
         self.block_names = block_names(self.program)
         self.contact_names = [self.block_names[block] for block in self.program.contacts]
         self.opening_names = self.block_names[self.program.first_gap :]
-        named = list(zip(self.slices, said.constraints, strict=False))  # contacts follow
-        self.anchors = anchor_frames(named, where)
+        named = list(zip(self.slices, spec.constraints, strict=False))  # contacts follow
+        self.anchors = anchor_frames(named, resolver)
         self.unprojected = [
             name
             for name, c in named
             if isinstance(c, UserConstraint) and c.residual is None and c.rate is None
         ]
         self.unchecked = any(has_rates(c) for c in described.values())
-        plain, sampled = without_functions(said, model.nv), self.program
+        plain, sampled = without_functions(spec, model.nv), self.program
         if plain is not None:
-            stand_in = core.Builder(model, core.Provider[said.terms])
-            lower(plain, stand_in, where)
+            stand_in = core.Builder(model, core.Provider[spec.terms])
+            lower(plain, stand_in, resolver)
             sampled = stand_in.finish()
-        self.dropped, copies = idle_rows(model, q0, self.program, sampled, said.assembly_tolerance)
+        self.dropped, copies = zero_rows(model, q0, self.program, sampled, spec.assembly_tolerance)
         if self.dropped:
             idle = {(name, row) for name, row, _ in self.dropped}
             for block, c in enumerate(self.program.constraints):
@@ -105,7 +106,7 @@ class CompiledScene:
             self.program = builder.finish()
         idle_names = {name for name, _, _ in self.dropped}
         self.projection = Projection(model, self.program, q0, idle_names, is_start or plain is None)
-        control = delayed_control(said.actuation)
+        control = delayed_control(spec.actuation)
         self._delayed: tuple[SampledControl, core.Builder] | None = None
         if control is not None:
             self._delayed, self._building = (control, builder), threading.Lock()
@@ -163,19 +164,19 @@ class CompiledScene:
         """Message on a part of the scene that no implicit method supports, or empty."""
         if self.opening_names:
             return f'no implicit method here opens and closes contacts such as "{self.opening_names[0]}" yet'
-        if switching := switching_drives(self.said.actuation):
+        if switching := switching_drives(self.spec.actuation):
             return f"no implicit method here holds the torques of a {type(switching[0]).__name__} yet"
         return ""
 
     def _circumstances(self) -> Circumstances:
         """Return the parts of the scene that errors of its runs name."""
-        said = self.said
-        sources = ("the actuation", _quoted("force", said.forces), _quoted("law", said.laws))
+        spec = self.spec
+        sources = ("the actuation", _quoted("force", spec.forces), _quoted("law", spec.laws))
         taken: set[str] = set()
-        unique_names(said.constraints, taken)
-        names = unique_names(said.contacts, taken)
+        unique_names(spec.constraints, taken)
+        names = unique_names(spec.contacts, taken)
         pairs = {
-            name: _frames_of(c) for name, c in zip(names, said.contacts, strict=True) if any(_frames_of(c))
+            name: _frames_of(c) for name, c in zip(names, spec.contacts, strict=True) if any(_frames_of(c))
         }
         return Circumstances(self.explicit_only, sources, pairs)
 

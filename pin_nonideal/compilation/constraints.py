@@ -24,13 +24,14 @@ from pin_nonideal.description.constraints import (
     Rolling,
     UserConstraint,
 )
+from pin_nonideal.description.contacts import UserContact
 from pin_nonideal.description.time_functions import Constant
 from pin_nonideal.errors import InputError, UnknownNameError, short_repr
-from pin_nonideal.types import Array
+from pin_nonideal.types import Array, PinocchioConstraint
 from pin_nonideal.validation import axis_triad, unit_axis
 
 from .callbacks import breaks, checked, time_function
-from .resolver import Frame, Resolution, placed_on, words
+from .resolver import Frame, Resolver, placed_on, words
 
 # Largest denominator of a rational gear ratio for which the coupled angle of endless joints is constrained.
 LARGEST_GEAR = 64
@@ -41,14 +42,14 @@ TIME_DIFFERENCE = 1e-6
 
 
 @singledispatch
-def lower_constraint(c: Any, name: str, out: core.Builder, where: Resolution) -> None:
+def lower_constraint(c: PinocchioConstraint, name: str, out: core.Builder, resolver: Resolver) -> None:
     """Add one constraint to the program: a description of this package, or a constraint model of Pinocchio.
 
     Args:
         c: the description.
         name: its unique name.
         out: the program under construction.
-        where: frames and joints by name.
+        resolver: frames and joints by name.
 
     Raises:
         InputError, UnknownNameError: a frame or joint does not exist or does not fit.
@@ -60,7 +61,7 @@ def lower_constraint(c: Any, name: str, out: core.Builder, where: Resolution) ->
             f"a constraint must be one of this package's or of Pinocchio's {', '.join(known)}; "
             f"got {short_repr(c)}"
         )
-    f1, f2 = frames_of(c, where, kind)
+    f1, f2 = frames_of(c, resolver, kind)
     if kind == "PointAnchorConstraintModel" or (
         kind == "RigidConstraintModel" and c.type == pin.ContactType.CONTACT_3D
     ):
@@ -69,48 +70,48 @@ def lower_constraint(c: Any, name: str, out: core.Builder, where: Resolution) ->
         out.add_frame(name, f1, f2)
 
 
-def frames_of(c: Any, where: Resolution, who: str) -> tuple[Frame, Frame]:
+def frames_of(c: PinocchioConstraint, resolver: Resolver, who: str) -> tuple[Frame, Frame]:
     """Return both frames of an anchor, or of a constraint model of Pinocchio.
 
     Args:
         c: the description.
-        where: frames and joints by name.
+        resolver: frames and joints by name.
         who: words for messages.
     """
     if hasattr(c, "joint1_placement"):
         return placed_on(c.joint1_id, c.joint1_placement), placed_on(c.joint2_id, c.joint2_placement)
-    return where.pair(c, who)
+    return resolver.pair(c, who)
 
 
 @lower_constraint.register
-def _(c: PointAnchor, name: str, out: core.Builder, where: Resolution) -> None:
-    f1, f2 = where.pair(c, words(c, name))
+def _(c: PointAnchor, name: str, out: core.Builder, resolver: Resolver) -> None:
+    f1, f2 = resolver.pair(c, words(c, name))
     axes = ["xyz".index(a) for a in c.axes]
     out.add_point(name, f1, f2, axes=axes)
 
 
 @lower_constraint.register
-def _(c: FrameAnchor, name: str, out: core.Builder, where: Resolution) -> None:
-    f1, f2 = where.pair(c, words(c, name))
+def _(c: FrameAnchor, name: str, out: core.Builder, resolver: Resolver) -> None:
+    f1, f2 = resolver.pair(c, words(c, name))
     out.add_frame(name, f1, f2)
 
 
 @lower_constraint.register
-def _(c: HingeAnchor, name: str, out: core.Builder, where: Resolution) -> None:
+def _(c: HingeAnchor, name: str, out: core.Builder, resolver: Resolver) -> None:
     who = words(c, name)
-    f1, f2 = where.pair(c, who)
-    t1, t2, u = axis_triad(where.hinge_axis(c, who))
+    f1, f2 = resolver.pair(c, who)
+    t1, t2, u = axis_triad(resolver.hinge_axis(c, who))
     normal1 = [-x for x in t2]
     out.add_hinge(name, f1, f2, axis=u, normal1=normal1, normal2=t1)
 
 
 @lower_constraint.register
-def _(c: Distance, name: str, out: core.Builder, where: Resolution) -> None:
+def _(c: Distance, name: str, out: core.Builder, resolver: Resolver) -> None:
     who = words(c, name)
-    f1, f2 = where.pair(c, who)
+    f1, f2 = resolver.pair(c, who)
     length = c.length
     if length is None:
-        gap = float(np.linalg.norm(where.in_world(f1).translation - where.in_world(f2).translation))
+        gap = float(np.linalg.norm(resolver.in_world(f1).translation - resolver.in_world(f2).translation))
         if gap == 0.0:
             raise InputError(f"{who}: the frames start at the same place; a distance must be positive")
         length = Constant(gap)
@@ -121,10 +122,10 @@ def _(c: Distance, name: str, out: core.Builder, where: Resolution) -> None:
 
 
 @lower_constraint.register
-def _(c: JointCoupling, name: str, out: core.Builder, where: Resolution) -> None:
+def _(c: JointCoupling, name: str, out: core.Builder, resolver: Resolver) -> None:
     who = words(c, name)
-    j1, j2 = where.joint(c.joint1, who), where.joint(c.joint2, who)
-    endless = [where.model.joints[j].nq == 2 for j in (j1, j2)]
+    j1, j2 = resolver.joint(c.joint1, who), resolver.joint(c.joint2, who)
+    endless = [resolver.model.joints[j].nq == 2 for j in (j1, j2)]
     period, position = 0.0, True
     turn = 2.0 * math.pi
     if endless[0] and endless[1]:
@@ -141,26 +142,26 @@ def _(c: JointCoupling, name: str, out: core.Builder, where: Resolution) -> None
 
 
 @lower_constraint.register
-def _(c: PrescribedMotion, name: str, out: core.Builder, where: Resolution) -> None:
+def _(c: PrescribedMotion, name: str, out: core.Builder, resolver: Resolver) -> None:
     who = words(c, name)
-    joint = where.joint(c.joint, who)
-    period = 2.0 * math.pi if where.model.joints[joint].nq == 2 else 0.0
+    joint = resolver.joint(c.joint, who)
+    period = 2.0 * math.pi if resolver.model.joints[joint].nq == 2 else 0.0
     out.add_breaks(breaks(c.function, who))
     out.add_motion(name, joint, function=time_function(c.function, who), period=period)
 
 
 @lower_constraint.register
-def _(c: KnifeEdge, name: str, out: core.Builder, where: Resolution) -> None:
+def _(c: KnifeEdge, name: str, out: core.Builder, resolver: Resolver) -> None:
     who = words(c, name)
-    frame = where.frame(c.frame, who)
+    frame = resolver.frame(c.frame, who)
     out.add_knife(name, frame, axis=unit_axis(who, c.axis))
 
 
 @lower_constraint.register
-def _(c: Rolling, name: str, out: core.Builder, where: Resolution) -> None:
+def _(c: Rolling, name: str, out: core.Builder, resolver: Resolver) -> None:
     who = words(c, name)
-    plane = where.plane(c.plane, who)
-    frame = where.frame(c.frame, who)
+    plane = resolver.plane(c.plane, who)
+    frame = resolver.frame(c.frame, who)
     t1, t2, n = axis_triad(unit_axis(who, c.normal))
     sphere = c.axis is None
     axle = (0.0, 0.0, 1.0) if c.axis is None else unit_axis(who, c.axis)
@@ -178,24 +179,24 @@ def _(c: Rolling, name: str, out: core.Builder, where: Resolution) -> None:
 
 
 @lower_constraint.register
-def _(c: UserConstraint, name: str, out: core.Builder, where: Resolution) -> None:
+def _(c: UserConstraint, name: str, out: core.Builder, resolver: Resolver) -> None:
     who = words(c, name)
-    rows = user_rows(c, c.size, who, where)
+    rows = user_rows(c, c.size, who, resolver)
     residual = None if c.residual is None else checked(c.residual, f"{who}: residual", (c.size,))
     rate = user_rate(c, c.size, who, rows, residual)
     out.add_user(name, c.size, rows=rows, residual=residual, rate=rate)
 
 
-def user_rows(c: Any, size: int, who: str, where: Resolution) -> Callable[..., Any]:
+def user_rows(c: UserConstraint | UserContact, size: int, who: str, resolver: Resolver) -> Callable[..., Any]:
     """Wrap the user's rows as a function of (t, q, v) that computes Pinocchio's data for them.
 
     Args:
         c: the description.
         size: number of rows.
         who: words for messages.
-        where: resolver of the model.
+        resolver: resolver of the model.
     """
-    model = where.model
+    model = resolver.model
     function = checked(c.function, f"{who}: function", (size, model.nv), (size,))
     if getattr(c.function, "needs_data", True) is False:  # functions of this package that need q and v only
         return lambda t, q, v: function(t, q, v, None)
@@ -214,7 +215,11 @@ def user_rows(c: Any, size: int, who: str, where: Resolution) -> Callable[..., A
 
 
 def user_rate(
-    c: Any, size: int, who: str, rows: Callable[..., Any], residual: Callable[..., Array] | None
+    c: UserConstraint | UserContact,
+    size: int,
+    who: str,
+    rows: Callable[..., Any],
+    residual: Callable[..., Array] | None,
 ) -> Callable[..., Array] | None:
     """Return the user's rate, or A v plus a time difference of the residual, or None without a residual.
 
@@ -240,18 +245,18 @@ def user_rate(
 
 
 def anchor_frames(
-    constraints: Sequence[tuple[str, object]], where: Resolution
+    constraints: Sequence[tuple[str, object]], resolver: Resolver
 ) -> list[tuple[str, int, int | None]]:
     """Return (name, frame id, frame id or None for the world) of constraints between two indexed frames.
 
     Args:
         constraints: names and descriptions.
-        where: frames and joints by name.
+        resolver: frames and joints by name.
     """
     found: list[tuple[str, int, int | None]] = []
     for name, c in constraints:
         if isinstance(c, (PointAnchor, FrameAnchor, HingeAnchor, Distance)):
             with suppress(UnknownNameError):  # a joint without a frame
-                second = None if c.frame2 is None else where.frame_id(c.frame2, "")
-                found.append((name, where.frame_id(c.frame1, ""), second))
+                second = None if c.frame2 is None else resolver.frame_id(c.frame2, "")
+                found.append((name, resolver.frame_id(c.frame1, ""), second))
     return found

@@ -4,12 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any, get_args
+from typing import get_args
 
 import numpy as np
 
 from pin_nonideal.core_loader import core
-from pin_nonideal.description.contacts import BoxContact, Contact, JointLimit, PointContact, UserContact
+from pin_nonideal.description.contacts import (
+    BoxContact,
+    CapsuleContact,
+    Contact,
+    JointLimit,
+    PointContact,
+    SphereContact,
+    UserContact,
+)
 from pin_nonideal.description.contacts.solids import (
     CylinderContact,
     EllipsoidContact,
@@ -22,15 +30,17 @@ from pin_nonideal.types import Model
 
 from .callbacks import checked
 from .constraints import user_rate, user_rows
-from .resolver import Resolution, turned, words
+from .resolver import Resolver, turned, words
+
+RoundContact = HullContact | BoxContact | RevolvedContact | SphereContact | CapsuleContact
 
 # Value of Pinocchio for joints without limits [rad or m].
 NO_LIMIT = np.finfo(float).max
 
 
 def lower_contacts(
-    contacts: Sequence[tuple[str, Any]], out: core.Builder, where: Resolution
-) -> Iterator[tuple[str, Any]]:
+    contacts: Sequence[tuple[str, Contact]], out: core.Builder, resolver: Resolver
+) -> Iterator[tuple[str, Contact]]:
     """Add the normal rows of all contacts; `lower_contact_friction` adds their friction after all rows.
 
     Bilateral contacts are added before unilateral contacts. Their rows are in the order of the descriptions.
@@ -38,7 +48,7 @@ def lower_contacts(
     Args:
         contacts: unique names and descriptions.
         out: the program under construction.
-        where: frames and joints by name.
+        resolver: frames and joints by name.
 
     Yields:
         Name and description of each added contact.
@@ -51,101 +61,101 @@ def lower_contacts(
             known = ", ".join(kind.__name__ for kind in get_args(Contact))
             raise InputError(f"a contact must be one of {known}; got {short_repr(c)}")
         if isinstance(c, JointLimit):
-            _check_limit(c, words(c, name), where)
+            _check_limit(c, words(c, name), resolver)
     blocks: dict[int, list[int]] = {}
     for opens in (False, True):
         for i, (name, c) in enumerate(contacts):
             if getattr(c, "unilateral", True) is opens:
-                blocks[i] = lower_gaps(c, name, out, where)
+                blocks[i] = lower_gaps(c, name, out, resolver)
                 yield name, c
     out.order_contacts([block for i in range(len(contacts)) for block in blocks[i]])
 
 
-def lower_gaps(c: Any, name: str, out: core.Builder, where: Resolution) -> list[int]:
+def lower_gaps(c: Contact, name: str, out: core.Builder, resolver: Resolver) -> list[int]:
     """Add the normal rows of one contact and return the indices of its blocks.
 
     Args:
         c: the description.
         name: its unique name.
         out: the program under construction.
-        where: frames and joints by name.
+        resolver: frames and joints by name.
     """
     if isinstance(c, JointLimit):
-        return _stops(c, name, out, where)
+        return _stops(c, name, out, resolver)
     if isinstance(c, PointContact):
-        return [_on_plane(c, name, out, where)]
+        return [_on_plane(c, name, out, resolver)]
     if isinstance(c, UserContact):
         who = words(c, name)
-        rows, gap = user_rows(c, 1, who, where), checked(c.gap, f"{who}: gap", (1,))
+        rows, gap = user_rows(c, 1, who, resolver), checked(c.gap, f"{who}: gap", (1,))
         block = out.add_user_gap(name, rows=rows, gap=gap, rate=user_rate(c, 1, who, rows, gap))
         out.let_open(restitution=c.restitution)
         return [block]
     who = words(c, name)
     if isinstance(c, EllipsoidContact):
-        f1, f2, (_, _, normal) = where.contact(c, who)
+        f1, f2, (_, _, normal) = resolver.contact(c, who)
         axes = turned(f1, c.rpy)
         block = out.add_ellipsoid(name, axes, f2, normal=normal, semiaxes=c.semiaxes)
     elif isinstance(c, CylinderContact):
-        f1, f2, solid, half1 = where.cylinder(c, who)
+        f1, f2, solid, half1 = resolver.cylinder(c, who)
         if half1 == 0.0:
             block = out.add_revolved(name, f1, f2, solid=solid, radius=c.radius1 + c.radius2)
         else:
             radius = c.radius1 + c.radius2
             block = out.add_line(name, f1, f2, solid=solid, half1=half1, radius=radius)
     elif isinstance(c, RimContact):
-        f1, f2, hull = where.rim(c, who)
+        f1, f2, hull = resolver.rim(c, who)
         block = out.add_rim(name, f1, f2, solid=hull, rim=c.rim, radius=c.radius2)
     else:
-        block = _round_gap(c, name, out, where)
+        block = _round_gap(c, name, out, resolver)
     out.let_open(restitution=c.restitution)
     return [block]
 
 
-def _round_gap(c: Any, name: str, out: core.Builder, where: Resolution) -> int:
+def _round_gap(c: RoundContact, name: str, out: core.Builder, resolver: Resolver) -> int:
     """Add the row of a contact between two solids with rounding radii."""
     who, radius = words(c, name), c.radius1 + c.radius2
     if isinstance(c, HullContact):
-        f1, f2, hull = where.hull(c, who)
+        f1, f2, hull = resolver.hull(c, who)
         return out.add_hull(name, f1, f2, solid=hull, radius=radius)
     if isinstance(c, BoxContact):
-        f1, f2, half = where.box(c, who)
+        f1, f2, half = resolver.box(c, who)
         return out.add_box(name, f1, f2, half=half, radius=radius)
     if isinstance(c, RevolvedContact):
-        f1, f2, one, other = where.rims(c, who)
+        f1, f2, one, other = resolver.rims(c, who)
         return out.add_rims(name, f1, f2, first=one, second=other, radius=radius)
-    f1, f2, half1, half2 = where.capsules(c, who)
+    f1, f2, half1, half2 = resolver.capsules(c, who)
     return out.add_capsules(name, f1, f2, half1=half1, half2=half2, radius=radius)
 
 
-def _on_plane(c: PointContact, name: str, out: core.Builder, where: Resolution) -> int:
-    f1, f2, (_, _, normal) = where.contact(c, words(c, name))
+def _on_plane(c: PointContact, name: str, out: core.Builder, resolver: Resolver) -> int:
+    f1, f2, (_, _, normal) = resolver.contact(c, words(c, name))
     block = out.add_contact(name, f1, f2, normal=normal, radius=c.radius)
     if c.unilateral:
         out.let_open(restitution=c.restitution)
     return block
 
 
-def _stops(c: JointLimit, name: str, out: core.Builder, where: Resolution) -> list[int]:
+def _stops(c: JointLimit, name: str, out: core.Builder, resolver: Resolver) -> list[int]:
     """Add the finite stops of a joint, "NAME lower" and "NAME upper"."""
     blocks = []
-    for which, sign, bound in zip(("lower", "upper"), (1.0, -1.0), stops_of(c, name, where), strict=True):
+    for which, sign, bound in zip(("lower", "upper"), (1.0, -1.0), stops_of(c, name, resolver), strict=True):
         if math.isfinite(bound):
             blocks.append(
-                out.add_limit(f"{name} {which}", where.joint(c.joint, name), bound=bound, sign=sign)
+                out.add_limit(f"{name} {which}", resolver.joint(c.joint, name), bound=bound, sign=sign)
             )
             out.let_open(restitution=c.restitution)
     return blocks
 
 
-def stops_of(c: JointLimit, name: str, where: Resolution) -> tuple[float, float]:
+def stops_of(c: JointLimit, name: str, resolver: Resolver) -> tuple[float, float]:
     """Return the positions of the lower and upper stop [rad or m]; a missing stop is infinite.
 
     Args:
         c: the description.
         name: its unique name.
-        where: frames and joints by name.
+        resolver: frames and joints by name.
     """
-    model, joint = where.model, where.joint(c.joint, words(c, name))
+    model, joint = resolver.model, resolver.joint(c.joint, words(c, name))
     at = model.joints[joint].idx_q
     lower = float(model.lowerPositionLimit[at]) if c.lower is None else c.lower
     upper = float(model.upperPositionLimit[at]) if c.upper is None else c.upper
@@ -162,18 +172,18 @@ def has_stops(model: Model, at: int) -> bool:
     return bool(model.lowerPositionLimit[at] > -NO_LIMIT or model.upperPositionLimit[at] < NO_LIMIT)
 
 
-def _check_limit(c: JointLimit, who: str, where: Resolution) -> None:
+def _check_limit(c: JointLimit, who: str, resolver: Resolver) -> None:
     """Check that a joint has one position coordinate and ordered stops, at least one of them finite.
 
     Raises:
         InputError, UnknownNameError: see above.
     """
-    joint = where.model.joints[where.joint(c.joint, who)]
+    joint = resolver.model.joints[resolver.joint(c.joint, who)]
     if joint.nq != 1:
         raise InputError(
             f'{who}: joint "{c.joint}" turns without end and has no stops; it is {joint.shortname()}'
         )
-    lower, upper = stops_of(c, who, where)
+    lower, upper = stops_of(c, who, resolver)
     if not (math.isfinite(lower) or math.isfinite(upper)):
         raise InputError(f'{who}: the model gives joint "{c.joint}" no finite limits; give lower or upper')
     if not lower < upper:

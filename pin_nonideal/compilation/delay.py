@@ -26,7 +26,7 @@ class DelayedTorque:
         samples: number of samples by which a torque acts late.
         initial: torque before the first delayed one arrives, (nv,).
         t0: start time of the runs [s].
-        by_thread: whether runs go on in several threads at once, each run in one thread.
+        by_thread: whether several threads run at once, each with runs of its own.
     """
 
     def __init__(

@@ -9,17 +9,17 @@ from pin_nonideal.description.forces import JointSpring, SpringDamper, UserForce
 from pin_nonideal.errors import InputError, short_repr
 
 from .callbacks import checked
-from .resolver import Resolution, words
+from .resolver import Resolver, words
 
 
 @singledispatch
-def lower_force(f: object, out: core.Builder, where: Resolution) -> None:
+def lower_force(f: object, out: core.Builder, resolver: Resolver) -> None:
     """Add one applied force to the program.
 
     Args:
         f: the description.
         out: the program under construction.
-        where: frames and joints by name.
+        resolver: frames and joints by name.
 
     Raises:
         InputError, UnknownNameError: a frame or joint does not exist or does not fit.
@@ -28,20 +28,20 @@ def lower_force(f: object, out: core.Builder, where: Resolution) -> None:
 
 
 @lower_force.register
-def _(f: SpringDamper, out: core.Builder, where: Resolution) -> None:
-    frame1, frame2 = where.pair(f, words(f))
+def _(f: SpringDamper, out: core.Builder, resolver: Resolver) -> None:
+    frame1, frame2 = resolver.pair(f, words(f))
     out.add_spring_damper(frame1, frame2, stiffness=f.stiffness, damping=f.damping, rest_length=f.rest_length)
 
 
 @lower_force.register
-def _(f: JointSpring, out: core.Builder, where: Resolution) -> None:
-    joint = where.joint(f.joint, words(f))
+def _(f: JointSpring, out: core.Builder, resolver: Resolver) -> None:
+    joint = resolver.joint(f.joint, words(f))
     out.add_joint_spring(joint, stiffness=f.stiffness, rest=f.rest, damping=f.damping)
 
 
 @lower_force.register
-def _(f: Wrench, out: core.Builder, where: Resolution) -> None:
-    frame = where.frame(f.frame, words(f))
+def _(f: Wrench, out: core.Builder, resolver: Resolver) -> None:
+    frame = resolver.frame(f.frame, words(f))
     if callable(f.value):
         out.add_wrench(frame, function=checked(f.value, f"{words(f)}: value", (6,)))
     else:
@@ -49,5 +49,5 @@ def _(f: Wrench, out: core.Builder, where: Resolution) -> None:
 
 
 @lower_force.register
-def _(f: UserForce, out: core.Builder, where: Resolution) -> None:
-    out.add_user_force(checked(f.function, f"{words(f)}: function", (where.model.nv,)))
+def _(f: UserForce, out: core.Builder, resolver: Resolver) -> None:
+    out.add_user_force(checked(f.function, f"{words(f)}: function", (resolver.model.nv,)))

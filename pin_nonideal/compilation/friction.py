@@ -25,7 +25,7 @@ from pin_nonideal.errors import InputError, UnknownNameError, UserFunctionError,
 
 from .callbacks import ReactionNames, checked, named
 from .constraints import frames_of
-from .resolver import Frame, Resolution, turned, words
+from .resolver import Frame, Resolver, turned, words
 
 # Constraint models of Pinocchio that can hold a point on a point.
 BALLS = ("PointAnchorConstraintModel", "RigidConstraintModel")
@@ -36,21 +36,21 @@ BEARING = ("radius", "axial_radius", "span")
 TEETH = ("lead_angle", "efficiency")
 
 
-class Surroundings(NamedTuple):
+class LoweringContext(NamedTuple):
     """Names of a scene that laws may use.
 
     Attributes:
-        where: frames and joints by name.
+        resolver: frames and joints by name.
         constraints: descriptions of the constraints by name.
         reactions: names by which user laws may access reactions.
     """
 
-    where: Resolution
+    resolver: Resolver
     constraints: dict[str, object]
     reactions: ReactionNames
 
 
-class Place(NamedTuple):
+class FrictionSite(NamedTuple):
     """Slip directions of one friction element of a law, and its load.
 
     Attributes:
@@ -82,20 +82,20 @@ class Place(NamedTuple):
     lever: float = 1.0
 
 
-def rubbing_joint(name: str, who: str, around: Surroundings, *, freedoms: tuple[int, ...] = (1,)) -> int:
+def friction_joint(name: str, who: str, context: LoweringContext, *, freedoms: tuple[int, ...] = (1,)) -> int:
     """Return the index of a movable joint that is no mimic joint, for a friction law.
 
     Args:
         name: name of the joint.
         who: words for messages.
-        around: names that the law may use.
+        context: names that the law may use.
         freedoms: numbers of degrees of freedom that the law supports.
 
     Raises:
         InputError, UnknownNameError: there is no such joint.
     """
-    joint = around.where.joint(name, who, freedoms=freedoms)
-    for c in around.constraints.values():
+    joint = context.resolver.joint(name, who, freedoms=freedoms)
+    for c in context.constraints.values():
         if isinstance(c, JointCoupling) and c.joint1 == name and (c.name or "").endswith("mimic"):
             raise InputError(
                 f'{who}: joint "{name}" is a mimic joint, driven by "{c.joint2}"; '
@@ -104,61 +104,61 @@ def rubbing_joint(name: str, who: str, around: Surroundings, *, freedoms: tuple[
     return joint
 
 
-def lower_joint_friction(law: JointFriction, name: str, out: core.Builder, around: Surroundings) -> None:
+def lower_joint_friction(law: JointFriction, name: str, out: core.Builder, context: LoweringContext) -> None:
     """Add friction of a joint of the tree, of an anchor or of a coupling.
 
     Args:
         law: the description.
         name: its unique name.
         out: the program under construction.
-        around: names that the law may use.
+        context: names that the law may use.
 
     Raises:
         InputError, UnknownNameError: the joint does not exist, or a parameter does not apply to it.
     """
-    who, model = words(law, name), around.where.model
-    if model.existJointName(law.joint) or law.joint not in around.constraints:
-        places = _in_joint(law, who, around)
+    who, model = words(law, name), context.resolver.model
+    if model.existJointName(law.joint) or law.joint not in context.constraints:
+        sites = _in_joint(law, who, context)
     else:
-        places = _in_constraint(law, name, out, around)
+        sites = _in_constraint(law, name, out, context)
     index = out.add_law(name)
-    for place in places:
-        _viscous(law, out, index, place)
-        if law.coulomb or law.preload or law.mu or place.mu:
-            _dry(law, name, out, index, place)
+    for site in sites:
+        _viscous(law, out, index, site)
+        if law.coulomb or law.preload or law.mu or site.mu:
+            _dry(law, name, out, index, site)
 
 
-def _in_joint(law: JointFriction, who: str, around: Surroundings) -> list[Place]:
+def _in_joint(law: JointFriction, who: str, context: LoweringContext) -> list[FrictionSite]:
     """Return the friction sites of a joint of the tree."""
-    where = around.where
-    model = where.model
-    if not model.existJointName(law.joint) and around.constraints:
-        known = [*list(model.names)[1:], *around.constraints]
+    resolver = context.resolver
+    model = resolver.model
+    if not model.existJointName(law.joint) and context.constraints:
+        known = [*list(model.names)[1:], *context.constraints]
         if not model.existFrame(law.joint, pin.FrameType.FIXED_JOINT):
             raise UnknownNameError(f'{who}: no joint or anchor "{law.joint}"{nearest(law.joint, known)}')
-    joint = rubbing_joint(law.joint, who, around, freedoms=(1, 2, 3, 6))
+    joint = friction_joint(law.joint, who, context, freedoms=(1, 2, 3, 6))
     kind = model.joints[joint].shortname()
     dof, count = model.joints[joint].idx_v, model.joints[joint].nv
     _refuse(law, who, TEETH, f'of a JointCoupling, and joint "{law.joint}" is {kind}')
     if kind == "JointModelUniversal":
         _check_radius(law, who, core.Load.revolute)
         axes = [(f"axis {k + 1}", dof + k) for k in range(2)]
-        return [Place(core.Load.revolute, p, d, 1, joint=joint, axis_dof=d) for p, d in axes]
+        return [FrictionSite(core.Load.revolute, p, d, 1, joint=joint, axis_dof=d) for p, d in axes]
     if kind in ("JointModelPlanar", "JointModelFreeFlyer", "JointModelTranslation"):
         return _sliding_and_turning(law, who, joint, kind, dof, count)
-    load, axis = where.bearing(joint)
+    load, axis = resolver.bearing(joint)
     if load is core.Load.none:
         raise InputError(
             f'{who}: joint "{law.joint}" must be revolute, prismatic, helical, spherical, universal, planar, '
             f"translation or free flyer; it is {kind}"
         )
     _check_radius(law, who, load)
-    return [Place(load, "", dof, count, joint=joint, axis=tuple(axis))]
+    return [FrictionSite(load, "", dof, count, joint=joint, axis=tuple(axis))]
 
 
 def _sliding_and_turning(
     law: JointFriction, who: str, joint: int, kind: str, dof: int, count: int
-) -> list[Place]:
+) -> list[FrictionSite]:
     """Return the friction sites of a planar, translation or free-flyer joint."""
     planar = kind == "JointModelPlanar"
     load, carrier = (core.Load.planar, joint) if planar else (core.Load.none, -1)
@@ -166,26 +166,30 @@ def _sliding_and_turning(
         raise InputError(f'{who}: joint "{law.joint}" carries no load that mu could follow; give coulomb')
     slides = count if kind == "JointModelTranslation" else 2 if planar else 3
     if slides == count:
-        return [Place(load, "", dof, count)]
-    places = [Place(load, "sliding", dof, slides, joint=carrier)]
+        return [FrictionSite(load, "", dof, count)]
+    sites = [FrictionSite(load, "sliding", dof, slides, joint=carrier)]
     if law.radius:
-        places.append(Place(load, "turning", dof + slides, count - slides, joint=carrier, lever=law.radius))
-    return places
+        sites.append(
+            FrictionSite(load, "turning", dof + slides, count - slides, joint=carrier, lever=law.radius)
+        )
+    return sites
 
 
-def _in_constraint(law: JointFriction, name: str, out: core.Builder, around: Surroundings) -> list[Place]:
+def _in_constraint(
+    law: JointFriction, name: str, out: core.Builder, context: LoweringContext
+) -> list[FrictionSite]:
     """Return the friction sites of an anchor or a coupling."""
-    c: Any = around.constraints[law.joint]
-    who, anchor, where = words(law, name), around.reactions.blocks[law.joint], around.where
+    c: Any = context.constraints[law.joint]
+    who, anchor, resolver = words(law, name), context.reactions.blocks[law.joint], context.resolver
     if isinstance(c, JointCoupling):
-        return [_in_coupling(law, who, name, c, anchor, out, where)]
+        return [_in_coupling(law, who, name, c, anchor, out, resolver)]
     _refuse(law, who, TEETH, f'of a JointCoupling, and "{law.joint}" is a {type(c).__name__}')
     if isinstance(c, HingeAnchor):
         _check_radius(law, who, core.Load.revolute)
-        f1, f2 = where.pair(c, who)
-        axis = tuple(where.hinge_axis(c, who))
+        f1, f2 = resolver.pair(c, who)
+        axis = tuple(resolver.hinge_axis(c, who))
         block = out.add_hinge_slip(name, f1, f2, axis=list(axis))
-        return [Place(core.Load.revolute, block=block, anchor=anchor, axis=axis)]
+        return [FrictionSite(core.Load.revolute, block=block, anchor=anchor, axis=axis)]
     ball = isinstance(c, PointAnchor) or type(c).__name__ in BALLS
     rows = next(rows.count for rows in out.constraints if rows.name == law.joint)
     if not ball or rows != 3:
@@ -195,8 +199,8 @@ def _in_constraint(law: JointFriction, name: str, out: core.Builder, around: Sur
             'acts in a HingeAnchor, in a PointAnchor with axes="xyz" and on a JointCoupling'
         )
     _check_radius(law, who, core.Load.spherical)
-    block = out.add_turn_slip(name, *frames_of(c, where, who), axes=[0, 1, 2])
-    return [Place(core.Load.spherical, block=block, anchor=anchor)]
+    block = out.add_turn_slip(name, *frames_of(c, resolver, who), axes=[0, 1, 2])
+    return [FrictionSite(core.Load.spherical, block=block, anchor=anchor)]
 
 
 def _in_coupling(
@@ -206,8 +210,8 @@ def _in_coupling(
     c: JointCoupling,
     anchor: int,
     out: core.Builder,
-    where: Resolution,
-) -> Place:
+    resolver: Resolver,
+) -> FrictionSite:
     """Return the friction site of the teeth or threads of a coupling.
 
     Fractions a and b of the tooth force act as friction on the two joints.
@@ -220,9 +224,9 @@ def _in_coupling(
     a, b = law.tooth_losses
     loss = a + b
     weights = (a / (loss * c.ratio), b / loss) if loss else (0.0, 1.0)
-    j1, j2 = where.joint(c.joint1, who), where.joint(c.joint2, who)
+    j1, j2 = resolver.joint(c.joint1, who), resolver.joint(c.joint2, who)
     block = out.add_coupling_slip(name, j1, j2, weight1=weights[0], weight2=weights[1])
-    return Place(core.Load.multiplier, block=block, anchor=anchor, mu=loss * abs(c.ratio))
+    return FrictionSite(core.Load.multiplier, block=block, anchor=anchor, mu=loss * abs(c.ratio))
 
 
 def _refuse(law: JointFriction, who: str, keys: tuple[str, ...], reason: str) -> None:
@@ -242,42 +246,42 @@ def _check_radius(law: JointFriction, who: str, load: core.Load) -> None:
         )
 
 
-def _viscous(law: JointFriction, out: core.Builder, index: int, place: Place) -> None:
+def _viscous(law: JointFriction, out: core.Builder, index: int, site: FrictionSite) -> None:
     """Add the viscous part of a law."""
     if not law.viscous:
         return
-    coefficient = law.viscous * place.lever**2
-    if place.block >= 0:
-        out.add_viscous(index, coefficient=coefficient, block=place.block, anchor=place.anchor)
+    coefficient = law.viscous * site.lever**2
+    if site.block >= 0:
+        out.add_viscous(index, coefficient=coefficient, block=site.block, anchor=site.anchor)
     else:
-        out.add_viscous(index, coefficient=coefficient, dof=place.dof, count=place.dofs)
+        out.add_viscous(index, coefficient=coefficient, dof=site.dof, count=site.dofs)
 
 
-def _dry(law: JointFriction, name: str, out: core.Builder, index: int, place: Place) -> None:
+def _dry(law: JointFriction, name: str, out: core.Builder, index: int, site: FrictionSite) -> None:
     """Add the dry friction element of a law."""
-    element = f"{name} {place.part}" if place.part else name
-    block = place.block
+    element = f"{name} {site.part}" if site.part else name
+    block = site.block
     if block < 0:
-        block = out.add_dof_slip(element, dof=place.dof, count=place.dofs)
-    mu = law.mu if place.mu is None else place.mu
+        block = out.add_dof_slip(element, dof=site.dof, count=site.dofs)
+    mu = law.mu if site.mu is None else site.mu
     out.add_friction(
         index,
         block,
         name=element,
-        load=place.load if mu else core.Load.none,
+        load=site.load if mu else core.Load.none,
         reaction=core.Reaction[law.reaction if mu else "none"],
-        joint=place.joint,
-        anchor=place.anchor,
-        row=place.row,
-        axis=list(place.axis),
-        axis_dof=place.axis_dof,
-        constant=(law.coulomb + law.preload) * place.lever,
-        mu=mu * place.lever,
+        joint=site.joint,
+        anchor=site.anchor,
+        row=site.row,
+        axis=list(site.axis),
+        axis_dof=site.axis_dof,
+        constant=(law.coulomb + law.preload) * site.lever,
+        mu=mu * site.lever,
         radius=law.radius,
         axial_radius=law.axial_radius,
         inverse_span=0.0 if law.span is None else 1.0 / law.span,
         static_ratio=law.static_ratio,
-        stribeck_velocity=(law.stribeck_velocity or 0.0) / place.lever,
+        stribeck_velocity=(law.stribeck_velocity or 0.0) / site.lever,
     )
 
 
@@ -285,7 +289,7 @@ def lower_contact_friction(
     c: Contact | Rolling,
     name: str,
     out: core.Builder,
-    around: Surroundings,
+    context: LoweringContext,
 ) -> None:
     """Add the friction elements of a contact: sliding, spinning about the normal, and rolling resistance.
 
@@ -293,58 +297,58 @@ def lower_contact_friction(
         c: description of a contact or of a rolling constraint.
         name: its unique name.
         out: the program under construction.
-        around: names of the scene.
+        context: names of the scene.
     """
     if not any(getattr(c, key, 0.0) for key in ("mu", "torsional", "rolling")):
         return
     law = out.add_law(name)
     slip = _user_slip if isinstance(c, UserContact) else _flat_slip if hasattr(c, "plane") else _round_slip
-    rubs = slip(c, name, out, around.where)
-    for element, block, coefficient in rubs:
+    elements = slip(c, name, out, context.resolver)
+    for element, block, coefficient in elements:
         out.add_friction(
             law,
             block,
             name=element,
             load=core.Load.multiplier,
             reaction=core.Reaction.total,
-            anchor=around.reactions.blocks[name],
+            anchor=context.reactions.blocks[name],
             row=2 if isinstance(c, Rolling) else 0,
             mu=coefficient,
             static_ratio=getattr(c, "static_ratio", 1.0),
         )
 
 
-def _round_slip(c: Any, name: str, out: core.Builder, where: Resolution) -> list[tuple[str, int, float]]:
+def _round_slip(c: Any, name: str, out: core.Builder, resolver: Resolver) -> list[tuple[str, int, float]]:
     """Add the slip directions of a contact of two solids; return (name, block, coefficient)."""
     who = words(c, name)
     if isinstance(c, HullContact):
-        f1, f2, hull = where.hull(c, who)
+        f1, f2, hull = resolver.hull(c, who)
         return [(name, out.add_hull_slip(name, f1, f2, solid=hull, radius1=c.radius1), c.mu)]
     if isinstance(c, CylinderContact):
-        f1, f2, solid, half1 = where.cylinder(c, who)
+        f1, f2, solid, half1 = resolver.cylinder(c, who)
         if half1 == 0.0:
             return [(name, out.add_revolved_slip(name, f1, f2, solid=solid, radius1=c.radius1), c.mu)]
         block = out.add_line_slip(name, f1, f2, solid=solid, half1=half1, radius1=c.radius1)
         return [(name, block, c.mu)]
     if isinstance(c, RimContact):
-        f1, f2, hull = where.rim(c, who)
+        f1, f2, hull = resolver.rim(c, who)
         return [(name, out.add_rim_slip(name, f1, f2, solid=hull, rim=c.rim), c.mu)]
     if isinstance(c, RevolvedContact):
-        f1, f2, one, other = where.rims(c, who)
-        around = {"radius1": c.radius1, "radius2": c.radius2}
-        return [(name, out.add_rims_slip(name, f1, f2, first=one, second=other, **around), c.mu)]
+        f1, f2, one, other = resolver.rims(c, who)
+        radii = {"radius1": c.radius1, "radius2": c.radius2}
+        return [(name, out.add_rims_slip(name, f1, f2, first=one, second=other, **radii), c.mu)]
     if isinstance(c, BoxContact):
-        f1, f2, half = where.box(c, who)
+        f1, f2, half = resolver.box(c, who)
         return [(name, out.add_box_slip(name, f1, f2, half=half, radius1=c.radius1), c.mu)]
-    f1, f2, half1, half2 = where.capsules(c, who)
+    f1, f2, half1, half2 = resolver.capsules(c, who)
     block = out.add_capsules_slip(name, f1, f2, half1=half1, half2=half2, radius1=c.radius1)
     return [(name, block, c.mu)]
 
 
-def _user_slip(c: Any, name: str, out: core.Builder, where: Resolution) -> list[tuple[str, int, float]]:
+def _user_slip(c: Any, name: str, out: core.Builder, resolver: Resolver) -> list[tuple[str, int, float]]:
     """Add slip directions that the user defines; return (name, block, coefficient)."""
-    who, nv = f"{words(c, name)}: directions", where.model.nv
-    shape = _shape_of_directions(named(c.directions, who), where)
+    who, nv = f"{words(c, name)}: directions", resolver.model.nv
+    shape = _shape_of_directions(named(c.directions, who), resolver)
     if shape not in ((1, nv), (2, nv)):
         raise InputError(f"{who} must return one or two rows of {nv} numbers each; got shape {shape}")
     function = checked(c.directions, who, shape)
@@ -352,32 +356,32 @@ def _user_slip(c: Any, name: str, out: core.Builder, where: Resolution) -> list[
     return [(name, block, c.mu)]
 
 
-def _shape_of_directions(directions: Callable[..., Any], where: Resolution) -> tuple[int, ...]:
+def _shape_of_directions(directions: Callable[..., Any], resolver: Resolver) -> tuple[int, ...]:
     """Return the shape of the directions at q0, or near q0 if the function raises there."""
     generator = np.random.default_rng(5)
     for part in AROUND:
         with suppress(UserFunctionError):
-            move = part * generator.standard_normal(where.model.nv)
-            return np.shape(directions(0.0, pin.integrate(where.model, where.q0, move)))
-    return np.shape(directions(0.0, where.q0))
+            move = part * generator.standard_normal(resolver.model.nv)
+            return np.shape(directions(0.0, pin.integrate(resolver.model, resolver.q0, move)))
+    return np.shape(directions(0.0, resolver.q0))
 
 
-def _flat_slip(c: Any, name: str, out: core.Builder, where: Resolution) -> list[tuple[str, int, float]]:
+def _flat_slip(c: Any, name: str, out: core.Builder, resolver: Resolver) -> list[tuple[str, int, float]]:
     """Add the slip directions of a contact with a plane; return (name, block, coefficient) per element."""
-    f1, f2, (t1, t2, n) = where.contact(c, words(c, name))
+    f1, f2, (t1, t2, n) = resolver.contact(c, words(c, name))
     if isinstance(c, EllipsoidContact):
         body, along = turned(f1, c.rpy), {"tangent1": t1, "tangent2": t2, "normal": n}
         return [(name, out.add_ellipsoid_slip(name, body, f2, semiaxes=c.semiaxes, **along), c.mu)]
     level, sliding = _turned(f2, np.column_stack([t1, t2, n])), getattr(c, "mu", 0.0)
-    rubs = []
+    elements = []
     if sliding:
         block = out.add_contact_slip(name, f1, f2, radius=c.radius, tangent1=t1, tangent2=t2, normal=n)
-        rubs.append((name, block, sliding))
+        elements.append((name, block, sliding))
     for part, coefficient, axes in (("torsional", c.torsional, [2]), ("rolling", c.rolling, [0, 1])):
         if coefficient:
             block = out.add_turn_slip(f"{name} {part}", f1, level, axes=axes)
-            rubs.append((f"{name} {part}", block, coefficient))
-    return rubs
+            elements.append((f"{name} {part}", block, coefficient))
+    return elements
 
 
 def _turned(frame: Frame, axes: Any) -> Frame:

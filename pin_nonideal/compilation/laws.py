@@ -11,19 +11,19 @@ from pin_nonideal.errors import InputError, short_repr
 from pin_nonideal.types import Array
 
 from .callbacks import Reactions, checked, checked_limits
-from .friction import Surroundings, lower_joint_friction, rubbing_joint
+from .friction import LoweringContext, friction_joint, lower_joint_friction
 from .resolver import words
 
 
 @singledispatch
-def lower_law(law: object, name: str, out: core.Builder, around: Surroundings) -> None:
+def lower_law(law: object, name: str, out: core.Builder, context: LoweringContext) -> None:
     """Add one law to the program.
 
     Args:
         law: the description.
         name: its unique name.
         out: the program under construction.
-        around: names that the law may use.
+        context: names that the law may use.
 
     Raises:
         InputError, UnknownNameError: a frame or joint does not exist or does not fit.
@@ -35,21 +35,21 @@ def lower_law(law: object, name: str, out: core.Builder, around: Surroundings) -
 
 
 @lower_law.register
-def _(law: JointFriction, name: str, out: core.Builder, around: Surroundings) -> None:
-    lower_joint_friction(law, name, out, around)
+def _(law: JointFriction, name: str, out: core.Builder, context: LoweringContext) -> None:
+    lower_joint_friction(law, name, out, context)
 
 
 @lower_law.register
-def _(law: SigmoidFriction, name: str, out: core.Builder, around: Surroundings) -> None:
-    joint = rubbing_joint(law.joint, words(law, name), around)
-    dof = around.where.model.joints[joint].idx_v
+def _(law: SigmoidFriction, name: str, out: core.Builder, context: LoweringContext) -> None:
+    joint = friction_joint(law.joint, words(law, name), context)
+    dof = context.resolver.model.joints[joint].idx_v
     out.add_sigmoid(out.add_law(name), dof, phi1=law.phi1, phi2=law.phi2, phi3=law.phi3)
 
 
 @lower_law.register
-def _(law: LuGre, name: str, out: core.Builder, around: Surroundings) -> None:
-    joint = rubbing_joint(law.joint, words(law, name), around)
-    dof = around.where.model.joints[joint].idx_v
+def _(law: LuGre, name: str, out: core.Builder, context: LoweringContext) -> None:
+    joint = friction_joint(law.joint, words(law, name), context)
+    dof = context.resolver.model.joints[joint].idx_v
     out.add_lugre(
         out.add_law(name),
         dof,
@@ -63,14 +63,14 @@ def _(law: LuGre, name: str, out: core.Builder, around: Surroundings) -> None:
 
 
 @lower_law.register
-def _(law: Drag, name: str, out: core.Builder, around: Surroundings) -> None:
-    frame = around.where.frame(law.frame, words(law, name))
+def _(law: Drag, name: str, out: core.Builder, context: LoweringContext) -> None:
+    frame = context.resolver.frame(law.frame, words(law, name))
     out.add_drag(out.add_law(name), frame, coefficient=law.coefficient, exponent=law.exponent)
 
 
 @lower_law.register
-def _(law: UserLaw, name: str, out: core.Builder, around: Surroundings) -> None:
-    nv, names = around.where.model.nv, around.reactions
+def _(law: UserLaw, name: str, out: core.Builder, context: LoweringContext) -> None:
+    nv, names = context.resolver.model.nv, context.reactions
     shapes = ((nv,), (law.states,)) if law.states else ((nv,),)
     function = checked(law.function, f"{words(law, name)}: function", *shapes)
 
@@ -82,9 +82,9 @@ def _(law: UserLaw, name: str, out: core.Builder, around: Surroundings) -> None:
 
 
 @lower_law.register
-def _(law: UserFriction, name: str, out: core.Builder, around: Surroundings) -> None:
-    who, names = words(law, name), around.reactions
-    direction = checked(law.direction, f"{who}: direction", (around.where.model.nv,))
+def _(law: UserFriction, name: str, out: core.Builder, context: LoweringContext) -> None:
+    who, names = words(law, name), context.reactions
+    direction = checked(law.direction, f"{who}: direction", (context.resolver.model.nv,))
     limits = checked_limits(law.limit, f"{who}: limit")
 
     def bounds(t: float, q: Array, v: Array, view: core.ReactionView) -> tuple[float, float]:

@@ -7,8 +7,9 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from pin_nonideal.core_loader import core
-from pin_nonideal.description.constraints import Rolling
-from pin_nonideal.description.contacts import JointLimit
+from pin_nonideal.description.constraints import Constraint, Rolling
+from pin_nonideal.description.contacts import Contact, JointLimit
+from pin_nonideal.description.scene_spec import SceneSpec
 from pin_nonideal.states.rows import row_slices
 
 from .actuation import lower_actuation
@@ -16,37 +17,12 @@ from .callbacks import ReactionNames
 from .constraints import lower_constraint
 from .contacts import lower_contacts, lower_gaps
 from .forces import lower_force
-from .friction import Surroundings, lower_contact_friction
+from .friction import LoweringContext, lower_contact_friction
 from .laws import lower_law
-from .resolver import Resolution, unique_names
+from .resolver import Resolver, unique_names
 
 
-class Descriptions(NamedTuple):
-    """Descriptions of a scene, without its model.
-
-    Attributes:
-        constraints: descriptions, or constraint models of Pinocchio.
-        contacts: descriptions.
-        laws: descriptions.
-        forces: descriptions.
-        actuation: None, an array (nv,), a table by joint name, a function, a description, or a tuple of
-            drives.
-        terms: provider of M and the bias forces, "core" or "pinocchio".
-        impact: the law of restitution, "newton" or "poisson".
-        assembly_tolerance: residual that a vanishing row may have [m or rad].
-    """
-
-    constraints: tuple[Any, ...]
-    contacts: tuple[Any, ...]
-    laws: tuple[Any, ...]
-    forces: tuple[Any, ...]
-    actuation: Any
-    terms: str
-    impact: str
-    assembly_tolerance: float
-
-
-class Written(NamedTuple):
+class LoweredItem(NamedTuple):
     """A description that has been added to the builder.
 
     Attributes:
@@ -62,13 +38,13 @@ class Written(NamedTuple):
     again: Callable[[Any, Any], object]
 
 
-def lower(said: Descriptions, builder: core.Builder, where: Resolution) -> dict[str, Any]:
+def lower(spec: SceneSpec, builder: core.Builder, resolver: Resolver) -> dict[str, Constraint | Contact]:
     """Add one scene to the core's builder.
 
     Args:
-        said: descriptions of the scene.
+        spec: descriptions of the scene.
         builder: the core's program under construction, still empty.
-        where: frames and joints by name.
+        resolver: frames and joints by name.
 
     Returns:
         Constraints and contacts by their unique names.
@@ -76,57 +52,59 @@ def lower(said: Descriptions, builder: core.Builder, where: Resolution) -> dict[
     Raises:
         InputError, UnknownNameError: a frame, joint or constraint does not exist or does not fit.
     """
-    written = lowered(said, builder, where)
+    written = lowered(spec, builder, resolver)
     return {each.name: each.description for each in written if each.kind in ("constraint", "contact")}
 
 
-def lowered(said: Descriptions, builder: core.Builder, where: Resolution) -> Iterator[Written]:
+def lowered(spec: SceneSpec, builder: core.Builder, resolver: Resolver) -> Iterator[LoweredItem]:
     """Add one scene to the core's builder and yield each description after it is added.
 
     A contact is yielded twice: after its normal rows and after its friction.
 
     Args:
-        said: descriptions of the scene.
+        spec: descriptions of the scene.
         builder: the core's program under construction, still empty.
-        where: frames and joints by name.
+        resolver: frames and joints by name.
     """
     taken: set[str] = set()
-    constraint_names = unique_names(said.constraints, taken)
-    contact_names = unique_names(said.contacts, taken)
-    law_names = unique_names(said.laws, set())
-    for c, name in zip(said.constraints, constraint_names, strict=True):
-        lower_constraint(c, name, builder, where)
-        yield Written("constraint", name, c, partial(_again, lower_constraint, name, where))
-    for name, c in lower_contacts(list(zip(contact_names, said.contacts, strict=True)), builder, where):
-        yield Written("contact", name, c, partial(_again, lower_gaps, name, where))
-    joints = {name: i for i, name in enumerate(where.model.names) if i}
+    constraint_names = unique_names(spec.constraints, taken)
+    contact_names = unique_names(spec.contacts, taken)
+    law_names = unique_names(spec.laws, set())
+    for c, name in zip(spec.constraints, constraint_names, strict=True):
+        lower_constraint(c, name, builder, resolver)
+        yield LoweredItem("constraint", name, c, partial(_again, lower_constraint, name, resolver))
+    for name, contact in lower_contacts(
+        list(zip(contact_names, spec.contacts, strict=True)), builder, resolver
+    ):
+        yield LoweredItem("contact", name, contact, partial(_again, lower_gaps, name, resolver))
+    joints = {name: i for i, name in enumerate(resolver.model.names) if i}
     blocks = {c.name: block for block, c in enumerate(builder.constraints)}
     names = ReactionNames(row_slices(builder), blocks, joints)
-    around = Surroundings(where, dict(zip(constraint_names, said.constraints, strict=True)), names)
-    for law, name in zip(said.laws, law_names, strict=True):
-        lower_law(law, name, builder, around)
-        yield Written("law", name, law, partial(_again, lower_law, name, around))
+    context = LoweringContext(resolver, dict(zip(constraint_names, spec.constraints, strict=True)), names)
+    for law, name in zip(spec.laws, law_names, strict=True):
+        lower_law(law, name, builder, context)
+        yield LoweredItem("law", name, law, partial(_again, lower_law, name, context))
     rolling = [
         (c, name)
-        for c, name in zip(said.constraints, constraint_names, strict=True)
+        for c, name in zip(spec.constraints, constraint_names, strict=True)
         if isinstance(c, Rolling)
     ]
-    contacts = zip(said.contacts, contact_names, strict=True)
-    for c, name in [*rolling, *(pair for pair in contacts if not isinstance(pair[0], JointLimit))]:
-        lower_contact_friction(c, name, builder, around)
-        yield Written("contact", name, c, partial(_again, lower_contact_friction, name, around))
-    for name, f in zip(unique_names(said.forces, set()), said.forces, strict=True):
-        lower_force(f, builder, where)
-        yield Written("force", name, f, lambda f, out: lower_force(f, out, where))
-    lower_actuation(said.actuation, builder, where, said)
-    again = partial(_actuation_again, where, said)
-    yield Written("actuation", "actuation", said.actuation, again)
-    builder.set_impact(core.ImpactLaw[said.impact])  # last, since it belongs to no description
+    contacts = zip(spec.contacts, contact_names, strict=True)
+    for rubbing, name in [*rolling, *(pair for pair in contacts if not isinstance(pair[0], JointLimit))]:
+        lower_contact_friction(rubbing, name, builder, context)
+        yield LoweredItem("contact", name, rubbing, partial(_again, lower_contact_friction, name, context))
+    for name, f in zip(unique_names(spec.forces, set()), spec.forces, strict=True):
+        lower_force(f, builder, resolver)
+        yield LoweredItem("force", name, f, lambda f, out: lower_force(f, out, resolver))
+    lower_actuation(spec.actuation, builder, resolver, spec)
+    again = partial(_actuation_again, resolver, spec)
+    yield LoweredItem("actuation", "actuation", spec.actuation, again)
+    builder.set_impact(core.ImpactLaw[spec.impact])  # last, since it belongs to no description
 
 
-def _again(write: Callable[..., object], name: str, around: Any, description: Any, out: Any) -> None:
-    write(description, name, out, around)
+def _again(write: Callable[..., object], name: str, context: Any, description: Any, out: Any) -> None:
+    write(description, name, out, context)
 
 
-def _actuation_again(where: Resolution, said: Descriptions, actuation: Any, out: Any) -> None:
-    lower_actuation(actuation, out, where, said)
+def _actuation_again(resolver: Resolver, spec: SceneSpec, actuation: Any, out: Any) -> None:
+    lower_actuation(actuation, out, resolver, spec)

@@ -11,12 +11,12 @@ import pinocchio as pin
 
 from pin_nonideal.core_loader import core
 from pin_nonideal.errors import InputError, UnknownNameError, nearest, short_repr
-from pin_nonideal.types import Array
+from pin_nonideal.types import Array, Table
 from pin_nonideal.validation import array, label
 
 from .compiled_scene import CompiledScene
-from .lowering import Written, lowered
-from .resolver import Resolution
+from .lowering import LoweredItem, lowered
+from .resolver import Resolver
 
 NUMBERS = (float, list, np.ndarray)  # types of keyword arguments that may differ between runs
 WRITES = ("add_", "set_", "let_")  # prefixes of builder methods that modify the program
@@ -38,11 +38,11 @@ class Call(NamedTuple):
     name: str
     number: int
     positional: tuple[Any, ...]
-    named: dict[str, Any]
+    named: Table
     result: Any
 
 
-class RunNumbers(NamedTuple):
+class ParameterOverrides(NamedTuple):
     """Parameter values of a batch in the form of the core.
 
     Attributes:
@@ -54,7 +54,7 @@ class RunNumbers(NamedTuple):
     values: Array
 
 
-def run_numbers(compiled: CompiledScene, parameters: Mapping[str, Any], n: int) -> RunNumbers:
+def parse_overrides(compiled: CompiledScene, parameters: Mapping[str, Any], n: int) -> ParameterOverrides:
     """Convert parameters of the runs to numbers of the core's program.
 
     Args:
@@ -84,11 +84,11 @@ def run_numbers(compiled: CompiledScene, parameters: Mapping[str, Any], n: int) 
     flat = [values.reshape(n, -1) for values in columns.values()]
     names, values = list(columns), np.ascontiguousarray(np.hstack(flat)) if flat else np.zeros((n, 0))
     if n:
-        _check_known(compiled.program, RunNumbers(names, values[:1]))
-    return RunNumbers(names, values)
+        _check_known(compiled.program, ParameterOverrides(names, values[:1]))
+    return ParameterOverrides(names, values)
 
 
-def _check_known(program: core.Program, first: RunNumbers) -> None:
+def _check_known(program: core.Program, first: ParameterOverrides) -> None:
     """Check that the core accepts all overrides as numbers.
 
     Raises:
@@ -107,17 +107,17 @@ def _is_body(compiled: CompiledScene, name: str) -> bool:
     return bool(compiled.model.existJointName(name))
 
 
-def _parts(compiled: CompiledScene) -> dict[str, list[tuple[Written, _Again]]]:
+def _parts(compiled: CompiledScene) -> dict[str, list[tuple[LoweredItem, _Relower]]]:
     """Return the parts of the program by name, with their builder calls; a contact has two parts."""
-    said = compiled.said
-    builder: Any = _Recorder(core.Builder(compiled.model, core.Provider[said.terms]))
-    parts: dict[str, list[tuple[Written, _Again]]] = {}
+    spec = compiled.spec
+    builder: Any = _Recorder(core.Builder(compiled.model, core.Provider[spec.terms]))
+    parts: dict[str, list[tuple[LoweredItem, _Relower]]] = {}
     kinds: dict[str, str] = {}
     begin = 0
-    for written in lowered(said, builder, Resolution(compiled.model, compiled.q0)):
+    for written in lowered(spec, builder, Resolver(compiled.model, compiled.q0)):
         kind = kinds.setdefault(written.name, written.kind)
         name = written.name if kind == written.kind else f"{written.kind} {written.name}"
-        parts.setdefault(name, []).append((written, _Again(builder, builder.calls[begin:])))
+        parts.setdefault(name, []).append((written, _Relower(builder, builder.calls[begin:])))
         begin = len(builder.calls)
     return parts
 
@@ -125,7 +125,7 @@ def _parts(compiled: CompiledScene) -> dict[str, list[tuple[Written, _Again]]]:
 def _body(compiled: CompiledScene, name: str, given: Mapping[str, Any], n: int) -> dict[Any, Array]:
     """Return mass, center of mass and inertia of a joint's body for all runs."""
     who = f'rollout: parameters: "{name}"'
-    if compiled.said.terms != "core":
+    if compiled.spec.terms != "core":
         raise InputError(f'{who}: masses can differ between runs with terms="core" only')
     if len(given) != 1:
         raise InputError(f'{who}: give "mass" or "inertia", not both')
@@ -161,7 +161,7 @@ def _body(compiled: CompiledScene, name: str, given: Mapping[str, Any], n: int) 
     } | {("body", joint, f"inertia {axis}"): turns[:, :, k] for k, axis in enumerate("xyz")}
 
 
-def _columns(name: str, given: Any, n: int, parts: list[tuple[Written, _Again]]) -> dict[Any, Array]:
+def _columns(name: str, given: Any, n: int, parts: list[tuple[LoweredItem, _Relower]]) -> dict[Any, Array]:
     """Return the numbers of the program that depend on the given fields of a description, for all runs."""
     described = parts[0][0].description
     others = list(_descriptions(name, described, given, n))
@@ -223,7 +223,7 @@ class _Recorder:
         return call
 
 
-class _Again:
+class _Relower:
     """A stand-in builder that compares the calls of a replaced description with the recorded calls.
 
     It returns the recorded results.
@@ -235,10 +235,10 @@ class _Again:
 
     def __init__(self, builder: Any, calls: list[Call]) -> None:
         self._builder, self.calls = builder, calls
-        self._told: list[dict[str, Any]] = []
+        self._told: list[Table] = []
         self._differs = False
 
-    def told(self, written: Written, other: Any, name: str) -> list[dict[str, Any]]:
+    def told(self, written: LoweredItem, other: Any, name: str) -> list[Table]:
         """Return the keyword arguments of the calls of another description.
 
         Raises:

@@ -34,8 +34,8 @@ def report(scene: CompiledScene, name: str, rank: int, notes: Sequence[str]) -> 
         lines.append(f"  {what} {name}: {end - first} rows{', may open' if name in opening else ''}")
     for name in scene.program.law_names:
         lines.append(f"  law {name}")
-    lines += [f"  force {_label(force)}" for force in scene.said.forces]
-    lines += [f"  actuation {_label(drive)}" for drive in drives_of(scene.said.actuation)]
+    lines += [f"  force {_label(force)}" for force in scene.spec.forces]
+    lines += [f"  actuation {_label(drive)}" for drive in drives_of(scene.spec.actuation)]
     limited = [str(model.names[i]) for i in _passed(scene)]
     if limited:
         lines.append(f"  limits, which the motion may pass: {', '.join(limited)}")
@@ -51,10 +51,10 @@ def report(scene: CompiledScene, name: str, rank: int, notes: Sequence[str]) -> 
     return "\n".join([*lines, *notes])
 
 
-def _label(said: object) -> str:
+def _label(spec: object) -> str:
     """Return a label of a force or an actuation: its name, joint or frame, and its kind."""
-    kind = type(said).__name__
-    name = getattr(said, "name", None) or getattr(said, "joint", None) or getattr(said, "frame", None)
+    kind = type(spec).__name__
+    name = getattr(spec, "name", None) or getattr(spec, "joint", None) or getattr(spec, "frame", None)
     if kind in ("ndarray", "list", "tuple", "dict"):
         return "constant torques"
     return f"{name} ({kind})" if isinstance(name, str) else {"function": "function (t, q, v)"}.get(kind, kind)
@@ -67,12 +67,12 @@ def _skipped(scene: CompiledScene) -> list[str]:
         skipped.append("rows and their factorization (no constraint)")
     if not scene.program.law_names:
         skipped.append("laws C (none)")
-    said = scene.said
-    depends = any(isinstance(law, JointFriction) and law.mu for law in said.laws)
-    depends |= any(getattr(law, "reaction", None) for law in said.laws if not isinstance(law, JointFriction))
-    if not depends and not any(getattr(c, "mu", 0.0) for c in said.contacts):
+    spec = scene.spec
+    depends = any(isinstance(law, JointFriction) and law.mu for law in spec.laws)
+    depends |= any(getattr(law, "reaction", None) for law in spec.laws if not isinstance(law, JointFriction))
+    if not depends and not any(getattr(c, "mu", 0.0) for c in spec.contacts):
         skipped.append("reactions (no law reads them)")
-    if not said.forces and said.actuation is None:
+    if not spec.forces and spec.actuation is None:
         skipped.append("given forces (none)")
     if _passed(scene):
         skipped.append("limits of joints (the motion may pass them)")
@@ -81,7 +81,7 @@ def _skipped(scene: CompiledScene) -> list[str]:
 
 def _passed(scene: CompiledScene) -> list[int]:
     """Return the joints with position limits that are no stops of the scene."""
-    stops = {c.joint for c in scene.said.contacts if isinstance(c, JointLimit)}
+    stops = {c.joint for c in scene.spec.contacts if isinstance(c, JointLimit)}
     model = scene.model
     return [i for i in range(1, model.njoints) if _limited(model, i) and str(model.names[i]) not in stops]
 

@@ -41,7 +41,7 @@ def placed_on(joint: int, placement: Placement) -> Frame:
     return (int(joint), placement.rotation.ravel().tolist(), placement.translation.tolist())
 
 
-class Resolution:
+class Resolver:
     """Lookup of frames and joints of a model by name.
 
     Args:

@@ -119,7 +119,7 @@ def describe(scene: CompiledScene, name: str) -> Description:
         scene: the compiled scene.
         name: name of the scene.
     """
-    said = scene.said
+    spec = scene.spec
     rows = [
         {
             "name": key,
@@ -129,18 +129,18 @@ def describe(scene: CompiledScene, name: str) -> Description:
         }
         for key, s in scene.slices.items()
     ]
-    held = len(said.constraints)
-    kinds = [_made(each) for each in (*said.constraints, *said.contacts)]
+    held = len(spec.constraints)
+    kinds = [_made(each) for each in (*spec.constraints, *spec.contacts)]
     tables = [{**row, **kind} for row, kind in zip(rows, kinds, strict=True)]
-    names = unique_names(said.laws, set())
+    names = unique_names(spec.laws, set())
     return Description(
         name=name,
         joints=_joints(scene.model, scene),
         constraints=tables[:held],
         contacts=tables[held:],
-        laws=[{"name": n, **_made(law)} for n, law in zip(names, said.laws, strict=True)],
-        forces=[_made(force) for force in said.forces],
-        actuation=None if said.actuation is None else _made(said.actuation),
+        laws=[{"name": n, **_made(law)} for n, law in zip(names, spec.laws, strict=True)],
+        forces=[_made(force) for force in spec.forces],
+        actuation=None if spec.actuation is None else _made(spec.actuation),
     )
 
 
@@ -182,22 +182,22 @@ def _limit(x: float) -> float | None:
     return float(x) if np.isfinite(x) and abs(x) < NO_LIMIT else None
 
 
-def _made(said: Any) -> Table:
+def _made(spec: Any) -> Table:
     """Return the kind of a description and its arguments as plain values; functions appear by name."""
     fields = (
-        {f.name: getattr(said, f.name) for f in dataclasses.fields(said)}
-        if dataclasses.is_dataclass(said)
+        {f.name: getattr(spec, f.name) for f in dataclasses.fields(spec)}
+        if dataclasses.is_dataclass(spec)
         else {}
     )
-    kind, drives = type(said).__name__, drives_of(said)
-    if drives and drives[0] is not said:
+    kind, drives = type(spec).__name__, drives_of(spec)
+    if drives and drives[0] is not spec:
         kind, fields = DRIVES, {"drives": [_made(drive) for drive in drives]}
     elif kind in ("ndarray", "list", "tuple"):
-        kind, fields = "constant torques", {"torque": said}
-    elif isinstance(said, Mapping):
-        kind, fields = "constant torques", dict(said)
+        kind, fields = "constant torques", {"torque": spec}
+    elif isinstance(spec, Mapping):
+        kind, fields = "constant torques", dict(spec)
     elif kind == "function":
-        kind, fields = "function (t, q, v)", {"function": said}
+        kind, fields = "function (t, q, v)", {"function": spec}
     return {"kind": kind, "made_with": {key: _plain(x) for key, x in fields.items()}}
 
 

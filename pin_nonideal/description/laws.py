@@ -139,19 +139,19 @@ class JointFriction:
         joints: Mapping[str, float | Mapping[str, object]] | Sequence[str] | None = None,
         **coefficients: object,
     ) -> list[JointFriction]:
-        """Friction of many joints, one law each, named after its joint.
+        """Return the friction of many joints: one law for each joint, with the joint's name.
 
         Args:
             scene: a Scene or a pinocchio.Model.
             joints: by joint name the dry friction `coulomb` or a table of coefficients, or names alone; None
                 for all joints of one degree of freedom.
-            **coefficients: of all of them, where a table does not give its own.
+            **coefficients: coefficients of all joints; a table replaces them for its joint.
 
         Returns:
             The laws, in the order of `joints` or of the model.
 
         Raises:
-            InputError: a coefficient is wrong, or all of a joint are zero.
+            InputError: a coefficient is invalid, or all coefficients of a joint are zero.
             UnknownNameError: there is no such joint.
         """
         model: Any = getattr(scene, "model", scene)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pin_nonideal.types import Array, Model
+
+from .scene_spec import SceneSpec
 
 
 class BoundDrive(NamedTuple):
@@ -38,13 +40,13 @@ class SceneDrive(ABC):
     name: str | None
 
     @abstractmethod
-    def bound(self, model: Model, q0: Array, said: Any) -> BoundDrive:
+    def bound(self, model: Model, q0: Array, spec: SceneSpec) -> BoundDrive:
         """Return the torques of the drive in a scene.
 
         Args:
             model: pinocchio.Model of the scene.
             q0: initial configuration of the scene, (nq,).
-            said: the `compilation.lowering.Descriptions` of the scene.
+            spec: descriptions of the scene.
 
         Raises:
             InputError, UnknownNameError: the drive does not fit the model.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -11,7 +10,7 @@ import pinocchio as pin
 from pin_nonideal.description.contacts.round import Segment
 from pin_nonideal.description.contacts.solids import CylinderContact
 from pin_nonideal.errors import InputError
-from pin_nonideal.types import Array
+from pin_nonideal.types import Array, Table
 from pin_nonideal.validation import Vector3
 
 from .shapes import Shape
@@ -63,9 +62,7 @@ def to_joint_frame(shape: Shape, x: float, y: float, z: float) -> tuple[float, f
     return a, b, c
 
 
-def sphere_contact(
-    at: Array, radius: float, frame: str, solid: Shape, options: dict[str, Any]
-) -> CylinderContact:
+def sphere_contact(at: Array, radius: float, frame: str, solid: Shape, options: Table) -> CylinderContact:
     """Return the contact of a sphere, or of a rounded corner, with a cylinder or cone."""
     assert solid.ends is not None
     half, below, above = solid.ends
@@ -84,7 +81,7 @@ def sphere_contact(
 
 
 def capsule_contact(
-    line: Segment, radius: float, frame: str, solid: Shape, options: dict[str, Any]
+    line: Segment, radius: float, frame: str, solid: Shape, options: Table
 ) -> CylinderContact:
     """Return the contact of a capsule, or of a rounded edge, with a cylinder or cone."""
     return replace(sphere_contact(np.array(line[0]), radius, frame, solid, options), end=line[1])

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import product
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -18,6 +17,7 @@ import pinocchio as pin
 from pin_nonideal.description.contacts.round import CapsuleContact, Segment
 from pin_nonideal.description.contacts.solids import CylinderContact, RevolvedContact
 from pin_nonideal.errors import InputError
+from pin_nonideal.types import Table
 from pin_nonideal.validation import Vector3
 
 from .cylinder import (
@@ -42,7 +42,7 @@ MIN_RIM_DISTANCE = 2.0
 
 
 def cylinder_contacts(
-    who: str, first: Shape, second: Shape, rounding: float | None, options: dict[str, Any]
+    who: str, first: Shape, second: Shape, rounding: float | None, options: Table
 ) -> list[CylinderContact | CapsuleContact | RevolvedContact]:
     """Return the contacts of two cylinders or cones.
 
@@ -144,9 +144,9 @@ def _chords(ring: list[Vector3]) -> list[Segment]:
     return list(zip(ring, ring[1:] + ring[:1], strict=True))
 
 
-def _pair(first: Shape, second: Shape, inset: float, options: dict[str, Any]) -> RevolvedContact:
+def _pair(first: Shape, second: Shape, inset: float, options: Table) -> RevolvedContact:
     """Return the contact of two cylinders, cones or disks that are rounded by the same radius."""
-    places: dict[str, Any] = {}
+    places: Table = {}
     for number, solid in ((1, first), (2, second)):
         assert solid.ends is not None
         half, below, above = solid.ends

@@ -21,7 +21,7 @@ from pin_nonideal.description.contacts.solids import (
     RimContact,
 )
 from pin_nonideal.errors import InputError
-from pin_nonideal.types import Array
+from pin_nonideal.types import Array, Table
 from pin_nonideal.validation import Vector3
 
 from .cylinder import (
@@ -58,7 +58,7 @@ MAX_CONTACTS = 1000
 
 
 def manifold(
-    who: str, first: Shape, second: Shape, rounding: float | None, base: str, options: dict[str, Any]
+    who: str, first: Shape, second: Shape, rounding: float | None, base: str, options: Table
 ) -> list[ManifoldContact]:
     """Return the contacts of one pair of shapes.
 
@@ -106,11 +106,11 @@ def manifold(
 
 
 def _half_space_contacts(
-    who: str, shape: Shape, ground: Shape, rounding: float | None, options: dict[str, Any]
+    who: str, shape: Shape, ground: Shape, rounding: float | None, options: Table
 ) -> Iterator[ManifoldContact]:
     """Yield the contacts of a shape with a half-space: corners, ends, points of faces, and rims."""
     assert ground.normal is not None
-    level: dict[str, Any] = {
+    level: Table = {
         "plane": None if ground.frame == "universe" else ground.frame,
         "normal": tuple(ground.normal.tolist()),
         "height": float(ground.normal @ ground.points[0]),
@@ -133,7 +133,7 @@ def _half_space_contacts(
 
 
 def _cylinder_manifold(
-    who: str, other: Shape, solid: Shape, rounding: float | None, options: dict[str, Any]
+    who: str, other: Shape, solid: Shape, rounding: float | None, options: Table
 ) -> list[ManifoldContact]:
     """Return the contacts of a capsule, box or convex mesh with a cylinder or cone.
 
@@ -173,7 +173,7 @@ def _cylinder_manifold(
 
 
 def _solid_manifold(
-    who: str, first: Shape, solid: Shape, rounding: float | None, options: dict[str, Any]
+    who: str, first: Shape, solid: Shape, rounding: float | None, options: Table
 ) -> list[ManifoldContact]:
     """Return the contacts of a box or convex mesh with a sphere, a capsule, a box or a convex mesh."""
     r2 = _edge_radius(who, [first, solid], rounding) if first.solid else 0.0
@@ -224,7 +224,7 @@ def _solid_contact(
     core: Array,
     radius: float,
     rounding: float,
-    options: dict[str, Any],
+    options: Table,
 ) -> BoxContact | HullContact:
     """Return the contact of a sphere or a point with a rounded box or mesh with these corners."""
     if target.half is not None:
@@ -234,7 +234,7 @@ def _solid_contact(
 
 
 def _box_contact(
-    ball: Shape, at: Array, box: Shape, radius: float, rounding: float, options: dict[str, Any]
+    ball: Shape, at: Array, box: Shape, radius: float, rounding: float, options: Table
 ) -> BoxContact:
     assert box.half is not None
     size = tuple((2.0 * box.half).tolist())

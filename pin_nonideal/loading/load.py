@@ -60,8 +60,8 @@ def load(
     Args:
         name: name of a robot, or a path, as above.
         terms: implementation of M(q) and the bias forces, "core" or "pinocchio", see `Scene`.
-        q0: initial configuration that replaces the file's: numbers (nq,), a table by joint name that changes
-            some of them (see `Scene`), or the name of a reference configuration. The keyframe of an MJCF file
+        q0: initial configuration that replaces the file's: numbers (nq,), a table of joints to change by
+            name (see `Scene`), or the name of a reference configuration. The keyframe of an MJCF file
             also sets velocities and controls.
         v0: initial velocity that replaces the file's: numbers (nv,), or a table by joint name. Projection
             onto the constraints holds the entries of these tables, or of the file's tables if none are given.

@@ -18,6 +18,8 @@ from pin_nonideal.states.parsing import named_coordinates, named_entries
 from pin_nonideal.types import Array, Model, Placement, State, Table
 from pin_nonideal.validation import sequence
 
+from .state import SceneStates
+
 KINDS = ("constraints", "laws", "contacts", "forces")
 
 
@@ -46,7 +48,7 @@ def parts_after(
         InputError: a list is no list of descriptions.
         UnknownNameError: there is no description of a name in `remove`.
     """
-    spec = compiled.said
+    spec = compiled.spec
     now: dict[str, tuple[Any, ...]] = {kind: tuple(getattr(spec, kind)) for kind in KINDS}
     names = dict(
         zip(("laws", "forces"), (unique_names(now[k], set()) for k in ("laws", "forces")), strict=True)
@@ -66,6 +68,44 @@ def parts_after(
         first = kept if new[kind] is None else sequence(f"replace: {kind}", new[kind])
         after[kind] = (*first, *sequence(f"replace: add_{kind}", added[kind]))
     return after
+
+
+def parts_of_replacement(
+    parts: Table,
+    compiled: CompiledScene,
+    states: SceneStates,
+    lists: Table,
+    added: Table,
+    remove: Iterable[str],
+    given: Table,
+) -> Table:
+    """Return the parts of a scene, as `copying.parts_of` does, after `Scene.replace`.
+
+    Args:
+        parts: parts of the scene before.
+        compiled: the compiled scene before.
+        states: states of the scene before.
+        lists: lists that replace present ones, by kind; None keeps a list.
+        added: lists that are appended, by kind.
+        remove: names of descriptions to leave out.
+        given: new actuation, or UNCHANGED; new "q0", "v0" and "name", or None for the present ones.
+
+    Raises:
+        InputError: a list is no list of descriptions, or a state does not fit the model.
+        UnknownNameError: there is no description of a name in `remove`.
+    """
+    made = parts["made"] | parts_after(compiled, lists, added, remove)
+    if not isinstance(given["actuation"], Unchanged):
+        made["actuation"] = given["actuation"]
+    if given["q0"] is not None:
+        made["q0"] = states.configuration(given["q0"], "replace: q0")
+    if given["v0"] is not None:
+        made["v0"] = states.velocity(given["v0"], "replace: v0")
+    if given["name"] is not None:
+        made["name"] = given["name"]
+    later = parts["later"] | {"table": None}
+    later["held"] = held_after(compiled.model, states.held, given["q0"], given["v0"])
+    return parts | {"made": made, "later": later}
 
 
 def held_after(model: Model, held: Held, q0: State | None, v0: State | None) -> Held:

@@ -15,12 +15,12 @@ from .state import SceneStates
 
 
 class Queries:
-    """Evaluates terms of the equation of motion; the closed initial state stands in for a missing one.
+    """Evaluation of terms of the equation of motion. The closed initial state is the default state.
 
     Args:
         compiled: the compiled scene.
         states: its states.
-        evaluator: evaluates it.
+        evaluator: evaluator of the scene.
         name: name of the scene in messages.
     """
 

@@ -2,63 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any, Literal, overload
+from collections.abc import Sequence
+from typing import Literal, overload
 
-import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from pin_nonideal.compilation.analysis import check_model
-from pin_nonideal.compilation.compiled_scene import CompiledScene
-from pin_nonideal.compilation.lowering import Descriptions
 from pin_nonideal.compilation.report import report
 from pin_nonideal.compilation.summary import Description, describe
-from pin_nonideal.core_loader import core
-from pin_nonideal.description.actuation import Actuation, given_actuation
+from pin_nonideal.description.actuation import Actuation
+from pin_nonideal.description.constraints import Constraint
 from pin_nonideal.description.contacts import Contact
 from pin_nonideal.description.forces import Force
 from pin_nonideal.description.laws import Law
 from pin_nonideal.equation import Solution
-from pin_nonideal.errors import InputError
-from pin_nonideal.geometry.from_model import GeometryContact, expand_geometry_contacts
+from pin_nonideal.geometry.from_model import GeometryContact
 from pin_nonideal.html_tables import names, table
-from pin_nonideal.states.held import Held
-from pin_nonideal.states.loop_closure import CLOSURE_TOLERANCE
 from pin_nonideal.states.report import ProjectionReport
-from pin_nonideal.types import Array, GeometryModel, Model, State, Table
-from pin_nonideal.validation import choice, nonnegative, number, optional_text, sequence
+from pin_nonideal.types import Array, State
+from pin_nonideal.validation import choice, number
 
-from .copying import copied, packed, parts_of, rebuilt
-from .editing import UNCHANGED, Unchanged, held_after, on_ground, parts_after
-from .evaluation import Evaluator
-from .queries import Queries
-from .shapes import SceneShapes
-from .state import InitialState, SceneStates
-from .stepping import SceneStepper, Stepper
+from .base import SceneBase, compiled_scene, scene_origin, scene_states, with_origin
+from .copying import rebuilt
+from .editing import UNCHANGED, Unchanged, on_ground, parts_of_replacement
+from .stepping import Stepper
 
-TERMS = tuple(provider.name for provider in core.Provider)
-IMPACTS = tuple(law.name for law in core.ImpactLaw)
-# Fields that cannot change after compilation.
-TAKEN = ("model", "constraints", "laws", "contacts", "forces", "actuation", "terms", "impact", "q0", "v0")
+__all__ = ["Scene", "compiled_scene", "scene_origin", "scene_states", "with_origin"]
 
 
-@dataclass(frozen=True)
-class Origin:
-    """Source of a scene, so that it can be made again.
-
-    Attributes:
-        table: name and parameters for `load`, or None.
-        shapes: functions that read the shapes for display and for collisions again, or None.
-        assembly_tolerance: assembly tolerance of the scene [m or rad].
-    """
-
-    table: Table | None
-    shapes: tuple[Any, Any] | None
-    assembly_tolerance: float
-
-
-class Scene:
+class Scene(SceneBase):
     """A Pinocchio model with constraints, laws, contacts, forces and actuation.
 
     The constructor checks all descriptions and removes rows that can never act.
@@ -112,90 +83,6 @@ class Scene:
         contact_friction: sliding, spinning and rolling coefficients of the collision geometry in the robot's
             file, by name.
     """
-
-    def __init__(
-        self,
-        model: Model,
-        *,
-        constraints: Sequence[Any] = (),
-        laws: Sequence[Law] = (),
-        contacts: Sequence[Contact | GeometryContact] = (),
-        forces: Sequence[Force] = (),
-        actuation: Actuation | None = None,
-        q0: State | None = None,
-        v0: State | None = None,
-        visual_model: GeometryModel | Callable[[], GeometryModel] | None = None,
-        collision_model: GeometryModel | Callable[[], GeometryModel] | None = None,
-        name: str | None = None,
-        notes: Sequence[str] = (),
-        source: str | None = None,
-        licence: str | None = None,
-        terms: str = "core",
-        impact: str = "newton",
-        assembly_tolerance: float = CLOSURE_TOLERANCE,
-    ) -> None:
-        if not isinstance(model, pin.Model):
-            raise InputError(f"Scene: model must be a pinocchio.Model; got {type(model).__name__}")
-        self.notes = list(sequence("notes", notes))
-        self._shapes = SceneShapes(visual_model, collision_model, self.notes)
-        self.model = model
-        self.name = optional_text("Scene: name", name) or model.name or "scene"
-        self.constraints, self.laws = sequence("constraints", constraints), sequence("laws", laws)
-        self.contacts = expand_geometry_contacts(sequence("contacts", contacts), model, collision_model)
-        self.forces = sequence("forces", forces)
-        self.actuation, self.terms = given_actuation(actuation), choice("Scene: terms", terms, TERMS)
-        self.impact = choice("Scene: impact", impact, IMPACTS)
-        self.contact_friction: dict[str, tuple[float, float, float]] = {}
-        self.source, self.licence = (
-            optional_text(f"Scene: {what}", value)
-            for what, value in (("source", source), ("licence", licence))
-        )
-        check_model(model)
-        initial = InitialState(model, q0, v0)
-        self.q0, self.v0 = initial.q, initial.v
-        tolerance = nonnegative("Scene: assembly_tolerance", assembly_tolerance)
-        lists = self.constraints, self.contacts, self.laws, self.forces
-        spec = Descriptions(*lists, self.actuation, terms, self.impact, tolerance)
-        compiled = CompiledScene(model, initial.q, spec, initial.is_given)
-        if initial.is_given:
-            compiled.check_functions(initial.q, initial.v, 0.0)
-        self.constraint_slices, self.anchor_frames = compiled.slices, compiled.anchors
-        self.contact_names = compiled.contact_names
-        self.element_names = compiled.program.element_names
-        self.law_names = compiled.program.law_names
-        self.dropped = compiled.dropped
-        if compiled.unprojected:
-            names = ", ".join(f'"{n}"' for n in compiled.unprojected)
-            self.notes.append(
-                f"{names}: no residual and no rate, so drift of these rows cannot be projected away"
-            )
-        self._origin = Origin(None, None, tolerance)
-        self._states = SceneStates(compiled, initial, self.name)
-        self._evaluator = Evaluator(compiled, self._states)
-        self._queries = Queries(compiled, self._states, self._evaluator, self.name)
-        self._stepper = SceneStepper(compiled, self._states, self._evaluator)
-        self._compiled = compiled
-
-    def __setattr__(self, key: str, value: Any) -> None:
-        if key in TAKEN and "_compiled" in self.__dict__:
-            raise InputError(
-                f'{key} of scene "{self.name}" is what the scene was made of and cannot be exchanged; make a '
-                f"new Scene with another {key}"
-            )
-        super().__setattr__(key, value)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return rebuilt, (type(self), packed(self._parts(), self.name))
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> Scene:
-        return copied(self, self._parts(), memo)  # type: ignore[no-any-return]
-
-    def _parts(self) -> Table:
-        return parts_of(self, self._origin, self._origin.shapes or self._shapes.sources, self._states.held)
-
-    def __setstate__(self, later: Table) -> None:
-        self._origin = Origin(later["table"], later["shapes"], self._origin.assembly_tolerance)
-        self.contact_friction, self._states.held = later["friction"], later["held"]
 
     def __repr__(self) -> str:
         return (
@@ -463,28 +350,16 @@ class Scene:
         """
         return self._stepper.stepper(period, q, v, t0, tau, method, dt, rtol, atol)
 
-    # --- shapes ---------------------------------------------------------------------------------------------
-
-    @property
-    def visual_model(self) -> GeometryModel | None:
-        """pinocchio.GeometryModel for the replay, or None; meshes of a file are read on first access."""
-        return self._shapes.visual
-
-    @property
-    def collision_model(self) -> GeometryModel | None:
-        """pinocchio.GeometryModel for collisions, or None; meshes are read on first access."""
-        return self._shapes.collision
-
     # --- new scenes -----------------------------------------------------------------------------------------
 
     def replace(
         self,
         *,
-        constraints: Sequence[Any] | None = None,
+        constraints: Sequence[Constraint] | None = None,
         laws: Sequence[Law] | None = None,
         contacts: Sequence[Contact | GeometryContact] | None = None,
         forces: Sequence[Force] | None = None,
-        add_constraints: Sequence[Any] = (),
+        add_constraints: Sequence[Constraint] = (),
         add_laws: Sequence[Law] = (),
         add_contacts: Sequence[Contact | GeometryContact] = (),
         add_forces: Sequence[Force] = (),
@@ -494,11 +369,10 @@ class Scene:
         v0: State | None = None,
         name: str | None = None,
     ) -> Scene:
-        """A new scene with some parts replaced, added or removed; this one stays as it is.
+        """Return a new scene with some parts replaced, added or removed. The present scene does not change.
 
-        Everything else is kept: model, shapes, notes, source and licence, named entries of the initial state.
-        `resume` and `Trajectory.load` cannot make the new scene from the robot's file alone: give them the
-        scene.
+        The new scene has the same model, shapes, notes, source, licence and named entries of the initial
+        state. `resume` and `Trajectory.load` cannot create it from the robot's file; pass the scene to them.
 
         Args:
             constraints: all constraints of the new scene; the present ones when None.
@@ -521,28 +395,19 @@ class Scene:
         Raises:
             InputError, UnknownNameError: something does not fit the model, or nothing has a name in `remove`.
         """
-        new = {"constraints": constraints, "laws": laws, "contacts": contacts, "forces": forces}
+        lists = {"constraints": constraints, "laws": laws, "contacts": contacts, "forces": forces}
         added = {
             "constraints": add_constraints,
             "laws": add_laws,
             "contacts": add_contacts,
             "forces": add_forces,
         }
-        parts = self._parts()
-        made = parts["made"] | parts_after(self._compiled, new, added, remove)
-        if not isinstance(actuation, Unchanged):
-            made["actuation"] = actuation
-        if q0 is not None:
-            made["q0"] = self._states.configuration(q0, "replace: q0")
-        if v0 is not None:
-            made["v0"] = self._states.velocity(v0, "replace: v0")
-        made["name"] = made["name"] if name is None else name
-        later = parts["later"] | {"table": None}
-        later["held"] = held_after(self.model, self._states.held, q0, v0)
-        return rebuilt(type(self), parts | {"made": made, "later": later})  # type: ignore[no-any-return]
+        given = {"actuation": actuation, "q0": q0, "v0": v0, "name": name}
+        parts = parts_of_replacement(self._parts(), self._compiled, self._states, lists, added, remove, given)
+        return rebuilt(type(self), parts)  # type: ignore[no-any-return]
 
     def put_on_ground(self, plane: str | None = None) -> Scene:
-        """A new scene whose floating robot is moved along a normal until its lowest collision shape touches.
+        """Return a new scene with its floating robot moved along a normal until a collision shape touches.
 
         The initial configuration is taken with loops closed. All floating bodies move by the same distance.
 
@@ -569,54 +434,3 @@ class Scene:
         credits = {"source": self.source, "licence": self.licence}
         notes += [f"{key}: {value}" for key, value in credits.items() if value]
         return report(self._compiled, self.name, rank, notes)
-
-
-def compiled_scene(scene: Scene) -> CompiledScene:
-    """Return the compiled scene.
-
-    Args:
-        scene: the scene.
-    """
-    return scene._compiled
-
-
-def scene_states(scene: Scene) -> SceneStates:
-    """Return the states of a scene.
-
-    Args:
-        scene: the scene.
-    """
-    return scene._states
-
-
-def scene_origin(scene: Scene) -> Origin:
-    """Origin of a scene.
-
-    Args:
-        scene: the scene.
-    """
-    return scene._origin
-
-
-def with_origin(
-    scene: Scene,
-    table: Table | None,
-    *,
-    shapes: tuple[Any, Any] | None = None,
-    friction: dict[str, tuple[float, float, float]] | None = None,
-    held: Held | None = None,
-) -> Scene:
-    """The scene with its origin, from which `resume` and other processes make it again.
-
-    Args:
-        scene: as made.
-        table: name and parameters for `load`, or None if a file cannot hold them.
-        shapes: functions that read its shapes again.
-        friction: coefficients of the file's collision geometry.
-        held: entries of the initial state that were named.
-    """
-    scene._origin = Origin(table, shapes, scene._origin.assembly_tolerance)
-    scene.contact_friction = friction or {}
-    if held is not None:
-        scene._states.held = held
-    return scene

@@ -1,4 +1,4 @@
-"""Shapes of a scene, made or read when something first asks for them."""
+"""Shapes of a scene, created or read on first access."""
 
 from __future__ import annotations
 

@@ -73,10 +73,10 @@ class SceneStates:
         self._start_notes: list[str] | None = None
 
     def require_unchanged(self) -> None:
-        """Check that the model has the numbers that the core took when the scene was made.
+        """Check that the model has the numbers with which the scene was compiled.
 
         Raises:
-            InputError: the model is no longer what it was.
+            InputError: the model has changed since.
         """
         if not self._compiled.program.is_of(self._model):
             raise InputError(

@@ -19,11 +19,11 @@ from pin_nonideal.validation import array, choice, nonnegative, number, positive
 from .evaluation import Evaluator
 from .state import SceneStates
 
-# The core's own methods, and those of them that take steps of a fixed length.
+# Methods of the core, and its methods with a fixed step.
 STEPPING = tuple(method.name for method in core.methods() if not method.outside)
 FIXED = tuple(method.name for method in core.methods() if not method.outside and not method.adaptive)
 RTOL, ATOL = 1e-8, 1e-10
-# Steps fit into a period if their number is whole but for so much.
+# Steps fit into a period if their number differs from a whole number by at most this part.
 WHOLE = 1e-9
 
 

@@ -23,7 +23,7 @@ from pin_nonideal.atomic_files import file_path, whole_file
 from pin_nonideal.compilation.actuation import initial_torque
 from pin_nonideal.compilation.delay import DelayedTorque
 from pin_nonideal.compilation.lowering import lower
-from pin_nonideal.compilation.resolver import Resolution
+from pin_nonideal.compilation.resolver import Resolver
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.actuation import delayed_control
 from pin_nonideal.errors import InputError, LoadingError, OutputError
@@ -189,7 +189,7 @@ def fingerprint(scene: Scene) -> str:
     """
     digest = hashlib.sha256((scene.model.saveToString() + scene.terms).encode())
     transcript: Any = _Transcript(core.Builder(scene.model), digest)
-    lower(compiled_scene(scene).said, transcript, Resolution(scene.model, scene.q0))
+    lower(compiled_scene(scene).spec, transcript, Resolver(scene.model, scene.q0))
     control = delayed_control(scene.actuation)
     if control is not None:  # the builder has no delay
         initial = initial_torque(control, scene.model).tolist()

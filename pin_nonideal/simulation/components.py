@@ -27,7 +27,7 @@ from pin_nonideal.description.forces import JointSpring, SpringDamper, Wrench
 from pin_nonideal.description.laws import Drag, JointFriction, SigmoidFriction
 from pin_nonideal.scene.scene import Scene, compiled_scene, scene_origin
 from pin_nonideal.states.parsing import named_configuration
-from pin_nonideal.types import Model
+from pin_nonideal.types import Model, Table
 
 Indices = NDArray[np.intp]
 # Descriptions that act only on the bodies that they name.
@@ -110,7 +110,7 @@ def _trees(model: Model) -> list[int]:
     return tree
 
 
-def _touched(one: Any, model: Model, tree: Sequence[int], anchors: dict[str, Any]) -> set[int]:
+def _touched(one: Any, model: Model, tree: Sequence[int], anchors: Table) -> set[int]:
     """Return the root joints of the trees that a description acts on."""
     roots: set[int] = set()
     for place in (f.name for f in fields(one) if f.name in PLACES):

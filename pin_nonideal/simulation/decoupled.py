@@ -17,11 +17,11 @@ from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.types import Array
 
 from .components import Component, components
-from .merge import joined_outcome
+from .merge import merge_outcomes
 from .options import METHODS, SCIPY, RunOptions
 
 
-def stepped_apart(scene: Scene, options: RunOptions) -> list[Component]:
+def decoupled_components(scene: Scene, options: RunOptions) -> list[Component]:
     """Return the components that take their own steps in a run; empty if all take common steps.
 
     Args:
@@ -62,7 +62,7 @@ def run_together(
     return outcome
 
 
-def run_apart(
+def run_decoupled(
     scene: Scene,
     parts: Sequence[Component],
     q0: Array,
@@ -89,15 +89,15 @@ def run_apart(
         if isinstance(stopped, core.CoreFailure):
             return None
         if stopped is not None:
-            return joined_outcome(scene, [], [], options, stopped)
+            return merge_outcomes(scene, [], [], options, stopped)
         outcomes.append(outcome)
-    return joined_outcome(scene, parts, outcomes, options)
+    return merge_outcomes(scene, parts, outcomes, options)
 
 
-def roll_apart(
+def rollout_decoupled(
     scene: Scene, parts: Sequence[Component], q0: Array, v0: Array, options: RunOptions, threads: int
 ) -> list[core.Outcome | None]:
-    """Return the result of `run_apart` for each of many states, on several threads.
+    """Return the result of `run_decoupled` for each of many states, on several threads.
 
     Args:
         scene: the whole scene.
@@ -116,7 +116,7 @@ def roll_apart(
     results: list[core.Outcome | None] = []
     for k, outcomes in enumerate(zip(*of_parts, strict=True)):
         if all(one is not None and one.stopped is None for one in outcomes):
-            results.append(joined_outcome(scene, parts, cast(list[core.Outcome], outcomes), options))
+            results.append(merge_outcomes(scene, parts, cast(list[core.Outcome], outcomes), options))
         else:  # a run in common steps reports the failure of the whole scene
             program = compiled_scene(scene).program
             results += core.rollout(program, q0[k : k + 1], v0[k : k + 1], options, 1, [], np.zeros((1, 0)))

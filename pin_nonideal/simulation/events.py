@@ -20,7 +20,7 @@ SEPARATE = "separate"
 SAME_TIME = 1e-12  # times closer than this are equal: relative, or absolute [s] below 1 s
 
 
-class Asked(NamedTuple):
+class RunRequests(NamedTuple):
     """Event functions of a run.
 
     Attributes:
@@ -34,10 +34,10 @@ class Asked(NamedTuple):
     separate: bool
 
 
-NOTHING = Asked([], (), False)
+NOTHING = RunRequests([], (), False)
 
 
-def asked_events(events: object) -> Asked:
+def parse_events(events: object) -> RunRequests:
     """Parse the `events` argument of `simulate`.
 
     Args:
@@ -66,7 +66,7 @@ def asked_events(events: object) -> Asked:
         names.append(name)
         who = f'event "{name}"'
         watched.append((_valued(f, who), _direction(f, who), _terminal(f, who)))
-    return Asked(watched, tuple(names), len(functions) < len(listed))
+    return RunRequests(watched, tuple(names), len(functions) < len(listed))
 
 
 def _valued(f: Callable[..., Any], who: str) -> Callable[..., float]:
@@ -92,7 +92,7 @@ def _terminal(f: Callable[..., Any], who: str) -> int:
     return count(f"{who}: terminal", given)
 
 
-def asked_callback(callback: object, nv: int) -> Callable[[float, Array, Array], Any] | None:
+def parse_callback(callback: object, nv: int) -> Callable[[float, Array, Array], Any] | None:
     """Wrap the callback between steps, with its result checked.
 
     Args:

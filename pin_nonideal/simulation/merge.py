@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from types import SimpleNamespace
-from typing import Any, NamedTuple, cast
+from typing import NamedTuple, cast
 
 import numpy as np
 
 from pin_nonideal.core_loader import core
 from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.trajectory.dense_output import DenseOutput, dense_output, inside_steps
-from pin_nonideal.types import Array
+from pin_nonideal.types import Array, Table
 
 from .components import Component
 from .options import RunOptions
@@ -20,7 +20,7 @@ COUNTERS = ("steps", "rejected", "evaluations", "factorizations", "projections",
 Motion = tuple[Array, Array, Array, Array, Array]  # states, modes, directions, sought, moved
 
 
-class JoinedEvent(NamedTuple):
+class MergedEvent(NamedTuple):
     """An event of one component, with the element index of the whole scene."""
 
     time: float
@@ -29,7 +29,7 @@ class JoinedEvent(NamedTuple):
     of_contact: bool = False
 
 
-def joined_outcome(
+def merge_outcomes(
     scene: Scene,
     parts: Sequence[Component],
     outcomes: Sequence[core.Outcome],
@@ -53,7 +53,7 @@ def joined_outcome(
     ]
     events = sorted(
         (
-            JoinedEvent(event.time, event.kind, int(part.elements[event.element]))
+            MergedEvent(event.time, event.kind, int(part.elements[event.element]))
             for one, part in zip(outcomes, parts, strict=True)
             for event in one.events
         ),
@@ -120,7 +120,7 @@ def _samples(
     directions: Array,
     sought: Array,
     moved: Array,
-) -> dict[str, Any]:
+) -> Table:
     """Return the samples as fields of a core outcome; states of a tree alone need no evaluation."""
     program, (nq, nv) = compiled_scene(scene).program, (scene.model.nq, scene.model.nv)
     asked = (

@@ -226,14 +226,14 @@ def check_values(
     flag("simulate: strict", strict)
 
 
-def kept_options(scene: Scene, *asked: Any) -> RunOptions:
+def cached_options(scene: Scene, *asked: Any) -> RunOptions:
     """Return cached options of `run_options`; controllers often repeat the same run.
 
     Args:
         scene: scene to simulate, which holds the cache.
         *asked: the other arguments of `run_options`, in order.
     """
-    kept: dict[Any, RunOptions] = scene.__dict__.setdefault("_kept_options", {})
+    kept: dict[Any, RunOptions] = scene.__dict__.setdefault("_cached_options", {})
     key = (asked, tuple(map(type, asked)))  # types separate True from 1.0
     try:
         if key in kept:

@@ -21,9 +21,10 @@ from pin_nonideal.errors import (
 from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.states.rows import gap_rows, rows_at
 from pin_nonideal.trajectory.dense_output import dense_output
+from pin_nonideal.trajectory.fields import with_defaults
 from pin_nonideal.trajectory.outcome import outcome_fields, outcome_stats
 from pin_nonideal.trajectory.records import UserEventRecord
-from pin_nonideal.trajectory.trajectory import Trajectory, with_defaults
+from pin_nonideal.trajectory.trajectory import Trajectory
 from pin_nonideal.types import Table
 
 from .events import exact_grid, grid_of

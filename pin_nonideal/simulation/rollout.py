@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pin_nonideal.compilation.parameter_overrides import RunNumbers, run_numbers
+from pin_nonideal.compilation.parameter_overrides import ParameterOverrides, parse_overrides
 from pin_nonideal.core_loader import core
 from pin_nonideal.errors import InputError, PinNonidealError, RunError, RunInterrupted, short_repr
 from pin_nonideal.scene.scene import Scene, compiled_scene, scene_states
@@ -18,7 +18,7 @@ from pin_nonideal.states.joint_layout import require_resolved
 from pin_nonideal.types import Array
 from pin_nonideal.validation import array, choice, count
 
-from .decoupled import roll_apart, stepped_apart
+from .decoupled import decoupled_components, rollout_decoupled
 from .options import SCIPY, RunOptions, run_options
 from .results import finish
 from .rollout_arrays import RunArrays, run_arrays
@@ -103,7 +103,7 @@ def rollout(
         raise InputError(f'rollout: method must be one of the core\'s; "{method}" runs in SciPy')
     if parameters and options.dense:
         raise InputError('rollout: record "dense" goes without parameters; take output_dt for more samples')
-    numbers = run_numbers(compiled_scene(scene), parameters or {}, len(starts_q))
+    numbers = parse_overrides(compiled_scene(scene), parameters or {}, len(starts_q))
     if choice("rollout: as_arrays", as_arrays, (True, False)):
         return _arrays(scene, starts_q, starts_v, numbers, options, threads, keep, record)
     results = _run(scene, starts_q, starts_v, numbers, options, threads)
@@ -153,7 +153,7 @@ def _arrays(
     scene: Scene,
     q: Array,
     v: Array,
-    numbers: RunNumbers,
+    numbers: ParameterOverrides,
     options: RunOptions,
     threads: int,
     keep: bool,
@@ -185,7 +185,7 @@ def _arrays(
 
 
 def _run(
-    scene: Scene, q: Array, v: Array, numbers: RunNumbers, options: RunOptions, threads: int
+    scene: Scene, q: Array, v: Array, numbers: ParameterOverrides, options: RunOptions, threads: int
 ) -> list[Any]:
     """Return the Trajectory or the error of each run."""
     begin = time.perf_counter()
@@ -202,8 +202,8 @@ def _run(
     rows = slice(None) if len(going) == len(q) else going
     started = np.ascontiguousarray(on[rows]), np.ascontiguousarray(v_on[rows])
     values = np.ascontiguousarray(numbers.values[rows])
-    if not numbers.names and (parts := stepped_apart(scene, options)):
-        outcomes = roll_apart(scene, parts, *started, options, threads)
+    if not numbers.names and (parts := decoupled_components(scene, options)):
+        outcomes = rollout_decoupled(scene, parts, *started, options, threads)
     else:
         program = compiled.program_of_runs(options.t0, by_thread=True)[0]
         outcomes = core.rollout(program, *started, options, threads, numbers.names, values)

@@ -8,13 +8,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from pin_nonideal.compilation.parameter_overrides import RunNumbers
+from pin_nonideal.compilation.parameter_overrides import ParameterOverrides
 from pin_nonideal.core_loader import core
 from pin_nonideal.errors import LoopClosureError, PinNonidealError, RunInterrupted, UserFunctionError
 from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.types import Array
 
-from .decoupled import roll_apart, stepped_apart
+from .decoupled import decoupled_components, rollout_decoupled
 from .options import RunOptions
 from .results import LEFT
 
@@ -61,7 +61,7 @@ class RunArrays:
 
 
 def run_arrays(
-    scene: Scene, q0: Array, v0: Array, numbers: RunNumbers, options: RunOptions, threads: int
+    scene: Scene, q0: Array, v0: Array, numbers: ParameterOverrides, options: RunOptions, threads: int
 ) -> RunArrays:
     """Simulate initial states that satisfy the constraints, and return their samples.
 
@@ -74,9 +74,11 @@ def run_arrays(
         threads: number of native threads.
     """
     n, compiled = len(q0), compiled_scene(scene)
-    parts = [] if numbers.names else stepped_apart(scene, options)
+    parts = [] if numbers.names else decoupled_components(scene, options)
     if parts:
-        outcomes = [one for one in roll_apart(scene, parts, q0, v0, options, threads) if one is not None]
+        outcomes = [
+            one for one in rollout_decoupled(scene, parts, q0, v0, options, threads) if one is not None
+        ]
         return _of_outcomes(scene, outcomes)
     numbers_of_runs = np.ascontiguousarray(numbers.values)
     program = compiled.program_of_runs(options.t0, by_thread=True)[0]

@@ -18,9 +18,9 @@ from pin_nonideal.trajectory.trajectory import Trajectory
 from pin_nonideal.types import State
 from pin_nonideal.validation import choice, nonnegative
 
-from .decoupled import run_apart, run_together, stepped_apart
-from .events import Asked, asked_callback, asked_events
-from .options import SCIPY, kept_options
+from .decoupled import decoupled_components, run_decoupled, run_together
+from .events import RunRequests, parse_callback, parse_events
+from .options import SCIPY, cached_options
 from .progress import progress_bar
 from .results import finish
 
@@ -85,8 +85,8 @@ def simulate(
             the grid.
         callback: function called as callback(t, q, v) before every step. True ends the run, torques (nv,)
             replace the actuation from this time on, and None changes nothing. Methods of the core only.
-        several: behavior if the laws admit several motions. "error" raises a FrictionParadoxError that holds
-            two of them. "continue" selects the motion nearest to the previous motion (at the start, the
+        several: behavior if the laws admit several motions. "error" raises a FrictionParadoxError with two
+            of the motions. "continue" selects the motion nearest to the previous motion (at the start, the
             motion of least friction) and records an event of kind "several". An element at rest that may
             also slip stays at rest in both cases, with such an event.
         strict: whether an impact that gains energy raises an ImpactEnergyError; Newton's law of restitution
@@ -115,11 +115,11 @@ def simulate(
     """
     if not isinstance(scene, Scene):
         raise InputError(f"simulate: scene must be a Scene; got {type(scene).__name__}")
-    asked, between = asked_events(events), asked_callback(callback, scene.model.nv)
+    asked, between = parse_events(events), parse_callback(callback, scene.model.nv)
     choice("simulate: progress", progress, (True, False, None))
     steps = (method, rtol, atol, dt, output_dt, max_steps)
     kept = (max_wall, asked.names, asked.separate)
-    options = kept_options(scene, duration, t0, *steps, record, several, *kept, strict)
+    options = cached_options(scene, duration, t0, *steps, record, several, *kept, strict)
     _check_together(method, asked, callback, checkpoint)
     nonnegative("simulate: checkpoint_interval", checkpoint_interval)
     if checkpoint is not None:
@@ -155,8 +155,8 @@ def simulate(
 
             outcome, stopped = simulate_stiff(scene, q0, v0, options, tick, asked.watched)
         else:
-            parts = [] if saver or between else stepped_apart(scene, options)
-            apart = run_apart(scene, parts, q0, v0, options, tick) if parts else None
+            parts = [] if saver or between else decoupled_components(scene, options)
+            apart = run_decoupled(scene, parts, q0, v0, options, tick) if parts else None
             # If a component fails, a run in common steps reports the failure.
             outcome = apart or run_together(
                 scene,
@@ -175,7 +175,7 @@ def simulate(
     return finish(scene, outcome, stopped, options, time.perf_counter() - begin, [*notes, *hints])
 
 
-def _check_together(method: str, asked: Asked, callback: object, checkpoint: object) -> None:
+def _check_together(method: str, asked: RunRequests, callback: object, checkpoint: object) -> None:
     """Check that method, events, callback and checkpoint can be combined.
 
     Raises:

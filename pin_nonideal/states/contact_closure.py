@@ -15,8 +15,8 @@ import numpy as np
 
 from pin_nonideal.types import Array
 
-from .least_distance import LeastMove, Numbers, least_move
-from .loop_closure import HALVINGS, ROUNDING, Closure, Place, Rows, Search
+from .least_distance import LeastDistance, Numbers, solve_ldp
+from .loop_closure import HALVINGS, ROUNDING, Closure, Iterate, Rows, Search
 
 STEPS, SETTLINGS, OPENINGS = 60, 8, 15
 # Steps end if the next step is shorter than this part of the displacement, since Newton's method squares it.
@@ -27,7 +27,7 @@ INSIDE = 10.0 * ROUNDING
 KEPT = 1e-4
 
 
-class SearchOutside(Search):
+class UnilateralClosure(Search):
     """Search for closures around a configuration without penetration.
 
     Args:
@@ -48,99 +48,99 @@ class SearchOutside(Search):
 
         self.rows = rows if len(touching) else self.loops
 
-    def _close(self, q: Array) -> Place:
+    def _close(self, q: Array) -> Iterate:
         """Close the loops and remove penetration; the result may still penetrate if the search fails."""
         self._hold(np.zeros(0, dtype=int))
         return self._step_out(super()._close(q))
 
-    def _is_closed(self, place: Place) -> bool:
+    def _is_closed(self, iterate: Iterate) -> bool:
         """Check if all rows are satisfied and no contact penetrates."""
-        return super()._is_closed(place) and self._depth(place) <= INSIDE
+        return super()._is_closed(iterate) and self._depth(iterate) <= INSIDE
 
-    def _settle(self, place: Place) -> Closure:
+    def _settle(self, iterate: Iterate) -> Closure:
         """Descend to a local minimum of the distance, with an update of the active gaps."""
-        known = place
+        known = iterate
         for _ in range(SETTLINGS):
             self._hold(np.zeros(0, dtype=int))
-            bare = self._place(place.q)
+            bare = self._place(iterate.q)
             found = self._least(bare, bare.move)
             if found is None:
                 break
             self._hold(found.touching)
-            start = self._retract(place.q)
+            start = self._retract(iterate.q)
             if start is None:
                 break
             closure = super()._settle(start)
             self._hold(np.zeros(0, dtype=int))
-            place = self._place(closure.q)
-            outside, further = self._depth(place) <= INSIDE, self._least(place, place.move)
+            iterate = self._place(closure.q)
+            outside, further = self._depth(iterate) <= INSIDE, self._least(iterate, iterate.move)
             if outside:
-                known = place
-            rounding = SHORT * self._distance(place) + ROUNDING * self.size
+                known = iterate
+            rounding = SHORT * self._distance(iterate) + ROUNDING * self.size
             if outside and further is not None and np.linalg.norm(further.x) <= rounding:
                 return closure
-            place = self._step_out(place)
+            iterate = self._step_out(iterate)
         return Closure(known.q, known.gap, self._distance(known), False, self.iterations)
 
-    def _gaps(self, place: Place) -> tuple[Array, Array]:
+    def _gaps(self, iterate: Iterate) -> tuple[Array, Array]:
         """Return rows and values of the gaps, in coordinates x in which |x| is the distance."""
-        G, gap = self.gaps(place.q)
-        return np.linalg.solve(place.half.T, G.T).T, gap
+        G, gap = self.gaps(iterate.q)
+        return np.linalg.solve(iterate.half.T, G.T).T, gap
 
-    def _least(self, place: Place, move: Array) -> LeastMove | None:
-        return least_move(place.B, place.phi, *self._gaps(place), move)
+    def _least(self, iterate: Iterate, move: Array) -> LeastDistance | None:
+        return solve_ldp(iterate.B, iterate.phi, *self._gaps(iterate), move)
 
-    def _step_out(self, place: Place) -> Place:
+    def _step_out(self, iterate: Iterate) -> Iterate:
         """Take steps to the nearest configuration without penetration, with a line search on the merit."""
         weight = 0.0
         for _ in range(STEPS):
-            step = self._least(place, place.move)
+            step = self._least(iterate, iterate.move)
             if step is None:
                 break
             length = float(np.linalg.norm(step.x))
-            if length <= SHORT * self._distance(place) + ROUNDING * self.size:
+            if length <= SHORT * self._distance(iterate) + ROUNDING * self.size:
                 break
             self.iterations += 1
             weight = max(weight, 2.0 * step.pull)
-            before, slope = self._merit(place, weight), self._slope_of_merit(place, step.x, weight)
+            before, slope = self._merit(iterate, weight), self._slope_of_merit(iterate, step.x, weight)
             for k in range(HALVINGS):
-                trial = self._place(self._go(place, step.x, 0.5**k))
+                trial = self._place(self._go(iterate, step.x, 0.5**k))
                 if self._merit(trial, weight) <= before + KEPT * 0.5**k * slope:
                     break
             else:
                 break
-            place = trial
-        return self._open(place)
+            iterate = trial
+        return self._open(iterate)
 
-    def _open(self, place: Place) -> Place:
+    def _open(self, iterate: Iterate) -> Iterate:
         """Remove remaining residuals and penetration by least displacements."""
         for _ in range(OPENINGS):
-            lacking = self._lacking(place)
-            step = self._least(place, np.zeros_like(place.move)) if lacking > 0.0 else None
+            lacking = self._lacking(iterate)
+            step = self._least(iterate, np.zeros_like(iterate.move)) if lacking > 0.0 else None
             if step is None:
                 break
-            trial = self._place(self._go(place, step.x))
+            trial = self._place(self._go(iterate, step.x))
             if not self._lacking(trial) < lacking:
                 break
-            place = trial
-        return place
+            iterate = trial
+        return iterate
 
-    def _depth(self, place: Place) -> float:
+    def _depth(self, iterate: Iterate) -> float:
         """Return the largest penetration."""
-        return -float(self._gaps(place)[1].min(initial=0.0))
+        return -float(self._gaps(iterate)[1].min(initial=0.0))
 
-    def _lacking(self, place: Place) -> float:
+    def _lacking(self, iterate: Iterate) -> float:
         """Return the largest residual or penetration."""
-        return max(place.gap, self._depth(place))
+        return max(iterate.gap, self._depth(iterate))
 
-    def _missed(self, place: Place) -> float:
+    def _missed(self, iterate: Iterate) -> float:
         """Return the sum of all residuals and penetrations."""
-        gap = self._gaps(place)[1]
-        return float(np.abs(place.phi).sum() - np.minimum(gap, 0.0).sum())
+        gap = self._gaps(iterate)[1]
+        return float(np.abs(iterate.phi).sum() - np.minimum(gap, 0.0).sum())
 
-    def _merit(self, place: Place, weight: float) -> float:
-        return 0.5 * float(place.move @ place.move) + weight * self._missed(place)
+    def _merit(self, iterate: Iterate, weight: float) -> float:
+        return 0.5 * float(iterate.move @ iterate.move) + weight * self._missed(iterate)
 
-    def _slope_of_merit(self, place: Place, x: Array, weight: float) -> float:
+    def _slope_of_merit(self, iterate: Iterate, x: Array, weight: float) -> float:
         """Return the derivative of the merit along x, which satisfies all linearized rows."""
-        return float(place.move @ x) - weight * self._missed(place)
+        return float(iterate.move @ x) - weight * self._missed(iterate)

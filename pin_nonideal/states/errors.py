@@ -59,7 +59,7 @@ def refuse_deep_starts(phi: Array, program: core.Program, allowed: float, t: flo
         )
 
 
-def no_way_out(phi: Array, program: core.Program, t: float) -> InputError:
+def penetration_error(phi: Array, program: core.Program, t: float) -> InputError:
     """Return the error of a contact with initial penetration that no short displacement removes.
 
     Args:
@@ -96,7 +96,7 @@ def open_loops(phi: Array, program: core.Program, t: float) -> LoopClosureError:
     )
 
 
-def lost_velocity(rate: Array, program: core.Program, t: float) -> InconsistentConstraintsError:
+def velocity_error(rate: Array, program: core.Program, t: float) -> InconsistentConstraintsError:
     """Return the error of constraint rates that no velocity satisfies.
 
     Args:

@@ -58,7 +58,7 @@ def order_words(model: Model) -> str | None:
     )
 
 
-def tell_order(model: Model, given: object, what: str, sizes: Literal["nqs", "nvs"]) -> None:
+def describe_order(model: Model, given: object, what: str, sizes: Literal["nqs", "nvs"]) -> None:
     """Warn if a list of joint values may have been written in the order of the file.
 
     Args:

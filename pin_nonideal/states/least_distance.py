@@ -21,7 +21,7 @@ LONGEST_WAY_OUT = 1e6
 Numbers = NDArray[np.intp]
 
 
-class LeastMove(NamedTuple):
+class LeastDistance(NamedTuple):
     """Step that gives the least total displacement.
 
     Attributes:
@@ -57,7 +57,7 @@ def complement(Vt: Array) -> Array:
     return Q[:, rank:]
 
 
-def least_move(B: Array, phi: Array, G: Array, gap: Array, move: Array) -> LeastMove | None:
+def solve_ldp(B: Array, phi: Array, G: Array, gap: Array, move: Array) -> LeastDistance | None:
     """Compute x with least |move + x|^2 under B x = -phi and gap + G x >= 0, or None if none is nearby.
 
     Args:
@@ -78,7 +78,7 @@ def least_move(B: Array, phi: Array, G: Array, gap: Array, move: Array) -> Least
     x = onto + back + open_directions @ out
     lam = U @ ((Vt @ (move + x - G.T @ pressed)) / s)
     pull = max(np.abs(lam).max(initial=0.0), pressed.max(initial=0.0))
-    return LeastMove(x, np.flatnonzero(pressed > 0.0), float(pull))
+    return LeastDistance(x, np.flatnonzero(pressed > 0.0), float(pull))
 
 
 def _way_out(C: Array, lacking: Array) -> tuple[Array | None, Array]:

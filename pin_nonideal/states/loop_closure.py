@@ -53,7 +53,7 @@ STARTS, FURTHER_STARTS, FAR, VERY_FAR = 24, 12, 0.05, 0.5
 MOST_STARTS, OFTEN, FEW_FREEDOMS = 60, 4, 12
 SPREADS = (0.1, 0.3, 0.5, 1.0)  # spreads of starts, in turn, over max(1 unit, displacement of best closure)
 # Smallest reciprocal condition number of the mass matrix. Closures below it (gimbal lock) are a fallback.
-WELL_CONDITIONED = 1e-10
+MIN_RCOND = 1e-10
 # Smallest divisor.
 TINY = 1e-300
 # Relative difference below which two distances are equal, and below which they belong to one closure.
@@ -81,7 +81,7 @@ class Closure(NamedTuple):
     iterations: int
 
 
-class Place(NamedTuple):
+class Iterate(NamedTuple):
     """Iterate of the search, in coordinates x in which |x| is the distance.
 
     Attributes:
@@ -148,7 +148,7 @@ class Search:
         """
         best: Closure | None = None
         fallback: Closure | None = None
-        open_place = self._place(self.q0)
+        open_iterate = self._place(self.q0)
         starts, further, often = STARTS, 0, 0
         generator = np.random.default_rng(0)  # a fixed seed makes the result deterministic
         most = MOST_STARTS if len(self.unit) <= FEW_FREEDOMS else 0
@@ -158,14 +158,14 @@ class Search:
             spread = longest * SPREADS[k % len(SPREADS)] * generator.standard_normal(len(self.unit))
             k += 1
             try:
-                place = self._close(self._integrate(self.q0, spread * self.unit) if k > 1 else self.q0)
-                if not self._is_closed(place):
-                    open_place = min(place, open_place, key=self._lacking)
+                iterate = self._close(self._integrate(self.q0, spread * self.unit) if k > 1 else self.q0)
+                if not self._is_closed(iterate):
+                    open_iterate = min(iterate, open_iterate, key=self._lacking)
                     continue
-                found = self._unwound(self._settle(place))
+                found = self._unwound(self._settle(iterate))
             except UserFunctionError:  # a user function raises on the path of this start
                 continue
-            if conditioning(self.mass(found.q)) <= WELL_CONDITIONED:
+            if conditioning(self.mass(found.q)) <= MIN_RCOND:
                 fallback = fallback if fallback and fallback.distance <= found.distance else found
                 continue
             if best is None:
@@ -183,8 +183,8 @@ class Search:
             return best._replace(iterations=self.iterations), known
         if fallback is not None:
             return fallback._replace(iterations=self.iterations), fallback.settled
-        lacking = self._lacking(open_place)
-        return Closure(open_place.q, lacking, self._distance(open_place), False, self.iterations), False
+        lacking = self._lacking(open_iterate)
+        return Closure(open_iterate.q, lacking, self._distance(open_iterate), False, self.iterations), False
 
     def _unwound(self, found: Closure) -> Closure:
         """Return the nearer of a closure and the closure without whole turns of its joints."""
@@ -192,40 +192,42 @@ class Search:
         turns = np.where(self.angles, np.round(move / TURN), 0.0)
         if not turns.any():
             return found
-        place = self._close(self._integrate(self.q0, move - TURN * turns))
-        return min(found, self._settle(place), key=lambda c: c.distance) if self._is_closed(place) else found
+        iterate = self._close(self._integrate(self.q0, move - TURN * turns))
+        return (
+            min(found, self._settle(iterate), key=lambda c: c.distance) if self._is_closed(iterate) else found
+        )
 
-    def _is_closed(self, place: Place) -> bool:
+    def _is_closed(self, iterate: Iterate) -> bool:
         """Check if all residuals are small enough for the core's Newton method."""
-        return self._lacking(place) <= CLOSED
+        return self._lacking(iterate) <= CLOSED
 
-    def _lacking(self, place: Place) -> float:
+    def _lacking(self, iterate: Iterate) -> float:
         """Return the largest residual."""
-        return place.gap
+        return iterate.gap
 
     def _longest(self, q: Array) -> float:
         """Return the longest displacement of a coordinate [units]."""
         return float((np.abs(self._difference(q)) / self.unit).max(initial=0.0))
 
-    def _place(self, q: Array) -> Place:
+    def _place(self, q: Array) -> Iterate:
         A, phi = self.rows(q)
         move = self.root @ self._difference(q)
         turned = pin.dDifference(self.model, self.q0, q, pin.ArgumentPosition.ARG1)
         turned = turned.reshape(self.model.nv, self.model.nv)
         half = self.root @ (turned if self.free is None else turned[np.ix_(self.free, self.free)])
-        return Place(q, move, half, np.linalg.solve(half.T, A.T).T, phi)
+        return Iterate(q, move, half, np.linalg.solve(half.T, A.T).T, phi)
 
     @staticmethod
-    def _distance(place: Place) -> float:
-        return float(np.linalg.norm(place.move))
+    def _distance(iterate: Iterate) -> float:
+        return float(np.linalg.norm(iterate.move))
 
-    def _go(self, place: Place, x: Array, part: float = 1.0) -> Array:
+    def _go(self, iterate: Iterate, x: Array, part: float = 1.0) -> Array:
         """Return the configuration after a displacement x, which is cut to one unit per coordinate."""
-        dq = np.linalg.solve(place.half, x)
+        dq = np.linalg.solve(iterate.half, x)
         longest = float((np.abs(dq) / self.unit).max(initial=0.0))
         if not np.isfinite(longest):
             raise np.linalg.LinAlgError("a move is not finite")
-        return self._integrate(place.q, dq * (part / max(longest, 1.0)))
+        return self._integrate(iterate.q, dq * (part / max(longest, 1.0)))
 
     def _integrate(self, q: Array, dq: Any) -> Array:
         """Return q with its free coordinates moved by dq."""
@@ -243,95 +245,97 @@ class Search:
 
     # --- onto the constraints -------------------------------------------------------------------------------
 
-    def _close(self, q: Array) -> Place:
+    def _close(self, q: Array) -> Iterate:
         """Close the loops by Levenberg-Marquardt steps x = -B^T (B B^T + damping I)^-1 phi."""
-        place, damping = self._place(q), DAMPING
+        iterate, damping = self._place(q), DAMPING
         for _ in range(CLOSING_STEPS):
-            if place.gap <= ROUNDING:
+            if iterate.gap <= ROUNDING:
                 break
             self.iterations += 1
-            G = place.B @ place.B.T
+            G = iterate.B @ iterate.B.T
             scale = max(float(np.trace(G)) / len(G), TINY)
-            x = -place.B.T @ np.linalg.solve(G + damping * scale * np.eye(len(G)), place.phi)
-            trial = self._place(self._go(place, x))
-            if np.linalg.norm(trial.phi) < np.linalg.norm(place.phi):
-                place, damping = trial, max(0.2 * damping, LEAST_DAMPING)
+            x = -iterate.B.T @ np.linalg.solve(G + damping * scale * np.eye(len(G)), iterate.phi)
+            trial = self._place(self._go(iterate, x))
+            if np.linalg.norm(trial.phi) < np.linalg.norm(iterate.phi):
+                iterate, damping = trial, max(0.2 * damping, LEAST_DAMPING)
                 if np.linalg.norm(x) < ROUNDING * ROUNDING * self.size:
                     break
             else:
                 damping *= 5.0
                 if damping > MOST_DAMPING:
                     break
-        return place
+        return iterate
 
-    def _retract(self, q: Array) -> Place | None:
+    def _retract(self, q: Array) -> Iterate | None:
         """Return to the constraints from nearby by least-norm Newton steps, or None on failure."""
-        place = self._place(q)
+        iterate = self._place(q)
         for _ in range(RETRACTIONS):
-            gap = place.gap
+            gap = iterate.gap
             if gap <= ROUNDING:
                 break
-            U, s, Vt = held(place.B)
-            trial = self._place(self._go(place, -Vt.T @ ((U.T @ place.phi) / s)))
+            U, s, Vt = held(iterate.B)
+            trial = self._place(self._go(iterate, -Vt.T @ ((U.T @ iterate.phi) / s)))
             if not trial.gap < gap:
                 break
-            place = trial
-        return place if place.gap <= CLOSED else None
+            iterate = trial
+        return iterate if iterate.gap <= CLOSED else None
 
     # --- along the constraints ------------------------------------------------------------------------------
 
-    def _settle(self, place: Place) -> Closure:
+    def _settle(self, iterate: Iterate) -> Closure:
         """Descend to a local minimum of the distance; return the start if the descent ends at a corner."""
-        found, settled = self._slide(place)
+        found, settled = self._slide(iterate)
         if not settled and self._has_corner(found):
-            found = place
+            found = iterate
         return Closure(found.q, found.gap, self._distance(found), settled, self.iterations)
 
-    def _slide(self, place: Place) -> tuple[Place, bool]:
+    def _slide(self, iterate: Iterate) -> tuple[Iterate, bool]:
         """Apply Newton's method for the Lagrangian in the open directions; return if it ends in a minimum."""
         settled = False
         for _ in range(SLIDES):
-            U, s, Vt = held(place.B)
+            U, s, Vt = held(iterate.B)
             open_directions = complement(Vt)
-            slope = open_directions.T @ place.move
-            lam = -U @ ((Vt @ place.move) / s)
-            flat = np.linalg.norm(slope) <= STATIONARY * self._distance(place) + ROUNDING * self.size
-            curvature, directions = self._curvature(place, lam, open_directions)
+            slope = open_directions.T @ iterate.move
+            lam = -U @ ((Vt @ iterate.move) / s)
+            flat = np.linalg.norm(slope) <= STATIONARY * self._distance(iterate) + ROUNDING * self.size
+            curvature, directions = self._curvature(iterate, lam, open_directions)
             if flat and curvature.min(initial=1.0) >= -SADDLE:
                 settled = len(curvature) <= MANY_FREEDOMS
                 break
             self.iterations += 1
             if flat:
-                x = ESCAPE * self._unit_length(place, directions[:, 0]) * directions[:, 0]
-                trial = self._downhill(place, x, 0.0) or self._downhill(place, -x, 0.0)
+                x = ESCAPE * self._unit_length(iterate, directions[:, 0]) * directions[:, 0]
+                trial = self._downhill(iterate, x, 0.0) or self._downhill(iterate, -x, 0.0)
             else:
-                parts = directions.T @ place.move
+                parts = directions.T @ iterate.move
                 x = -directions @ (parts / np.maximum(np.abs(curvature), LEAST_CURVATURE))
-                trial = self._downhill(place, x, float(np.linalg.norm(slope)))
+                trial = self._downhill(iterate, x, float(np.linalg.norm(slope)))
             if trial is None:
                 # Neither distance nor slope decreases, so the remaining slope may be rounding.
-                settled = bool(np.linalg.norm(slope) <= 1e3 * STATIONARY * self._distance(place))
+                settled = bool(np.linalg.norm(slope) <= 1e3 * STATIONARY * self._distance(iterate))
                 break
-            place = trial
-        return place, settled
+            iterate = trial
+        return iterate, settled
 
-    def _has_corner(self, place: Place) -> bool:
+    def _has_corner(self, iterate: Iterate) -> bool:
         """Check if row directions change abruptly, as for a disk that lies flat."""
-        _, _, Vt = held(place.B)
-        slope = place.move - Vt.T @ (Vt @ place.move)
-        x = NEAR_CORNER * self._unit_length(place, slope) * slope
-        there = [self._place(self._go(place, side * x)).phi - side * (place.B @ x) for side in (1.0, -1.0)]
-        return bool(max(np.abs(phi - place.phi).max(initial=0.0) for phi in there) > CORNER * NEAR_CORNER)
+        _, _, Vt = held(iterate.B)
+        slope = iterate.move - Vt.T @ (Vt @ iterate.move)
+        x = NEAR_CORNER * self._unit_length(iterate, slope) * slope
+        there = [
+            self._place(self._go(iterate, side * x)).phi - side * (iterate.B @ x) for side in (1.0, -1.0)
+        ]
+        return bool(max(np.abs(phi - iterate.phi).max(initial=0.0) for phi in there) > CORNER * NEAR_CORNER)
 
-    def _unit_length(self, place: Place, x: Array) -> float:
+    def _unit_length(self, iterate: Iterate, x: Array) -> float:
         """Return the factor of x at which the first coordinate moves by its unit."""
-        return 1.0 / max(float((np.abs(np.linalg.solve(place.half, x)) / self.unit).max()), TINY)
+        return 1.0 / max(float((np.abs(np.linalg.solve(iterate.half, x)) / self.unit).max()), TINY)
 
-    def _downhill(self, place: Place, x: Array, slope: float) -> Place | None:
+    def _downhill(self, iterate: Iterate, x: Array, slope: float) -> Iterate | None:
         """Backtrack along x until the distance falls, or, if it changes by rounding only, the slope falls."""
-        distance = self._distance(place)
+        distance = self._distance(iterate)
         for k in range(HALVINGS):
-            trial = self._retract(self._go(place, x, 0.5**k))
+            trial = self._retract(self._go(iterate, x, 0.5**k))
             if trial is None:
                 continue
             now = self._distance(trial)
@@ -341,29 +345,29 @@ class Search:
                 return trial
         return None
 
-    def _slope(self, place: Place) -> float:
+    def _slope(self, iterate: Iterate) -> float:
         """Return the norm of the displacement in the open directions."""
-        _, _, Vt = held(place.B)
-        return float(np.linalg.norm(place.move - Vt.T @ (Vt @ place.move)))
+        _, _, Vt = held(iterate.B)
+        return float(np.linalg.norm(iterate.move - Vt.T @ (Vt @ iterate.move)))
 
-    def _curvature(self, place: Place, lam: Array, open_directions: Array) -> tuple[Array, Array]:
+    def _curvature(self, iterate: Iterate, lam: Array, open_directions: Array) -> tuple[Array, Array]:
         """Return ascending second derivatives of the Lagrangian in the open directions, and directions."""
         n = open_directions.shape[1]
         if n == 0 or n > MANY_FREEDOMS:
             return np.ones(n), open_directions
-        here, H = self._gradient(place, lam), np.empty((n, n))
+        here, H = self._gradient(iterate, lam), np.empty((n, n))
         for k in range(n):
             x = open_directions[:, k]
-            h = DIFFERENCE * self._unit_length(place, x)
-            there = self._gradient(self._place(self._go(place, h * x)), lam)
-            H[:, k] = open_directions.T @ np.linalg.solve(place.half.T, (there - here) / h)
+            h = DIFFERENCE * self._unit_length(iterate, x)
+            there = self._gradient(self._place(self._go(iterate, h * x)), lam)
+            H[:, k] = open_directions.T @ np.linalg.solve(iterate.half.T, (there - here) / h)
         values, vectors = np.linalg.eigh(0.5 * (H + H.T))
         return values, open_directions @ vectors
 
     @staticmethod
-    def _gradient(place: Place, lam: Array) -> Array:
+    def _gradient(iterate: Iterate, lam: Array) -> Array:
         """Return the gradient of |move|^2/2 + lam . phi, in tangent coordinates."""
-        gradient: Array = place.half.T @ (place.move + place.B.T @ lam)
+        gradient: Array = iterate.half.T @ (iterate.move + iterate.B.T @ lam)
         return gradient
 
 

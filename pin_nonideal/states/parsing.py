@@ -17,7 +17,7 @@ from pin_nonideal.types import Array, Model, State
 from pin_nonideal.validation import array, by_name, number
 
 from .joint_layout import CIRCLES, configuration, unit_parts
-from .joint_order import tell_order
+from .joint_order import describe_order
 
 # A hand-written quaternion within this distance of unit length is normalized; others are errors.
 WRITTEN_UNIT_TOLERANCE = 1e-3
@@ -86,7 +86,7 @@ def named_configuration(
             raise UnknownNameError(f'{what}: no reference configuration "{given}"{nearest(given, known)}')
         return np.array(model.referenceConfigurations[given])
     if not isinstance(given, Mapping):
-        tell_order(model, given, what, "nqs")
+        describe_order(model, given, what, "nqs")
         return configuration(model, given, what, parts)
     q = np.array(base)
     for name, value in given.items():
@@ -114,7 +114,7 @@ def named_velocity(model: Model, given: State, base: Array, what: str) -> Array:
         UnknownNameError: there is no such joint or piece.
     """
     if not isinstance(given, Mapping):
-        tell_order(model, given, what, "nvs")
+        describe_order(model, given, what, "nvs")
         return np.array(array(what, given, (model.nv,)))
     v = np.array(base)
     for name, value in given.items():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from contextlib import suppress
 from copy import copy
 
@@ -11,11 +11,11 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from pin_nonideal.core_loader import core
-from pin_nonideal.errors import InputError, PinNonidealError, UserFunctionError
+from pin_nonideal.errors import InputError, PinNonidealError
 from pin_nonideal.types import Array, Model
 
-from .contact_closure import SearchOutside
-from .errors import largest_loop_gap, lost_velocity, no_way_out, open_loops, refuse_deep_starts
+from .closure_search import ClosureSearch, mass_function, metric
+from .errors import largest_loop_gap, open_loops, penetration_error, refuse_deep_starts, velocity_error
 from .held import (
     NOTHING_HELD,
     Held,
@@ -28,10 +28,10 @@ from .held import (
     told_coordinates,
     with_entries,
 )
-from .loop_closure import CLOSURE_TOLERANCE, FAR, WELL_CONDITIONED, Closure, Rows, Search, conditioning
+from .loop_closure import CLOSURE_TOLERANCE, FAR, Closure
 from .report import ProjectionReport, report_of
-from .rows import copies, gap_rows, holonomic_rows, rows_at
-from .scales import VANISHING, chain, coordinate, largest_body, slides
+from .rows import gap_rows, holonomic_rows, rows_at
+from .scales import chain, coordinate, largest_body, slides
 
 # Largest remaining rate of consistent rows, relative to 1 + |v|.
 RATE_TOLERANCE = 1e-6
@@ -48,10 +48,6 @@ INSIDE = 1e-12
 # Largest initial penetration, relative to the length of the mechanism or to 1 m if the mechanism is longer.
 # Deeper penetration cannot be rounding of a pose.
 DEEP = 1e-2
-# Inertia that the metric gains if M is singular, relative to the largest inertia.
-LEAST_INERTIA = 1e-9
-# Parts of a displacement at which rows are sampled. If a user function raises, the next part is tried.
-NEARER = (1.0, 0.1, 1e-2, 1e-3)
 # Maximum number of degrees of freedom for a search, which takes minutes above it. Newton's method is then
 # tried from any residual.
 MANY_FREEDOMS = 300
@@ -131,7 +127,12 @@ class Projection:
                 q,
                 v,
                 report_of(
-                    self.model, self.unit, _mass(self.model, self.program.runner()), (q, v), (q, v), held
+                    self.model,
+                    self.unit,
+                    mass_function(self.model, self.program.runner()),
+                    (q, v),
+                    (q, v),
+                    held,
                 ),
             )
         self.measure_at(q)
@@ -152,12 +153,20 @@ class Projection:
                 iterations, nearest = iterations + search[0], search[1]
             _, v_on, _, _, rate = runner.project(on, v, t, np.inf)
         if not rate <= RATE_TOLERANCE * min(1.0, self.length) * (1.0 + _largest(v_on)):
-            raise lost_velocity(rows_at(runner, on, v_on, t)[3], self.program, t)
-        mass = _mass(self.model, runner)
+            raise velocity_error(rows_at(runner, on, v_on, t)[3], self.program, t)
+        mass = mass_function(self.model, runner)
         if held.v is not None and changes(v, v_on, held.v):
             with suppress(*(() if held.firm_v else (InputError,))):
                 v_on = holding(
-                    self.model, self.program, on, v, held.v, ~self._gaps, self._metric(mass(on)), self.unit, t
+                    self.model,
+                    self.program,
+                    on,
+                    v,
+                    held.v,
+                    ~self._gaps,
+                    metric(mass(on), self.unit),
+                    self.unit,
+                    t,
                 )
         return (
             on,
@@ -218,7 +227,7 @@ class Projection:
         inside = not self._is_outside(q, phi) and largest_loop_gap(phi, self.program) <= self._closed
         far = (np.abs(pin.difference(self.model, q, found)) > FAR * self.unit).any()
         if inside and (not met or (far and not nearest)):
-            raise no_way_out(phi, self.program, t)
+            raise penetration_error(phi, self.program, t)
         if not met:
             raise open_loops(now, self.program, t)
 
@@ -330,78 +339,10 @@ class Projection:
             and self._is_outside(newton, self._residuals(runner, newton, t))
         ):
             return Closure(newton, 0.0, 0.0, False, 0), False
-        mass, unit = _mass(self.model, runner), self._unit_at(runner, q, t)
-        try:
-            own = np.ones(self.model.nv, dtype=bool) if free is None else free
-            block = np.ix_(own, own)
-            loops = self._rows(runner, q, t, unit, self._loops, own)
-            given = (
-                self.model,
-                loops,
-                lambda q: mass(q)[block],
-                self._metric(mass(q))[block],
-                unit[own],
-                np.logical_not(self._slides)[own],
-                q,
-                free,
-            )
-            if not self._has_gaps:
-                return Search(*given).nearest()
-            return SearchOutside(self._rows(runner, q, t, unit, self._gaps, own), *given).nearest()
-        except np.linalg.LinAlgError:  # a number overflowed: no closure
-            return Closure(q, np.inf, 0.0, False, 0), False
-
-    def _unit_at(self, runner: core.Runner, q: Array, t: float) -> Array:
-        """Return the units of a search; slide units cover the least displacements that close single rows."""
-        A, _, phi, _ = rows_at(runner, q, np.zeros(self.model.nv), t)
-        phi = np.where(self._gaps, np.minimum(phi, 0.0), phi)
-        weighted = A * self.unit
-        reach = np.linalg.norm(weighted, axis=1)
-        most = np.abs(weighted[:, self._slides]).max(axis=1, initial=0.0)
-        acts = reach > VANISHING * reach.max(initial=0.0)
-        far = self.length * np.divide(np.abs(phi) * most, reach**2, out=np.zeros_like(phi), where=acts)
-        return np.where(self._slides, max(self.length, _largest(far)), 1.0)
-
-    def _rows(
-        self,
-        runner: core.Runner,
-        q: Array,
-        t: float,
-        unit: Array,
-        wanted: NDArray[np.bool_],
-        free: NDArray[np.bool_],
-    ) -> Rows:
-        """Return the wanted rows of free coordinates over their scales, without duplicate and zero rows."""
-        zero, generator = np.zeros(self.model.nv), np.random.default_rng(1)
-        moves = [unit * generator.standard_normal(self.model.nv) for _ in range(3)]
-        samples = [self._sample(runner, q, move, t) for move in moves]
-        weighted = np.hstack([A * unit for A, _, _, _ in samples])
-        reach = np.abs(weighted).max(axis=1, initial=0.0)
-        used = wanted & (reach > VANISHING * reach.max(initial=0.0))
-        wide = np.hstack([weighted, np.column_stack([phi for _, _, phi, _ in samples])])
-        used[[row for row, _, _ in copies(wide, used, weighted.shape[1])]] = False
-        scale = 1.0 / reach[used]
-
-        def rows(q: Array) -> tuple[Array, Array]:
-            A, _, phi, _ = rows_at(runner, q, zero, t)
-            return A[np.ix_(used, free)] * scale[:, None], phi[used] * scale
-
-        return rows
-
-    def _sample(
-        self, runner: core.Runner, q: Array, move: Array, t: float
-    ) -> tuple[Array, Array, Array, Array]:
-        """Return the rows after a displacement; it is shortened if a user function raises."""
-        for part in NEARER:
-            with suppress(UserFunctionError):
-                return rows_at(runner, pin.integrate(self.model, q, part * move), np.zeros(self.model.nv), t)
-        return rows_at(runner, q, np.zeros(self.model.nv), t)
-
-    def _metric(self, M: Array) -> Array:
-        """Return M, with a small inertia added to each coordinate if M is singular."""
-        if conditioning(M) > WELL_CONDITIONED:
-            return M
-        return M + np.diag(LEAST_INERTIA * (np.diag(M) * self.unit**2).max() / self.unit**2)
+        search = ClosureSearch(
+            self.model, runner, t, self.unit, self.length, self._slides, self._gaps, self._loops
+        )
+        return search.nearest(q, free)
 
     def _furthest(self, move: Array) -> int:
         """Return the coordinate with the largest displacement over its unit."""
@@ -454,12 +395,6 @@ def nearest_closure(
         on = projection._search(runner, q, 0.0, None)[0].q
         before, after = np.inf, _largest(rows_at(runner, on, zero, 0.0)[2])
     return (on, after) if after <= before else (q, before)
-
-
-def _mass(model: Model, runner: core.Runner) -> Callable[[Array], Array]:
-    """Return the mass matrix as a function q -> M, (nv, nv)."""
-    n, zero = model.nv, np.zeros(model.nv)
-    return lambda q: runner.terms(q, zero)[0].reshape(n, n)
 
 
 def _largest(values: Array) -> float:

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from pin_nonideal.description.scene_spec import SceneSpec
 from pin_nonideal.errors import InputError
 from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.states.held import Held, settled
@@ -43,7 +44,7 @@ class ClosedReference:
         driven: names of the driven joints.
         dofs: mask of their degrees of freedom, (nv,).
         who: words for messages.
-        by_name: whether the coordinates are given by name, so that all of them must be kept, up to rounding.
+        by_name: whether the coordinates are given by name; projection then holds all of them up to rounding.
         rounding: rounding of times at the ends, see `ReferenceMotion`.
 
     Raises:
@@ -187,13 +188,13 @@ class ClosedReference:
         return np.asarray(x)
 
 
-def without_drives(model: Any, q0: Array, said: Any, who: str) -> Scene:
+def without_drives(model: Any, q0: Array, spec: SceneSpec, who: str) -> Scene:
     """Return a scene with the constraints, laws and forces of another, without contacts and actuation.
 
     Args:
         model: pinocchio.Model.
         q0: initial configuration, (nq,).
-        said: descriptions of the other scene.
+        spec: descriptions of the other scene.
         who: words for messages.
 
     Raises:
@@ -201,12 +202,12 @@ def without_drives(model: Any, q0: Array, said: Any, who: str) -> Scene:
     """
     scene = Scene(
         model,
-        constraints=said.constraints,
-        laws=said.laws,
-        forces=said.forces,
+        constraints=spec.constraints,
+        laws=spec.laws,
+        forces=spec.forces,
         q0=q0,
-        terms=said.terms,
-        assembly_tolerance=said.assembly_tolerance,
+        terms=spec.terms,
+        assembly_tolerance=spec.assembly_tolerance,
     )
     program = compiled_scene(scene).program
     for c in program.constraints:

@@ -109,7 +109,7 @@ def _overloaded(scene: Scene, cones: LimitCones, factor: float) -> str:
 
 
 def _unheld(scene: Scene, at_rest: AtRest, q: Array, cones: LimitCones) -> str:
-    """Return the joint, the contacts or the elements that cannot hold, whatever the friction limits are."""
+    """Return the joint, the contacts or the elements that cannot hold for any friction limits."""
     if not cones.holds:
         force, way = at_rest.forces(q), cones.unheld
         shares = force * way

@@ -18,11 +18,12 @@ from pin_nonideal.description.actuation import (
     sample_times,
 )
 from pin_nonideal.description.scene_drive import BoundDrive, SceneDrive
+from pin_nonideal.description.scene_spec import SceneSpec
 from pin_nonideal.errors import InputError
 from pin_nonideal.states.joint_layout import joint_places
 from pin_nonideal.states.parsing import joint_named, named_configuration_samples, named_joint_samples
 from pin_nonideal.states.reference_motion import TIME_ROUNDING, ReferenceMotion, break_times
-from pin_nonideal.types import Array, Model
+from pin_nonideal.types import Array, Model, Table
 from pin_nonideal.validation import by_name, choice, label, optional_text, positive, sequence, text
 
 from .closed_reference import ClosedReference, without_drives
@@ -91,7 +92,7 @@ class TrackTrajectory(SceneDrive):
         optional_text("TrackTrajectory: name", self.name)
         who = label(self)
         times = sample_times(who, self.times)
-        given: dict[str, Any] = {"times": times, "q": checked_samples(f"{who}: q", self.q, times.size)}
+        given: Table = {"times": times, "q": checked_samples(f"{who}: q", self.q, times.size)}
         if self.v is not None:
             given["v"] = checked_samples(f"{who}: v", self.v, times.size)
             _require_same_joints(who, given["q"], given["v"])
@@ -105,13 +106,13 @@ class TrackTrajectory(SceneDrive):
         for key, value in given.items():
             object.__setattr__(self, key, value)
 
-    def bound(self, model: Model, q0: Array, said: Any) -> BoundDrive:
+    def bound(self, model: Model, q0: Array, spec: SceneSpec) -> BoundDrive:
         """Return the torques of the drive in a scene.
 
         Args:
             model: pinocchio.Model of the scene.
             q0: initial configuration of the scene, (nq,).
-            said: the `compilation.lowering.Descriptions` of the scene.
+            spec: descriptions of the scene.
 
         Raises:
             InputError, UnknownNameError: the drive does not fit the model.
@@ -130,7 +131,7 @@ class TrackTrajectory(SceneDrive):
             motion = ReferenceMotion(model, times, q, v, rounding)
             tracking = _Tracking(model, motion, given, driven, kp, kd, self.feedforward)
             return BoundDrive(tracking, driven, breaks)
-        scene = without_drives(model, q0, said, who)
+        scene = without_drives(model, q0, spec, who)
         names = [place.name for place in joint_places(model) if driven[place.v_first]]
 
         def reference() -> ClosedReference:

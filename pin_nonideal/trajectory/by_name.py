@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pinocchio as pin
 
@@ -13,11 +11,12 @@ from pin_nonideal.states.kinematics import frame_motion
 from pin_nonideal.types import Array
 from pin_nonideal.validation import choice, text
 
+from .fields import RunFields, reactions_of
 from .frame_reaction import carrier_of, frame_reaction
 from .records import FrameRecord, JointRecord, LawRecord, angles
 
 
-def joint_record(run: Any, name: str) -> JointRecord:
+def joint_record(run: RunFields, name: str) -> JointRecord:
     """Return the record of one joint; see `Trajectory.joint`."""
     name = text("joint: name", name)
     floating = [place for place in run.joints if place.kind == "JointModelFreeFlyer"]
@@ -37,7 +36,7 @@ def joint_record(run: Any, name: str) -> JointRecord:
     return JointRecord(place.name, *parts)  # type: ignore[arg-type]
 
 
-def frame_record(run: Any, name: str) -> FrameRecord:
+def frame_record(run: RunFields, name: str) -> FrameRecord:
     """Return the record of one frame; see `Trajectory.frame`."""
     name = text("frame: name", name)
     if run.scene is None:
@@ -49,7 +48,7 @@ def frame_record(run: Any, name: str) -> FrameRecord:
     return FrameRecord(name, *frame_motion(model, name, run.q, run.v))
 
 
-def force_of(run: Any, name: str) -> Array:
+def force_of(run: RunFields, name: str) -> Array:
     """Return the force of one constraint or contact; see `Trajectory.force`."""
     name = text("force: name", name)
     if name not in run.rows:
@@ -64,7 +63,7 @@ def force_of(run: Any, name: str) -> Array:
     return multipliers
 
 
-def law_record(run: Any, name: str) -> LawRecord:
+def law_record(run: RunFields, name: str) -> LawRecord:
     """Return the record of one law; see `Trajectory.law`."""
     name = text("law: name", name)
     if name not in run.law_names:
@@ -83,32 +82,32 @@ def law_record(run: Any, name: str) -> LawRecord:
     return LawRecord(name, force, power, limit, mode)
 
 
-def reaction_of(run: Any, name: str, axes: str) -> Array:
+def reaction_of(run: RunFields, name: str, axes: str) -> Array:
     """Return the wrench of a joint, anchor or contact; see `Trajectory.reaction`."""
     name = text("reaction: name", name)
-    if not run.reactions.recorded:
+    if not reactions_of(run).recorded:
         raise InputError(f'reaction("{name}") needs a run with record="reactions"')
     begin = 6 * ("own", "world").index(choice("reaction: axes", axes, ("own", "world")))
     wrench: Array = _wrenches(run, name)[:, begin : begin + 6]
     return wrench
 
 
-def _wrenches(run: Any, name: str) -> Array:
+def _wrenches(run: RunFields, name: str) -> Array:
     """Wrenches of a joint, anchor or contact as recorded, or those through a fixed joint or frame."""
-    if name in run.reactions:
-        recorded: Array = run.reactions[name]
+    if name in reactions_of(run):
+        recorded: Array = reactions_of(run)[name]
         return recorded
     model = None if run.scene is None else run.scene.model
     if model is None or name == "universe" or not model.existFrame(name):
         frames = [] if model is None else [str(f.name) for f in model.frames][1:]
-        known = [*run.reactions, *frames]
+        known = [*reactions_of(run), *frames]
         lost = (
             "" if model is not None else "; fixed joints need the scene of the run, which this one has lost"
         )
         raise UnknownNameError(f'no joint, frame, anchor or contact "{name}"{nearest(name, known)}{lost}')
     index = carrier_of(model, name)
     if model.frames[index].type == pin.FrameType.JOINT:
-        of_joint: Array = run.reactions[str(model.frames[index].name)]
+        of_joint: Array = reactions_of(run)[str(model.frames[index].name)]
         return of_joint
     if run.a is None:
         raise InputError(f'reaction("{name}") of a fixed joint needs a run with record=("a", "reactions")')

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
-from typing import Any
+from collections.abc import Collection, Iterator, Sequence
+from typing import cast
 
 import numpy as np
 
+from pin_nonideal.states.joint_layout import JointPlace
 from pin_nonideal.types import Array
+
+from .by_name import joint_record, law_record
+from .fields import RunFields
 
 # Kinds of joints by prefix, with the units of their positions as `JointRecord` has them and of their rates.
 # Kinds that are not listed, such as composites, have unknown units.
@@ -30,7 +34,7 @@ EITHER_FORCE = (
 )
 
 
-def columns(run: Any) -> dict[str, Array]:
+def columns(run: RunFields) -> dict[str, Array]:
     """Return all recorded values as named columns, (nt,) each.
 
     Args:
@@ -39,7 +43,7 @@ def columns(run: Any) -> dict[str, Array]:
     return {name: values for name, (values, _) in _with_units(_all(run)).items()}
 
 
-def motion_columns(run: Any, fields: Collection[str]) -> dict[str, Array]:
+def motion_columns(run: RunFields, fields: Collection[str]) -> dict[str, Array]:
     """Return the columns of some fields of the joints and of the energies, (nt,) each.
 
     Args:
@@ -56,7 +60,7 @@ def motion_columns(run: Any, fields: Collection[str]) -> dict[str, Array]:
     return table
 
 
-def units(run: Any) -> dict[str, str]:
+def units(run: RunFields) -> dict[str, str]:
     """Unit of each column, "1" for numbers without one and empty if it is unknown.
 
     Args:
@@ -93,7 +97,7 @@ def _with_units(found: Iterator[tuple[str, Array, str]]) -> dict[str, tuple[Arra
     return table
 
 
-def _all(run: Any) -> Iterator[tuple[str, Array, str]]:
+def _all(run: RunFields) -> Iterator[tuple[str, Array, str]]:
     """Each column as its name, its values and its unit."""
     yield "t", run.t, "s"
     yield from _joints(run)
@@ -105,10 +109,10 @@ def _all(run: Any) -> Iterator[tuple[str, Array, str]]:
     yield from _others(run)
 
 
-def _joints(run: Any) -> Iterator[tuple[str, Array, str]]:
+def _joints(run: RunFields) -> Iterator[tuple[str, Array, str]]:
     """Yield the motion and the actuation of each joint."""
     for place in run.joints:
-        record = run.joint(place.name)
+        record = joint_record(run, place.name)
         position, rate = _motion(place)
         forces = [FORCE_OF.get(unit, "") for unit in rate]
         per = {"q": position, "tau": forces}
@@ -117,7 +121,7 @@ def _joints(run: Any) -> Iterator[tuple[str, Array, str]]:
             yield from _numbered(f"{place.name}.{field}", getattr(record, field), per[field])
 
 
-def _others(run: Any) -> Iterator[tuple[str, Array, str]]:
+def _others(run: RunFields) -> Iterator[tuple[str, Array, str]]:
     """Yield values of rows, elements, reactions and laws, energies, powers and violations."""
     for name, (first, end, _) in run.rows.items():
         for field in ("lam", "lam_ideal"):
@@ -127,7 +131,7 @@ def _others(run: Any) -> Iterator[tuple[str, Array, str]]:
     for k, name in enumerate(run.element_names):
         for field, of_all, unit in (("mode", run.modes, "1"), ("limit", run.limits, EITHER_FORCE)):
             if of_all is not None:
-                yield f"{name}.{field}", of_all[:, k], unit
+                yield f"{name}.{field}", cast("Array", of_all[:, k]), unit
     for name, values in (run.reactions or {}).items():
         yield from _numbered(f"{name}.reaction", values[:, :6], ["N"] * 3 + ["N m"] * 3)
     for field, unit in (("energy", "J"), ("power", "W")):
@@ -138,7 +142,7 @@ def _others(run: Any) -> Iterator[tuple[str, Array, str]]:
     yield "violation_rate", run.violation_rate, "m/s or rad/s"
 
 
-def _motion(place: Any) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def _motion(place: JointPlace) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Units of the positions and of the displacements of a joint."""
     for kind, position, rate in KINDS:
         if place.kind.startswith(kind):
@@ -146,18 +150,18 @@ def _motion(place: Any) -> tuple[tuple[str, ...], tuple[str, ...]]:
     return (), ("",) * place.nv
 
 
-def _by_dof(run: Any) -> Iterator[tuple[str, Array]]:
+def _by_dof(run: RunFields) -> Iterator[tuple[str, Array]]:
     """Yield the fields that have a column for each degree of freedom."""
     for field in ("F_ideal", "F_nonideal"):
         if getattr(run, field) is not None:
             yield field, getattr(run, field)
     for name in run.law_forces or ():
-        force = run.law(name).force
+        force = law_record(run, name).force
         assert force is not None
         yield f"C.{name}", np.asarray(force)
 
 
-def _numbered(name: str, values: Array | None, units: Any) -> Iterator[tuple[str, Array, str]]:
+def _numbered(name: str, values: Array | None, units: Sequence[str]) -> Iterator[tuple[str, Array, str]]:
     """Return one column under the given name, several columns under numbered names, or none for None."""
     if values is None:
         return

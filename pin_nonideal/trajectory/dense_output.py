@@ -29,7 +29,7 @@ class DenseOutput:
         times: start and end of each step [s], (n, 2).
         states: q, v, states of laws and work of the energy ledger at the points of each step, (n, points,
             size).
-        modes: modes of the frictional elements during each step, (n, ne).
+        modes: modes of the friction elements during each step, (n, ne).
         directions: slip directions of the elements at the points of each step, (n, points, 3 ne), or without
             columns if each element slips along one direction. Steps that did not solve for directions store
             those at their end.
@@ -130,7 +130,7 @@ def dense_output(outcome: core.Outcome, options: Any, nv: int, elements: int) ->
         outcome: result of the core.
         options: options of the run, a RunOptions.
         nv: number of velocities.
-        elements: number of frictional elements.
+        elements: number of friction elements.
     """
     times = outcome.dense_times.reshape(-1, 2)
     n = len(times)

@@ -22,6 +22,7 @@ from pin_nonideal.states.joint_layout import JointPlace
 from pin_nonideal.types import Table
 
 from .dense_output import DenseOutput
+from .fields import RunFields
 from .npz import npz_bytes
 from .records import LEDGER, Event, Stats, UserEventRecord
 
@@ -40,7 +41,7 @@ DENSE = ("times", "states", "modes", "directions", "sought", "torque", "moved")
 LISTS = ("element_names", "element_laws", "law_names", "law_dofs")
 
 
-def write(run: Any, path: str | os.PathLike[str]) -> Path:
+def write(run: RunFields, path: str | os.PathLike[str]) -> Path:
     """Write all arrays of a Trajectory to one .npz file, completely or not at all.
 
     Args:
@@ -65,7 +66,7 @@ def write(run: Any, path: str | os.PathLike[str]) -> Path:
     return target
 
 
-def to_bytes(run: Any) -> bytes:
+def to_bytes(run: RunFields) -> bytes:
     """Return the content of the file that `write` writes, without compression, for a large number of runs.
 
     Args:
@@ -76,7 +77,7 @@ def to_bytes(run: Any) -> bytes:
     return npz_bytes(arrays)
 
 
-def _arrays(run: Any) -> Table:
+def _arrays(run: RunFields) -> Table:
     """Return all arrays of a trajectory and its header, by their names in a file."""
     arrays: Table = {key: getattr(run, key) for key in REQUIRED}
     arrays |= {key: getattr(run, key) for key in OPTIONAL if getattr(run, key) is not None}
@@ -256,7 +257,7 @@ def _event(t: float, kind: str, element: str, change: float = 0.0, *vectors: Seq
     return Event(float(t), str(kind), str(element), impulse, float(change), before, after)
 
 
-def _extra_arrays(run: Any) -> Table:
+def _extra_arrays(run: RunFields) -> Table:
     """Return the arrays without a row for each sample, by name."""
     found: Table = {} if run.grid is None else {"grid": run.grid.astype(np.int8)}
     for k, record in enumerate(run.user_events):

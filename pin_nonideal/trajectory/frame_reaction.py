@@ -16,7 +16,7 @@ import pinocchio as pin
 
 from pin_nonideal.compilation.constraints import frames_of
 from pin_nonideal.compilation.contacts import lower_gaps
-from pin_nonideal.compilation.resolver import WORLD, Frame, Resolution
+from pin_nonideal.compilation.resolver import WORLD, Frame, Resolver
 from pin_nonideal.description.constraints import KnifeEdge, Rolling
 from pin_nonideal.description.forces import SpringDamper, Wrench
 from pin_nonideal.description.laws import Drag
@@ -24,6 +24,8 @@ from pin_nonideal.errors import InputError
 from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.states.kinematics import BodyMotions, frame_index
 from pin_nonideal.types import Array, Model
+
+from .fields import RunFields, reactions_of
 
 # Largest part of the forces on a body by which they may miss its recorded reaction.
 AGREES = 1e-6
@@ -86,7 +88,7 @@ def carrier_of(model: Model, name: str) -> int:
     return index
 
 
-def frame_reaction(run: Any, name: str, index: int) -> Array:
+def frame_reaction(run: RunFields, name: str, index: int) -> Array:
     """Compute the wrench through a frame at all samples, in its own axes and in world axes, (nt, 12).
 
     The wrench is Y a + v x* Y v of the part of the body beyond the frame, with a relative to free fall, plus
@@ -98,8 +100,8 @@ def frame_reaction(run: Any, name: str, index: int) -> Array:
         index: index of the frame.
 
     Raises:
-        InputError: the model or the scene does not tell what lies beyond the frame, or masses or gravity of
-            the run are not those of its scene.
+        InputError: the model or the scene does not determine the part beyond the frame, or masses or gravity
+            of the run differ from those of its scene.
     """
     who = f'reaction("{name}")'
     model = run.scene.model
@@ -109,9 +111,11 @@ def frame_reaction(run: Any, name: str, index: int) -> Array:
     bodies = [_whole_body(model, joint, loads)] if joint else []
     if not joint:  # the universe has no reaction; its children show the same masses and gravity
         bodies = [_whole_body(model, child, _on(run, child)) for child in part.children]
-    wrenches = np.empty((len(run), 12))
-    for k in range(len(run)):
-        motions = BodyMotions(model, run.q[k], run.v[k], run.a[k])
+    accelerations = run.a
+    assert accelerations is not None  # `by_name` checks it
+    wrenches = np.empty((len(run.t), 12))
+    for k in range(len(run.t)):
+        motions = BodyMotions(model, run.q[k], run.v[k], accelerations[k])
         for body in bodies:
             _require_recorded(run, k, motions, body, who)
         own = place.actInv(_balance(run, k, motions, part)[0])
@@ -120,19 +124,19 @@ def frame_reaction(run: Any, name: str, index: int) -> Array:
     return wrenches
 
 
-def _balance(run: Any, k: int, motions: BodyMotions, part: Part) -> tuple[pin.Force, float]:
+def _balance(run: RunFields, k: int, motions: BodyMotions, part: Part) -> tuple[pin.Force, float]:
     """Return the wrench that a part receives, in the joint frame, and the sum of the sizes of its terms."""
     velocity, acceleration = motions.velocity(part.joint), motions.acceleration(part.joint)
     terms = [part.inertia * acceleration, velocity.cross(part.inertia * velocity)]
     to_body = motions.placement(part.joint)
     for child in part.children:
-        wrench = run.reactions[str(run.scene.model.names[child])][k, 6:]
+        wrench = reactions_of(run)[str(run.scene.model.names[child])][k, 6:]
         terms.append(to_body.actInv(_about_world(wrench, motions.placement(child).translation)))
     terms += [-to_body.actInv(load.at(k, motions)) for load in part.loads]
     return sum(terms, pin.Force.Zero()), sum(float(np.abs(term.vector).max()) for term in terms)
 
 
-def _require_recorded(run: Any, k: int, motions: BodyMotions, body: Part, who: str) -> None:
+def _require_recorded(run: RunFields, k: int, motions: BodyMotions, body: Part, who: str) -> None:
     """Check that the loads on a whole body add up to the recorded reaction of its joint.
 
     Raises:
@@ -140,11 +144,11 @@ def _require_recorded(run: Any, k: int, motions: BodyMotions, body: Part, who: s
     """
     name = str(run.scene.model.names[body.joint])
     found, size = _balance(run, k, motions, body)
-    recorded = run.reactions[name][k, :6]
+    recorded = reactions_of(run)[name][k, :6]
     missed = float(np.abs(found.vector - recorded).max())
     model = run.scene.model
     whole = sum(Y.mass for Y in model.inertias) * float(np.linalg.norm(model.gravity.linear))
-    whole += max(float(np.abs(wrench[k]).max()) for wrench in run.reactions.values())
+    whole += max(float(np.abs(wrench[k]).max()) for wrench in reactions_of(run).values())
     if missed > AGREES * (size + float(np.abs(recorded).max())) + CANCELS * whole:
         raise InputError(
             f"{who}: masses and gravity of the run must be those of its scene; the loads on the body of "
@@ -164,7 +168,7 @@ def _whole_body(model: Model, joint: int, loads: list[Load]) -> Part:
     return Part(joint, model.inertias[joint], children, loads)
 
 
-def _on(run: Any, joint: int) -> list[Load]:
+def _on(run: RunFields, joint: int) -> list[Load]:
     return [load for load in _loads(run) if load.joint == joint]
 
 
@@ -172,7 +176,7 @@ def _part_beyond(scene: Scene, index: int, loads: list[Load], who: str) -> Part:
     """Return the part beyond a frame.
 
     Raises:
-        InputError: the model does not tell what lies beyond.
+        InputError: the model does not determine the part beyond the frame.
     """
     model = scene.model
     joint = int(model.frames[index].parentJoint)
@@ -183,7 +187,7 @@ def _part_beyond(scene: Scene, index: int, loads: list[Load], who: str) -> Part:
 
 
 def _beyond(model: Model, frame: int, index: int) -> bool | None:
-    """Check if a frame lies beyond another frame of its body; None if the order of frames does not tell."""
+    """Check if a frame lies beyond another frame of its body; None if the order of frames is unclear."""
     joint, passed = model.frames[index].parentJoint, set()
     before = _ancestors(model, index)
     while frame != index:
@@ -214,7 +218,7 @@ def _inertia_beyond(model: Model, index: int, who: str) -> pin.Inertia:
     """Return the inertia of the frames beyond a frame of a body, in the joint frame.
 
     Raises:
-        InputError: the model does not tell this inertia.
+        InputError: the model has no such inertia.
     """
     frame = model.frames[index]
     locked = int(frame.parentFrame) == index and index != 0  # the sign of pinocchio.buildReducedModel
@@ -255,7 +259,7 @@ def _child_beyond(model: Model, child: int, index: int, who: str) -> bool:
     """Check if a joint on the body of a frame lies beyond it.
 
     Raises:
-        InputError: the model does not tell.
+        InputError: the model does not determine the side.
     """
     name = str(model.names[child])
     is_beyond = None
@@ -273,7 +277,7 @@ def _load_beyond(scene: Scene, load: Load, index: int, who: str) -> bool:
     """Check if a load on the body of a frame acts beyond it.
 
     Raises:
-        InputError: the scene does not tell.
+        InputError: the scene does not determine the side.
     """
     model, is_beyond = scene.model, None
     if load.frame is not None and model.existFrame(load.frame):
@@ -295,7 +299,7 @@ def _load_beyond(scene: Scene, load: Load, index: int, who: str) -> bool:
 def _shape_beyond(scene: Scene, joint: int, contact: str, index: int) -> bool | None:
     """Check if a contact that names only the moving joint, as those of collision shapes, lies beyond a frame.
 
-    The name of such a contact contains the names of its shapes, and the shapes know their links. A contact
+    The name of such a contact contains the names of its shapes, and each shape belongs to a link. A contact
     with another name lies on the link of the joint itself, unless shapes on that body lie beyond the frame.
     """
     shapes = scene.collision_model
@@ -310,25 +314,25 @@ def _shape_beyond(scene: Scene, joint: int, contact: str, index: int) -> bool | 
 # --- Loads on bodies ----------------------------------------------------------------------------------------
 
 
-def _loads(run: Any) -> Iterator[Load]:
+def _loads(run: RunFields) -> Iterator[Load]:
     """Yield the wrenches on all bodies: of constraints and contacts, of applied forces and of drags."""
     scene: Scene = run.scene
-    where = Resolution(scene.model, scene.q0)
+    resolver = Resolver(scene.model, scene.q0)
     for name, c in compiled_scene(scene).described.items():
-        if name in run.reactions and (frames := _frames(c, name, where)):
+        if name in reactions_of(run) and (frames := _frames(c, name, resolver)):
             yield from _pair(run, name, c, *frames)
     for f in scene.forces:
         if isinstance(f, Wrench):
-            yield _pushed(run, f, where.frame(f.frame, "reaction"))
+            yield _pushed(run, f, resolver.frame(f.frame, "reaction"))
         elif isinstance(f, SpringDamper):
-            yield from _sprung(f, *where.pair(f, "reaction"))
+            yield from _sprung(f, *resolver.pair(f, "reaction"))
     for law in scene.laws:
         if isinstance(law, Drag):
-            yield _dragged(law, where.frame(law.frame, "reaction"))
+            yield _dragged(law, resolver.frame(law.frame, "reaction"))
 
 
 class _Frames:
-    """Stands in for the core's builder and keeps the frames that a contact adds."""
+    """Substitute for the core's builder that records the frames of a contact."""
 
     def __init__(self) -> None:
         self.found: list[Frame] = []
@@ -341,23 +345,23 @@ class _Frames:
         return note
 
 
-def _frames(c: Any, name: str, where: Resolution) -> tuple[Frame, Frame] | None:
+def _frames(c: Any, name: str, resolver: Resolver) -> tuple[Frame, Frame] | None:
     """Return both frames of a constraint or contact in the form of the core, or None without frames."""
     if isinstance(c, KnifeEdge):
-        return where.frame(c.frame, name), WORLD
+        return resolver.frame(c.frame, name), WORLD
     if isinstance(c, Rolling):
-        return where.frame(c.frame, name), where.plane(c.plane, name)
+        return resolver.frame(c.frame, name), resolver.plane(c.plane, name)
     if hasattr(c, "joint1_placement") or (hasattr(c, "frame1") and not hasattr(c, "restitution")):
-        return frames_of(c, where, name)
+        return frames_of(c, resolver, name)
     if not (hasattr(c, "frame") or hasattr(c, "frame1")):
         return None
     noted: Any = _Frames()
-    lower_gaps(c, name, noted, where)
+    lower_gaps(c, name, noted, resolver)
     first, second = noted.found
     return first, second
 
 
-def _pair(run: Any, name: str, c: Any, first: Frame, second: Frame) -> Iterator[Load]:
+def _pair(run: RunFields, name: str, c: Any, first: Frame, second: Frame) -> Iterator[Load]:
     """Yield the wrench of a constraint or contact on the bodies of both of its frames."""
     for frame, sign, keys in ((first, 1.0, ("frame1", "frame")), (second, -1.0, ("frame2", "plane"))):
         place = next((str(getattr(c, key)) for key in keys if getattr(c, key, None) is not None), None)
@@ -365,12 +369,12 @@ def _pair(run: Any, name: str, c: Any, first: Frame, second: Frame) -> Iterator[
             place = "universe"
 
         def at(k: int, motions: BodyMotions, sign: float = sign) -> pin.Force:
-            return sign * _about_world(run.reactions[name][k, 6:], motions.point(first))
+            return sign * _about_world(reactions_of(run)[name][k, 6:], motions.point(first))
 
         yield Load(f'"{name}"', frame[0], place, at, name if run.rows[name][2] else None)
 
 
-def _pushed(run: Any, f: Wrench, frame: Frame) -> Load:
+def _pushed(run: RunFields, f: Wrench, frame: Frame) -> Load:
     def at(k: int, motions: BodyMotions) -> pin.Force:
         value = f.value(float(run.t[k])) if callable(f.value) else f.value
         return _about_world(np.asarray(value, dtype=float).reshape(6), motions.point(frame))

@@ -8,8 +8,8 @@ from typing import Any, TypeVar
 
 from pin_nonideal.types import Table
 
-Made = TypeVar("Made", bound="MadeLater")
-MAKER = "_make"
+Made = TypeVar("Made", bound="LazyFields")
+FACTORY = "_make"
 _one_at_a_time = RLock()  # reentrant, since the fields of one object may need those of another
 
 
@@ -20,7 +20,7 @@ class _Plain:
 _own: Callable[[Any], Table] = vars(_Plain)["__dict__"].__get__
 
 
-class MadeLater(_Plain):
+class LazyFields(_Plain):
     """Base class of objects whose fields are computed by a function on first access.
 
     A field must not be a class attribute as well, since Python finds class attributes first.
@@ -35,7 +35,7 @@ class MadeLater(_Plain):
             known: fields that are available at once.
         """
         made = cls.__new__(cls)
-        _own(made).update(known, **{MAKER: make})
+        _own(made).update(known, **{FACTORY: make})
         return made
 
     def __getattr__(self, name: str) -> Any:
@@ -47,11 +47,11 @@ class MadeLater(_Plain):
 
     def _fields(self) -> Table:
         own = _own(self)
-        if MAKER in own:
+        if FACTORY in own:
             with _one_at_a_time:
-                if MAKER in own:
-                    own.update({**own[MAKER](), **own})
-                    del own[MAKER]
+                if FACTORY in own:
+                    own.update({**own[FACTORY](), **own})
+                    del own[FACTORY]
         return own
 
     # `vars` and similar functions return all fields.

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+
+from .fields import RunFields
 
 # If there are more energy terms than this, only nonzero terms are shown.
 MAX_TERMS = 20
 
 
-def summary(run: Any) -> str:
+def summary(run: RunFields) -> str:
     """Return the summary of a run, a line for each kind of data.
 
     Args:

@@ -6,28 +6,24 @@ import copy
 import dataclasses
 import os
 import re
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from pin_nonideal.errors import InputError, short_repr
 from pin_nonideal.html_tables import table
 from pin_nonideal.scene.scene import Scene
-from pin_nonideal.states.joint_layout import JointPlace
 from pin_nonideal.types import Array, Table
 from pin_nonideal.validation import array
 from pin_nonideal.validation import count as whole_number
 
 from .by_name import force_of, frame_record, joint_record, law_record, reaction_of
 from .columns import columns, units
-from .dense_output import DenseOutput
-from .groups import RECORD_OF, GroupField
-from .lazy_fields import MadeLater
-from .records import Event, FrameRecord, JointRecord, LawRecord, Sample, Stats, UserEventRecord
+from .fields import RunFields
+from .records import FrameRecord, JointRecord, LawRecord, Sample
 from .summary import summary
 
 # A line of the summary: its heading, with a unit or not, and the rest from ": " or the first digit on.
@@ -35,7 +31,7 @@ SUMMARY_LINE = re.compile(r"([a-z]+(?: [a-z]+)*(?: \[J\])?)(?:: +| +(?=\d))(.*)"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Trajectory(MadeLater):
+class Trajectory(RunFields):
     """Samples of a run; fields that were not recorded are None or empty tables.
 
     Attributes:
@@ -56,10 +52,10 @@ class Trajectory(MadeLater):
             the total energy and the work, and must be zero. Record "energy".
         power: power by column [W]: "actuation", "forces", "constraints", each law.  Record "power".
         z: states of laws, (nt, nz), or None if no law has states.
-        modes: mode of each frictional element, +1 or -1 for slip, 0 for stick, 2 for an open contact, (nt,
+        modes: mode of each friction element, +1 or -1 for slip, 0 for stick, 2 for an open contact, (nt,
             ne).
         closed: whether each contact is closed, in the order of the scene's `contact_names`, (nt, n).
-        limits: limit of each frictional element in its mode [N or N m], (nt, ne); record "laws" or "forces".
+        limits: limit of each friction element in its mode [N or N m], (nt, ne); record "laws" or "forces".
         law_forces: part of C of each law by name, on the degrees of freedom `law_dofs`; record "laws" or
             "forces". See `law`.
         reactions: wrench by name of joint, anchor and contact [N; N m], (nt, 12): [force; moment] in its own
@@ -85,42 +81,6 @@ class Trajectory(MadeLater):
         notes: notes on the run, such as a projection of the initial state onto the constraints.
         failure: message of the error that stopped the run before its end, or None.
     """
-
-    t: Array
-    q: Array
-    v: Array
-    violation: Array
-    violation_rate: Array
-    a: Array | None = None
-    tau: Array | None = None
-    F_ideal: Array | None = None
-    F_nonideal: Array | None = None
-    lam: Array | None = None
-    lam_ideal: Array | None = None
-    energy: dict[str, Array] | None = None
-    power: dict[str, Array] | None = None
-    z: Array | None = None
-    modes: NDArray[np.int8] | None = None
-    closed: NDArray[np.bool_] | None = None
-    limits: Array | None = None
-    law_forces: dict[str, Array] | None = None
-    reactions: dict[str, Array] | None = None
-    contact_forces: dict[str, Array] | None = None
-    grid: NDArray[np.bool_] | None = None
-    dense: DenseOutput | None = None
-    user_events: list[UserEventRecord] = field(default_factory=list)
-    events: list[Event] = field(default_factory=list)
-    stats: Stats = field(default_factory=Stats)
-    scene: Any = None
-    element_names: list[str] = field(default_factory=list)
-    element_laws: list[int] = field(default_factory=list)
-    law_names: list[str] = field(default_factory=list)
-    law_dofs: list[list[int]] = field(default_factory=list)
-    joints: list[JointPlace] = field(default_factory=list)
-    rows: dict[str, tuple[int, int, bool]] = field(default_factory=dict)
-    name: str = ""
-    notes: list[str] = field(default_factory=list)
-    failure: str | None = None
 
     def __getstate__(self) -> Table:
         # The scene is included if it can be pickled.
@@ -248,7 +208,7 @@ class Trajectory(MadeLater):
 
         Returns:
             The frame; `frame.attrs["units"]` has the unit of each column and of the index, such as "rad/s".
-            A unit is "1" for numbers without one, as in quaternions, and empty if the run does not know it.
+            A unit is "1" for numbers without one, as in quaternions, and empty if it is unknown.
 
         Raises:
             InputError: pandas is not installed.
@@ -265,7 +225,7 @@ class Trajectory(MadeLater):
         return frame
 
     def first(self, count: int) -> Trajectory:
-        """Return the first samples of a run, with the events up to the last of them.
+        """Return the first samples of a run, with the events up to the last sample.
 
         Args:
             count: number of samples, at most all.
@@ -366,26 +326,6 @@ class Trajectory(MadeLater):
         from .file import read
 
         return restore_trajectory(*read(path), path, scene)
-
-
-_DEFAULTS: Table = {}
-_MAKERS: dict[str, Callable[[], Any]] = {}
-for _field in dataclasses.fields(Trajectory):
-    if _field.default is not dataclasses.MISSING:
-        _DEFAULTS[_field.name] = _field.default
-        # attributes of the class would hide the fields that `later` computes
-        delattr(Trajectory, _field.name)
-    elif _field.default_factory is not dataclasses.MISSING and _field.name != "stats":
-        _MAKERS[_field.name] = _field.default_factory
-
-for _name in RECORD_OF:
-    setattr(Trajectory, _name, GroupField(_name))
-
-
-def with_defaults(fields: Table) -> Table:
-    """Return all fields of a Trajectory except its counters: given fields, and defaults for the others."""
-    made = {name: make() for name, make in _MAKERS.items() if name not in fields}
-    return {**_DEFAULTS, **made, **fields}
 
 
 def restore_trajectory(fields: Table, origin: Any, path: Any, scene: Scene | str | None) -> Trajectory:

@@ -1,4 +1,4 @@
-"""Cylinders, cones, disks and ellipsoids on planes, against closed forms."""
+"""Cylinders, cones, wheel rims and ellipsoids on planes, against closed forms."""
 
 from __future__ import annotations
 

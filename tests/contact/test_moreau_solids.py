@@ -9,7 +9,7 @@ import pytest
 
 import pin_nonideal as pn
 
-from ..geometry.test_revolved_pairs import distance
+from ..geometry.test_cylinder_pairs import distance
 from ..support.mechanisms import GRAVITY, body, empty
 from ..support.seeds import seeds
 

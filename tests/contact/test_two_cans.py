@@ -11,8 +11,7 @@ from scipy.integrate import solve_ivp
 import pin_nonideal as pn
 from pin_nonideal.geometry.cylinder import DEFAULT_ROUNDING, FACE_CIRCLE_RATIO, SIDE_INSET
 
-from ..geometry.test_geometry_pairs import EXACT, by_coal, pair, placements, shape
-from ..geometry.test_revolved_pairs import (
+from ..geometry.test_cylinder_pairs import (
     CAN,
     HERE,
     LEVEL,
@@ -23,6 +22,7 @@ from ..geometry.test_revolved_pairs import (
     point,
     segment,
 )
+from ..geometry.test_geometry_pairs import EXACT, by_coal, pair, placements, shape
 from ..support.mechanisms import GRAVITY, body, empty
 from ..support.same_run import assert_same_run
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from oracles.paper_road import (
+from oracles.eq40_by_paper import (
+    eq40_by_paper,
     exact_road,
     generalized_inverse_road,
     kkt_road,
     letters,
-    paper_road,
     stacked_road,
 )
 from pin_nonideal.equation import RANK_TOLERANCE, solve
@@ -76,7 +76,7 @@ class TestRoadsAgree:
         solution = solve(M, F, A, b, C)
         scale = np.linalg.norm(F) + np.linalg.norm(C)
         assert solution.rank == shape[1]
-        assert_forces(solution, paper_road(M, F, A, b, C), ROADS, scale)
+        assert_forces(solution, eq40_by_paper(M, F, A, b, C), ROADS, scale)
         assert_forces(solution, generalized_inverse_road(M, F, A, b, C), ROADS, scale)
         kkt, lam = kkt_road(M, F, A, b, C)
         assert_forces(solution, kkt, ROADS, scale)
@@ -145,7 +145,7 @@ class TestTheoremsOfThePaper:
         M, F, A, b, C = problem(22, 6, 3, 2)
         V = letters(M, A).V
         mixed = V @ np.array([[2.0, 0.3, 0.0], [0.0, 1.0, -0.5], [0.4, 0.0, 3.0]])
-        reference, other = paper_road(M, F, A, b, C), paper_road(M, F, A, b, C, V=mixed)
+        reference, other = eq40_by_paper(M, F, A, b, C), eq40_by_paper(M, F, A, b, C, V=mixed)
         for one, two in zip(reference, other, strict=True):
             assert_close(one, two, ROADS)
 

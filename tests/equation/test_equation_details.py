@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import pin_nonideal as pn
-from oracles.paper_road import letters, paper_road
+from oracles.eq40_by_paper import eq40_by_paper, letters
 from tests.equation.test_equation import ROADS, SHAPES, assert_close, ill_conditioned, problem
 
 # Backward errors of products of well-conditioned factors: some n^2 roundings of 1e-16.
@@ -36,7 +36,7 @@ def test_forces_and_acceleration_are_those_of_solve(drawn):
     M, F, A, b, C = drawn
     d = pn.solve_details(M, F, A, b, C)
     s = pn.solve(M, F, A, b, C)
-    literal = paper_road(M, F, A, b, C)
+    literal = eq40_by_paper(M, F, A, b, C)
     for name in ("a", "F_ideal", "F_nonideal", "lam"):
         np.testing.assert_array_equal(getattr(d, name), getattr(s, name))
     assert d.rank == s.rank

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from oracles.paper_road import letters, paper_road
+from oracles.eq40_by_paper import eq40_by_paper, letters
 from pin_nonideal.equation import solve
 
 from ..support.paper_examples import example
@@ -42,7 +42,7 @@ def assert_rate_is_the_derivative(system, t, q, v):
 def assert_forces(M, F, A, b, C, ideal, nonideal):
     """Assert the printed constraint force against `solve` and against the paper's equations."""
     solution = solve(M, F, A, b, C)
-    literal = paper_road(M, F, A, b, C)
+    literal = eq40_by_paper(M, F, A, b, C)
     for forces in (solution, literal):
         assert_close(forces.F_ideal, ideal)
         assert_close(forces.F_nonideal, nonideal)

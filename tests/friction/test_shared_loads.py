@@ -9,9 +9,9 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from oracles.given import given_force, mass_matrix
+from oracles.applied_forces import given_force, mass_matrix
+from oracles.hyperstatic import constraint_force, least_norm
 from oracles.rows import rows
-from oracles.sharing import constraint_force, least_norm
 
 from ..support.mechanisms import GRAVITY, assert_close, body, empty, frame
 from ..support.seeds import seeds
@@ -87,7 +87,7 @@ def test_loads_of_hinges_are_the_least_ones(places):
 
 
 def geared(seed):
-    """Joints coupled and driven in several ways that say the same, each in its own scale."""
+    """Return joints with redundant couplings and drives, each with its own scale."""
     rng = np.random.default_rng(seed)
     model = empty()
     joint = 0
@@ -162,7 +162,7 @@ def test_two_feet_of_a_sledge_that_cannot_turn_carry_half_each(order):
 
 
 def gears(order):
-    """Two wheels in three couplings that say the same, one of them turned around, each with its losses."""
+    """Two wheels with three redundant couplings, one of them reversed, each with its losses."""
     model = empty()
     for k in (0, 1):
         body(model, 0, pin.JointModelRZ(), f"wheel{k}", 1.0, inertia=0.1 * np.eye(3))

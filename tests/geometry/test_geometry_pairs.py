@@ -24,7 +24,7 @@ SHAPES = ("sphere", "capsule", "box", "convex mesh", "cylinder", "cone", "ellips
 SOLIDS = ("sphere", "capsule", "box", "convex mesh")
 KNOWN = {(shape, "half-space") for shape in SHAPES[:-1]} | set(combinations_with_replacement(SOLIDS, 2))
 KNOWN |= {("sphere", "cylinder"), ("sphere", "cone")}
-# The parts of these pairs are compared in test_revolved_pairs.py.
+# The parts of these pairs are compared in test_cylinder_pairs.py.
 IN_PARTS = {
     (shape, revolved) for shape in (*SOLIDS[1:], "cylinder", "cone") for revolved in ("cylinder", "cone")
 }

@@ -16,7 +16,7 @@ import pin_nonideal as pn
 from pin_nonideal.atomic_files import whole_file
 from pin_nonideal.cli.main import main
 from pin_nonideal.errors import InputError, LoadingError, OutputError, UserFunctionError
-from pin_nonideal.scene.scene import TAKEN
+from pin_nonideal.scene.base import FROZEN_FIELDS
 
 from ..support.refusals import refuses
 from ..support.small_robots import folder, joint, link, robot
@@ -162,7 +162,7 @@ def test_a_model_that_is_changed_after_the_scene_was_made_is_refused(tmp_path):
         scene.q0[0] = 1.0
 
 
-@pytest.mark.parametrize("key", TAKEN)
+@pytest.mark.parametrize("key", FROZEN_FIELDS)
 def test_what_a_scene_was_made_of_cannot_be_exchanged(tmp_path, key):
     scene = pn.load(folder(tmp_path))
     with refuses(f'{key} of scene "{scene.name}" is what the scene was made of', InputError):

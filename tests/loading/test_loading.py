@@ -199,7 +199,7 @@ def ball_robot(middle_mass=0.0, second_axis="0 1 0", xyz="0 0 0", inside="", lim
 
 def test_ball_joints_are_named_by_what_the_joints_share(tmp_path):
     scene = pn.load(folder(tmp_path, urdf=ball_robot()))
-    assert list(scene.model.names)[1:] == ["shoulder", "elbow", "c_rev2"]  # "c" alone would say too little
+    assert list(scene.model.names)[1:] == ["shoulder", "elbow", "c_rev2"]  # common part "c" is too short
     named = ball_robot().replace("c_rev", "wrist_rev")
     assert "wrist" in list(pn.load(folder(tmp_path, urdf=named)).model.names)
 

@@ -1,4 +1,4 @@
-"""The robots of the package: each loads by name, says where it comes from, and starts closed."""
+"""The robots of the package: each loads by name, names its source, and starts with closed loops."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ def test_an_old_python_is_refused_in_words() -> None:
 
 
 def test_the_backend_is_reached_by_an_old_python() -> None:
-    """No requirement of the build is asked of one that cannot have it."""
+    """An old Python gets no build requirement that does not support it."""
     tomllib = pytest.importorskip("tomllib")
     table = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     assert all(word.endswith("; python_version >= '3.10'") for word in table["build-system"]["requires"])

@@ -55,7 +55,7 @@ def polyline(at, values):
 
 
 def drive(rng, kind):
-    """A motion of the cart and its breaks."""
+    """Return a random motion of the cart, and the times at which its pieces meet."""
     if kind in ("clamped", "natural"):
         at = times(rng, int(rng.integers(2, 6)), 10.0 ** rng.uniform(-2.0, 0.0))
         values = np.concatenate([[0.0], rng.uniform(-0.3, 0.3, len(at) - 2), [rng.choice([-0.3, 0.3])]])
@@ -77,7 +77,7 @@ def at(run, *kinds):
 
 
 def known(function, breaks):
-    """The same with its breaks told."""
+    """Return the function with its attribute `breaks`."""
 
     def moves(t):
         return function(t)

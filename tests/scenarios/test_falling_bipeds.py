@@ -10,8 +10,7 @@ import pin_nonideal as pn
 
 from ..support.mechanisms import body, empty, frame
 
-# By which a corner may be below the ground beside the tolerance, to which corners that land together are told
-# apart [m].
+# Penetration of a corner beyond the tolerance [m]. Corners that land together differ by the tolerance.
 INSIDE = 1e-9
 CORNERS = [(-0.08, -0.05), (-0.08, 0.05), (0.12, -0.05), (0.12, 0.05)]
 

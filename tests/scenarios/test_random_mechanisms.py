@@ -21,7 +21,7 @@ from ..support.seeds import seeds
 DURATION = 0.5  # s: several events each
 DEEP = int(os.environ.get("PIN_NONIDEAL_MECHANISMS", "500"))
 QUICK = 48
-# Part of the forces in play by which a condition may be missed: rounding, through the constraints' solution.
+# Residual of a condition relative to the forces: rounding of the solution of the constraints.
 SLACK = 1e-8
 # Rounding of the slip velocity of sticking elements other than joints, relative to the largest speed.
 STILL = 1e-11

@@ -1,8 +1,8 @@
-"""Any scene answers the same however it is turned, moved, measured, ordered, repeated, split, delayed or cut.
+"""Results do not depend on rotation, motion, units, order, duplication, splitting, delay or cuts of a scene.
 
-Images of sample scenes, all robots, kinds and random mechanisms among them, are asked the same as the scenes
-themselves (`support/`): by default each scene in one image and each image of some scene, all of them when
-slow, more mechanisms under stress.
+The tests compare the results of all public functions for sample scenes and their images (`support/`). The
+samples include all robots, all kinds of constraints and random mechanisms. By default each scene has one
+image; `-m slow` tests all images, and `-m stress` more mechanisms.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def answer(name: str, function: str) -> Answer:
 
 
 def asked(name: str, transformation: str) -> list[str]:
-    """Functions that an image is asked."""
+    """Functions whose results the tests compare."""
     made = image(name, transformation)
     if made is None:
         return []

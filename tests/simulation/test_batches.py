@@ -1,4 +1,4 @@
-"""Batches whose runs have numbers of their own, beside scenes that are made of them; failures by run."""
+"""Rollouts with parameters for each run, compared with separate scenes, and the failures of single runs."""
 
 from __future__ import annotations
 

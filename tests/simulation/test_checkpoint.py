@@ -1,4 +1,4 @@
-"""A run that was stopped goes on bit by bit as if it had never been."""
+"""A resumed run is bitwise equal to a run without interruption."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def driven_arm():
 
 
 def weak_arm():
-    """The arm held by motors that are asked for more than they have, again and again."""
+    """Return an arm whose motors reach their effort limits again and again."""
     scene = pn.load("panda_friction")
     drive = pn.EffortLimits(lambda t, q, v: 60.0 * np.sin(9.0 * t + np.arange(len(v))), 40.0)
     return pn.Scene(scene.model, laws=scene.laws, q0=scene.q0, actuation=drive, name="weak arm")
@@ -303,7 +303,7 @@ def states_of(scene, duration):
 
 
 def resumed(scene, state, options):
-    """The record of the run that goes on from a state, or None when the state is refused."""
+    """Return the record of a run resumed from a state, or None if the state is rejected."""
     try:
         return scene._compiled.program.runner().resume(state, options)
     except ValueError as error:

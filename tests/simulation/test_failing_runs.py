@@ -118,7 +118,7 @@ def test_drives_that_ask_for_two_accelerations():
 
 
 def test_drives_that_part_in_mid_run():
-    """Equal until t = 0.5 s: that they are copies at one instant must not drop one of them."""
+    """Two constraints are equal until t = 0.5 s. Equality at one instant must not remove either."""
 
     def parting(t):
         s = max(t - 0.5, 0.0)
@@ -164,7 +164,7 @@ def test_a_rod_that_is_too_long():
 
 
 def test_a_rod_that_grows_too_long():
-    """At full stretch no motion goes on; the run ends there and keeps its samples."""
+    """At full stretch no motion exists. The run ends there and keeps its samples."""
     model = tree(["revolute x", "revolute x"], np.random.default_rng(1), parents=[0, 1])
     data = model.createData()
     pin.framesForwardKinematics(model, data, np.array([0.3, 0.4]))

@@ -1,4 +1,4 @@
-"""A run that crawls because it is stiff says so, and no other run does."""
+"""A run with tiny steps due to stiffness raises a StiffnessError, and no other run does."""
 
 from __future__ import annotations
 

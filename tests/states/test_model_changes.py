@@ -1,4 +1,4 @@
-"""A model that changes after its scene was made is an error, whatever changes; poses may be named."""
+"""Any change of a model after the construction of its scene is an error, except reference configurations."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from oracles.nearest import distance, nearest_by_search
+from oracles.nearest_closure import distance, nearest_by_search
 
 from ..support.mechanisms import again, body, empty, frame, point_mass
 from ..support.seeds import seeds

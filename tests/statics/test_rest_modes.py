@@ -35,7 +35,7 @@ def stickiest(solutions):
 
 
 def check(seed, joints):
-    """One, several or no motion, as the scan says; returns how many, or None where it cannot tell."""
+    """Compare the number of motions with the scan; return it, or None if the scan is inconclusive."""
     model, laws, q, tau = loaded_tree(seed, joints)
     tree, rest = RestingTree(model, laws, q, tau), np.zeros(model.nv)
     try:

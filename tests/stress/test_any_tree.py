@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from oracles.given import given_force, mass_matrix
+from oracles.applied_forces import given_force, mass_matrix
 from oracles.rows import rows
 from oracles.solutions import kkt_acceleration
 from pin_nonideal.errors import SingularMassError

@@ -19,7 +19,7 @@ TIGHT = {"rtol": 1e-12, "atol": 1e-13}
 CLOSED = 1e-8
 # Positions of bodies as large as R are known to R eps, and their residuals to a few hundred times that.
 CLOSURE = 1e-13
-# Copies and other scales of rows are the same constraint: only rounding may tell them apart.
+# Copies and other scales of rows are the same constraint: they differ by rounding only.
 SAME_MOTION = 1e-10
 
 
@@ -91,7 +91,7 @@ def test_each_size_moves_as_it_does_alone():
     "lengths", [[1e4, 1e2, 1.0, 1e-2, 1e-4], [1e-4, 1e-2, 1.0, 1e2, 1e4], [10.0, 1.0, 1e-3]]
 )
 def test_a_chain_from_crane_to_finger(lengths):
-    """A small link far out has an inertia below the rounding of M: the run is right, or says so by name."""
+    """A small link far out has an inertia below the rounding of M: a right run, or an error with a name."""
     try:
         run = pn.simulate(pn.Scene(rods(lengths), q0=np.full(len(lengths), 0.3)), 1.0, record="energy")
     except (pn.SingularMassError, pn.StepSizeError) as error:

@@ -43,7 +43,7 @@ def stance(seed, unilateral):
 
 
 def sharings(oracle, run, instant, more):
-    """Loads with which the plate can go on at the end of the run, were friction larger by a part."""
+    """Return loads of a motion at the end of the run if friction were larger by a part."""
     state = planar_state(run)
     slip = oracle.slip(state[2], state[3:])
     speed = np.linalg.norm(slip, axis=1)
@@ -127,7 +127,7 @@ def test_feet_that_cannot_pull_slide_on(seeds):
 
 @pytest.mark.parametrize("seed", [12, 15, 375])
 def test_a_motion_in_which_a_foot_would_not_hold_is_none(seed):
-    """Loads under which some feet slip otherwise, but those that stick are asked for more than they hold."""
+    """Other feet slip under these loads, and sticking feet would exceed their limits."""
     scene, oracle = stance(seed, unilateral=False)
     instant = oracle.give_way(LATEST)
     run = pn.simulate(scene, instant + 1.0)

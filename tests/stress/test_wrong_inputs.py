@@ -325,7 +325,7 @@ def files(known, tmp_path, monkeypatch):
 
     for module, name in (
         (simulate_module, "run_together"),
-        (simulate_module, "run_apart"),
+        (simulate_module, "run_decoupled"),
         (scipy_solvers, "simulate_stiff"),
         (rendering, "_pictures"),
         (plotting, "_figure"),

@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from pin_nonideal.compilation.constraints import lower_constraint
 from pin_nonideal.compilation.contacts import lower_contacts
-from pin_nonideal.compilation.resolver import Resolution
+from pin_nonideal.compilation.resolver import Resolver
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.constraints import PointAnchor
 from pin_nonideal.states.joint_layout import joint_places
@@ -83,7 +83,7 @@ def run_of(model: pin.Model, t: Any, q: Callable[[float], Any], **fields: Any) -
 
 def _program(scene: Any, names: list[str]) -> Any:
     """Return the core's data of the constraints and contacts of a scene without analysis."""
-    builder, where = core.Builder(scene.model), Resolution(scene.model, scene.q0)
+    builder, where = core.Builder(scene.model), Resolver(scene.model, scene.q0)
     for name, c in zip(names, scene.constraints, strict=False):
         lower_constraint(c, name, builder, where)
     contacts = list(zip(names[len(scene.constraints) :], scene.contacts, strict=True))

@@ -126,7 +126,7 @@ def test_an_interrupt_is_seen_when_the_calling_thread_has_nothing_left_to_do():
 
     def torque(t, main):
         if main:
-            time.sleep(0.2)  # the other thread takes its run
+            time.sleep(0.2)  # meanwhile the other thread starts its run
             failed.append(time.monotonic())
             raise ValueError("this one ends early")
         if not sent and failed and time.monotonic() > failed[0] + 0.2:

@@ -52,7 +52,7 @@ def test_fields_that_were_not_asked_for_are_none():
 
 @pytest.mark.parametrize("look", [vars, copy.copy, lambda run: run.grid, lambda run: run.samples(0)])
 def test_fields_are_there_whoever_looks_first(look):
-    """A run makes its fields when they are asked for."""
+    """Fields of a run are computed on first access."""
     scene = pn.load("belt_oscillator")
     run, other = (pn.simulate(scene, 0.1, output_dt=0.01) for _ in range(2))
     look(run)

@@ -9,7 +9,7 @@ from pin_nonideal.errors import InputError
 from pin_nonideal.validation import array, fraction, label, nonnegative, optional_text, text
 
 
-def check_rubbing(c: Any, *lengths: str) -> str:
+def check_friction(c: Any, *lengths: str) -> str:
     """Check name, friction, restitution, and nonnegative lengths.
 
     Args:

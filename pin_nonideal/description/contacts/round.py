@@ -10,14 +10,14 @@ from pin_nonideal.errors import InputError
 from pin_nonideal.types import Array
 from pin_nonideal.validation import Vector3, array
 
-from .base import check_rubbing, check_two_frames, check_vectors
+from .base import check_friction, check_two_frames, check_vectors
 
 __all__ = ["BoxContact", "CapsuleContact", "SphereContact"]
 
 
 def _check(c: SphereContact | CapsuleContact | BoxContact) -> str:
     """Check the common fields: names of frames, radii and friction."""
-    who = check_rubbing(c, "radius1", "radius2")
+    who = check_friction(c, "radius1", "radius2")
     check_two_frames(c, who)
     if c.radius1 + c.radius2 == 0.0:
         raise InputError(f"{who}: one of radius1 and radius2 must be positive; two points have no normal")

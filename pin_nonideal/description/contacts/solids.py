@@ -20,7 +20,7 @@ from pin_nonideal.validation import (
     unit_axis,
 )
 
-from .base import check_rubbing, check_two_frames, check_vectors
+from .base import check_friction, check_two_frames, check_vectors
 from .convex_hull import convex_hull
 
 __all__ = ["CylinderContact", "EllipsoidContact", "HullContact", "RevolvedContact", "RimContact"]
@@ -63,7 +63,7 @@ class EllipsoidContact:
     name: str | None = None
 
     def __post_init__(self) -> None:
-        who = check_rubbing(self)
+        who = check_friction(self)
         text(f"{who}: frame", self.frame)
         optional_text(f"{who}: plane", self.plane)
         if self.plane == self.frame:
@@ -109,7 +109,7 @@ class HullContact:
     name: str | None = None
 
     def __post_init__(self) -> None:
-        who = check_rubbing(self, "radius1", "radius2")
+        who = check_friction(self, "radius1", "radius2")
         check_two_frames(self, who)
         if self.radius1 + self.radius2 == 0.0:
             raise InputError(f"{who}: one of radius1 and radius2 must be positive; a point has no normal")
@@ -163,7 +163,7 @@ class CylinderContact:
     def __post_init__(self) -> None:
         if self.above is None:
             object.__setattr__(self, "above", self.below)
-        who = check_rubbing(self, "below", "above", "radius2")
+        who = check_friction(self, "below", "above", "radius2")
         check_two_frames(self, who)
         object.__setattr__(self, "length", positive(f"{who}: length", self.length))
         around = nonnegative if self.radius2 > 0.0 else positive
@@ -212,7 +212,7 @@ class RimContact:
     name: str | None = None
 
     def __post_init__(self) -> None:
-        who = check_rubbing(self)
+        who = check_friction(self)
         check_two_frames(self, who)
         for key in ("rim", "radius2"):
             object.__setattr__(self, key, positive(f"{who}: {key}", getattr(self, key)))
@@ -262,7 +262,7 @@ class RevolvedContact:
     name: str | None = None
 
     def __post_init__(self) -> None:
-        who = check_rubbing(self, "radius2")
+        who = check_friction(self, "radius2")
         check_two_frames(self, who)
         object.__setattr__(self, "radius1", positive(f"{who}: radius1", self.radius1))
         check_vectors(self, who, "solid1", "solid2", "xyz1", "rpy1", "xyz2", "rpy2")

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from pin_nonideal.description.constraints import JointCoupling
+from pin_nonideal.description.constraints import Constraint, JointCoupling
 from pin_nonideal.errors import LoadingError, short_repr
 from pin_nonideal.loading.urdf.geometry_sources import Shapes
 from pin_nonideal.loading.urdf.reader import RobotFile
@@ -53,7 +52,9 @@ def exchange_joints(robot: RobotFile, table: Table, where: str, notes: list[str]
     robot.q0 = robot.v0 = None
 
 
-def _exchange(robot: RobotFile, edit: Callable[[list[Any]], tuple[Any, Iterable[Any]]]) -> None:
+def _exchange(
+    robot: RobotFile, edit: Callable[[list[GeometryModel]], tuple[Model, Iterable[GeometryModel]]]
+) -> None:
     """Replace the model and the geometries of a robot by edited ones."""
     robot.model, _ = edit([])
     _edit_shapes(robot, lambda geometry: next(iter(edit([geometry])[1])))
@@ -198,7 +199,7 @@ def _reduced(
     return q, v
 
 
-def has_joints(model: Model, constraint: Any, where: str) -> bool:
+def has_joints(model: Model, constraint: Constraint, where: str) -> bool:
     """Check if the joints of a constraint in the robot's file still exist; without them it is satisfied.
 
     Args:

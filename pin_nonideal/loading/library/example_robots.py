@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from pin_nonideal.description.constraints import Constraint
 from pin_nonideal.errors import LoadingError, UnknownNameError, nearest
 from pin_nonideal.loading.urdf.geometry_sources import Shapes, cached_models, cached_shapes, file_stamps
 from pin_nonideal.loading.urdf.reader import RobotFile, read_mimics
@@ -133,6 +134,6 @@ def _example_shapes(model: Model, file: str, packages: str, srdf: str | None) ->
     return visual, collision
 
 
-def _has_joints(model: Model, constraint: Any) -> bool:
+def _has_joints(model: Model, constraint: Constraint) -> bool:
     names = [getattr(constraint, key, None) for key in ("joint", "joint1", "joint2")]
     return all(model.existJointName(n) for n in names if n is not None)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from pin_nonideal.types import Array
 from pin_nonideal.validation import array, number
 
 from .motion import FixedTendon
+from .mujoco_types import MjModel
 from .transmissions import BODY, TENDON, Geared, OnBall, OnSite, Transmission
 from .tree import Tree
 
@@ -185,7 +185,7 @@ class Actuators:
             self.ctrl = np.zeros(nu) if ctrl is None else array("ctrl", ctrl, (nu,))
 
 
-def _control_names(m: Any) -> list[str]:
+def _control_names(m: MjModel) -> list[str]:
     """Return the name of each control: its actuator's name, numbered if the actuator has several controls."""
     names = [""] * m.nu
     for a in range(m.nactuator):
@@ -196,7 +196,7 @@ def _control_names(m: Any) -> list[str]:
     return names
 
 
-def _period(m: Any, actuator: int, transmission: Transmission) -> float:
+def _period(m: MjModel, actuator: int, transmission: Transmission) -> float:
     """Return the period of a servo's set angle for a ball joint or between sites, 0 for other actuators."""
     servo = (
         m.actuator_biastype[actuator] == AFFINE
@@ -212,7 +212,7 @@ def _period(m: Any, actuator: int, transmission: Transmission) -> float:
     return 0.0
 
 
-def can_produce_force(m: Any, actuator: int) -> bool:
+def can_produce_force(m: MjModel, actuator: int) -> bool:
     """Check if an actuator can produce a force.
 
     Args:
@@ -227,7 +227,7 @@ def can_produce_force(m: Any, actuator: int) -> bool:
     return not plain or bool(gains.any() or biases.any())
 
 
-def is_supported(m: Any, actuator: int) -> bool:
+def is_supported(m: MjModel, actuator: int) -> bool:
     """Check if the force of an actuator depends on its control, length and rate only.
 
     Args:

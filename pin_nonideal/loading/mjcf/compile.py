@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from pin_nonideal.errors import LoadingError
 from pin_nonideal.loading.urdf.xml import read_text
 
 from .fields import CONVERTED, CONVERTED_OPTIONS
+from .mujoco_types import MjModel, MjsElement, MjSpec, Mujoco
 
 MIN_VERSION = 4  # oldest supported major version of MuJoCo, because the fields of compiled models differ
 PLACEHOLDER = 1e-3  # radius of the sphere that replaces a shape that is not read [m]
@@ -31,13 +32,13 @@ class Compiled(NamedTuple):
         notes: notes on the reading for the user.
     """
 
-    model: Any
+    model: MjModel
     absent: frozenset[int]
     unread: frozenset[int]
     notes: list[str]
 
 
-def mujoco_module(path: Path) -> Any:
+def mujoco_module(path: Path) -> Mujoco:
     """Return MuJoCo's Python package.
 
     Raises:
@@ -80,7 +81,7 @@ def compile_mjcf(path: Path, *, meshes: bool = False) -> Compiled:
     return compiled
 
 
-def _compile(mujoco: Any, path: Path, meshes: bool, *, probe: bool) -> Compiled:
+def _compile(mujoco: Mujoco, path: Path, meshes: bool, *, probe: bool) -> Compiled:
     """Compile a file; with `probe`, also without the massless meshes that MuJoCo cannot read."""
     notes: list[str] = []
     with warnings.catch_warnings(record=True) as caught, _collected_warnings(mujoco) as messages:
@@ -101,7 +102,7 @@ def _compile(mujoco: Any, path: Path, meshes: bool, *, probe: bool) -> Compiled:
 
 
 @contextmanager
-def _collected_warnings(mujoco: Any) -> Iterator[list[str]]:
+def _collected_warnings(mujoco: Mujoco) -> Iterator[list[str]]:
     """Collect MuJoCo's warnings, which are otherwise printed and written to the working directory."""
     messages: list[str] = []
     before = mujoco.get_mju_user_warning()
@@ -112,7 +113,7 @@ def _collected_warnings(mujoco: Any) -> Iterator[list[str]]:
         mujoco.set_mju_user_warning(before)
 
 
-def _check_finite(model: Any, path: Path) -> None:
+def _check_finite(model: MjModel, path: Path) -> None:
     """Check that a model contains no NaN, which MuJoCo accepts with a warning and treats as no range."""
     fields = {f"option {name}": getattr(model.opt, name) for name in CONVERTED_OPTIONS.split()}
     fields |= {name: getattr(model, name) for name in CONVERTED.split() if name != "opt"}
@@ -144,8 +145,8 @@ def _one_line(error: Exception) -> str:
 
 
 def _assets(
-    mujoco: Any, spec: Any, path: Path, meshes: bool, probe: bool, notes: list[str]
-) -> tuple[list[Any], list[Any]]:
+    mujoco: Mujoco, spec: MjSpec, path: Path, meshes: bool, probe: bool, notes: list[str]
+) -> tuple[list[MjsElement], list[MjsElement]]:
     """Remove textures, skins, and shapes that are missing or needed for a replay only.
 
     Returns:
@@ -188,7 +189,7 @@ def _assets(
     return absent, unread
 
 
-def _strip(spec: Any, notes: list[str]) -> None:
+def _strip(spec: MjSpec, notes: list[str]) -> None:
     """Remove textures, skins and plugin sensors: they do not affect the motion, and files may be missing."""
     for material in spec.materials:
         material.textures = [""] * len(material.textures)
@@ -200,11 +201,11 @@ def _strip(spec: Any, notes: list[str]) -> None:
             spec.delete(sensor)
 
 
-def _shape(asset: Any) -> str:
+def _shape(asset: MjsElement) -> str:
     return str(asset.name or Path(asset.file).stem)
 
 
-def _is_readable(mujoco: Any, asset: Any, place: Path | None) -> bool:
+def _is_readable(mujoco: Mujoco, asset: MjsElement, place: Path | None) -> bool:
     """Check if MuJoCo can compile a mesh or a height field alone; True for an asset without a file."""
     if place is None:
         return True
@@ -223,7 +224,7 @@ def _is_readable(mujoco: Any, asset: Any, place: Path | None) -> bool:
     return True
 
 
-def _place(spec: Any, asset: Any, homes: Sequence[Path]) -> Path | None:
+def _place(spec: MjSpec, asset: MjsElement, homes: Sequence[Path]) -> Path | None:
     """Return the path of the file of a mesh or a height field, or None if it is missing."""
     name = Path(asset.file).name if spec.strippath else asset.file
     folders = [asset.compiler.meshdir or "", spec.meshdir or "", ""]
@@ -251,14 +252,14 @@ def _homes(path: Path) -> list[Path]:
     return list(homes)
 
 
-def _wrapped_geoms(mujoco: Any, spec: Any) -> set[str]:
+def _wrapped_geoms(mujoco: Mujoco, spec: MjSpec) -> set[str]:
     """Return the names of the geoms that tendons wrap around; missing geoms are ignored."""
     around = (mujoco.mjtWrap.mjWRAP_SPHERE, mujoco.mjtWrap.mjWRAP_CYLINDER)
     wraps = [w for tendon in spec.tendons for w in tendon.path if w.type in around]
     return {w.target.name for w in wraps if w.target is not None}
 
 
-def _moves(body: Any) -> bool:
+def _moves(body: MjsElement) -> bool:
     """Check if a joint moves a body."""
     while body is not None:
         if body.joints:
@@ -267,7 +268,7 @@ def _moves(body: Any) -> bool:
     return False
 
 
-def _carries_mass(mujoco: Any, spec: Any, geom: Any) -> bool:
+def _carries_mass(mujoco: Mujoco, spec: MjSpec, geom: MjsElement) -> bool:
     """Check if MuJoCo computes the mass of a moving body, or a share of the total mass, from this geom."""
     compiler, body = geom.compiler, geom.parent
     if not _moves(body) and spec.compiler.settotalmass <= 0.0:
@@ -282,7 +283,7 @@ def _carries_mass(mujoco: Any, spec: Any, geom: Any) -> bool:
     return bool(low <= geom.group <= high and not massless and not geom.hfieldname)
 
 
-def _drop_unused(spec: Any) -> None:
+def _drop_unused(spec: MjSpec) -> None:
     """Remove the assets that no shape uses."""
     used = {name for geom in spec.geoms for name in (geom.meshname, geom.hfieldname)}
     used |= {getattr(site, "meshname", "") for site in spec.sites}

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
-from pin_nonideal.description.forces import JointSpring, UserForce, Wrench
-from pin_nonideal.description.laws import JointFriction, UserFriction, UserLaw
+from pin_nonideal.description.forces import Force, JointSpring, UserForce, Wrench
+from pin_nonideal.description.laws import JointFriction, Law, UserFriction, UserLaw
 from pin_nonideal.types import Array, Placement
 
 from .motion import Motion
@@ -166,10 +165,10 @@ def rotation(q: Array, at: int) -> Array:
     return np.asarray(pin.Quaternion(w, x, y, z).matrix())
 
 
-def joint_springs(tree: Tree) -> list[Any]:
+def joint_springs(tree: Tree) -> list[Force]:
     """Return the springs of the joints as given forces."""
     m = tree.compiled
-    result: list[Any] = []
+    result: list[Force] = []
     springs = Springs([], [], [])
     for j in range(m.njnt):
         stiffness, higher = float(m.jnt_stiffness[j]), np.array(m.jnt_stiffnesspoly[j])
@@ -193,7 +192,7 @@ def joint_springs(tree: Tree) -> list[Any]:
     return result
 
 
-def joint_resistance(tree: Tree, *, dampers: bool, friction: bool) -> list[Any]:
+def joint_resistance(tree: Tree, *, dampers: bool, friction: bool) -> list[Law]:
     """Return damping and dry friction of the joints as laws.
 
     Args:
@@ -203,7 +202,7 @@ def joint_resistance(tree: Tree, *, dampers: bool, friction: bool) -> list[Any]:
     """
     m = tree.compiled
     share = actuator_share(m, np.column_stack([m.actuator_damping, m.actuator_dampingpoly]), joints=True)
-    laws: list[Any] = []
+    laws: list[Law] = []
     rest = Damping([], [])
     for j in range(m.njnt):
         name, kind, first = tree.joint_name(j), m.jnt_type[j], int(m.jnt_dofadr[j])
@@ -228,10 +227,10 @@ def joint_resistance(tree: Tree, *, dampers: bool, friction: bool) -> list[Any]:
     return laws
 
 
-def _dof_friction(tree: Tree, j: int, dofs: range, dry: list[float]) -> list[Any]:
+def _dof_friction(tree: Tree, j: int, dofs: range, dry: list[float]) -> list[Law]:
     """Return separate dry friction for each degree of freedom of a ball or free joint, as in MuJoCo."""
     at = int(tree.compiled.jnt_qposadr[j]) + 3
-    laws = []
+    laws: list[Law] = []
     for k, (dof, level) in enumerate(zip(dofs, dry, strict=True)):
         if level > 0.0:
             world = len(dofs) == 6 and k < 3
@@ -242,7 +241,7 @@ def _dof_friction(tree: Tree, j: int, dofs: range, dry: list[float]) -> list[Any
     return laws
 
 
-def floating_armature(tree: Tree) -> list[Any]:
+def floating_armature(tree: Tree) -> list[Force]:
     """Return the given force that reproduces MuJoCo's armature of free joints."""
     m, model = tree.compiled, tree.model
     bodies = [
@@ -274,13 +273,14 @@ class GravityCompensation:
         return self.on * self.motion.generalized(q, forces)
 
 
-def gravity_compensation(tree: Tree) -> tuple[list[Any], GravityCompensation | None]:
+def gravity_compensation(tree: Tree) -> tuple[list[Force], GravityCompensation | None]:
     """Return the forces at the centers of mass that compensate gravity.
 
     Returns:
         Given forces, and the compensation that acts through the drives of joints, whose limits apply to it.
     """
-    m, forces, lifts = tree.compiled, [], []
+    m, lifts = tree.compiled, []
+    forces: list[Force] = []
     gravity = np.array(tree.model.gravity.linear)
     driven = np.repeat(m.jnt_actgravcomp, [6 if k == FREE else 3 if k == BALL else 1 for k in m.jnt_type])
     for body in np.flatnonzero(m.body_gravcomp).tolist():
@@ -299,7 +299,7 @@ def gravity_compensation(tree: Tree) -> tuple[list[Any], GravityCompensation | N
     return [UserForce(passive, name="gravity compensation")], through_drives
 
 
-def fluid_forces(tree: Tree) -> list[Any]:
+def fluid_forces(tree: Tree) -> list[Law]:
     """Return the fluid forces on bodies without ellipsoids, as a law."""
     m = tree.compiled
     if not (m.opt.density or m.opt.viscosity):

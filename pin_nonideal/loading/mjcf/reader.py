@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 from functools import cache, partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -28,6 +27,7 @@ from .forces import (
     joint_springs,
 )
 from .motion import Tendon
+from .mujoco_types import MjModel, Mujoco
 from .ranges import read_ranges
 from .shapes import geom_names, read_shapes
 from .tendons import read_tendons, tendon_forces
@@ -67,7 +67,7 @@ def read_mjcf(path: Path, *, allow: Collection[str] = (), ctrl: Control = None) 
 
 
 def translate(
-    mujoco: Any, compiled: Any, name: str, unsupported: UnsupportedFeatures
+    mujoco: Mujoco, compiled: MjModel, name: str, unsupported: UnsupportedFeatures
 ) -> tuple[RobotFile, Tree]:
     """Return a compiled model as a robot.
 
@@ -117,7 +117,7 @@ def _actuators(
     return Actuators(tree, [(a, t) for a, t in carried if t is not None], compensation, clamp)
 
 
-def _apply_key(actuators: Actuators | None, compiled: Any, key: int, ctrl: Control) -> None:
+def _apply_key(actuators: Actuators | None, compiled: MjModel, key: int, ctrl: Control) -> None:
     """Set the activations of a keyframe, and its controls if the user gave none."""
     if actuators is not None:
         actuators.set_control(compiled.key_ctrl[key] if ctrl is None else ctrl, compiled.key_act[key])
@@ -131,7 +131,7 @@ def _with_meshes(path: Path, notes: list[str]) -> tuple[Tree, frozenset[int]]:
 
 
 def _shapes(
-    mujoco: Any, again: Callable[[], tuple[Tree, frozenset[int]]], absent: frozenset[int], *, visual: bool
+    mujoco: Mujoco, again: Callable[[], tuple[Tree, frozenset[int]]], absent: frozenset[int], *, visual: bool
 ) -> GeometryModel:
     tree, lost = again()
     return read_shapes(mujoco, tree, absent | lost, visual=visual)

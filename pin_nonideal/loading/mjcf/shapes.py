@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
-from pin_nonideal.types import GeometryModel
+from pin_nonideal.types import Array, CollisionGeometry, GeometryModel
 
+from .mujoco_types import MjModel, Mujoco
 from .tree import Tree, placement
 
 PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX, MESH, SDF = range(9)  # MuJoCo's mjtGeom
 SHOWN_GROUPS = 3  # MuJoCo's viewer shows the groups 0, 1 and 2
 
 
-def geom_names(m: Any) -> list[str]:
+def geom_names(m: MjModel) -> list[str]:
     """Return the names of the geoms; geoms without a name are numbered.
 
     Args:
@@ -29,7 +29,7 @@ def geom_names(m: Any) -> list[str]:
     ]
 
 
-def read_shapes(mujoco: Any, tree: Tree, left_out: Collection[int], *, visual: bool) -> GeometryModel:
+def read_shapes(mujoco: Mujoco, tree: Tree, left_out: Collection[int], *, visual: bool) -> GeometryModel:
     """Return the visual geoms, or the collision geoms.
 
     Args:
@@ -60,7 +60,7 @@ def read_shapes(mujoco: Any, tree: Tree, left_out: Collection[int], *, visual: b
     return result
 
 
-def _shape(m: Any, g: int, *, solid: bool) -> Any:
+def _shape(m: MjModel, g: int, *, solid: bool) -> CollisionGeometry:
     """Return a coal geometry, or None for signed distance functions of plugins."""
     import coal
 
@@ -85,7 +85,7 @@ def _shape(m: Any, g: int, *, solid: bool) -> Any:
     return _height_field(m, data, solid=solid) if kind == HFIELD else None
 
 
-def _triangles(vertices: Any, faces: Any, *, solid: bool) -> Any:
+def _triangles(vertices: Array, faces: Array, *, solid: bool) -> CollisionGeometry:
     """Return a mesh; the bounding volume hierarchy, which takes most time, is built for collisions only."""
     import coal
 
@@ -98,7 +98,7 @@ def _triangles(vertices: Any, faces: Any, *, solid: bool) -> Any:
     return mesh
 
 
-def _height_field(m: Any, data: int, *, solid: bool) -> Any:
+def _height_field(m: MjModel, data: int, *, solid: bool) -> CollisionGeometry:
     """Return a height field as the triangles of its surface."""
     rows, columns = int(m.hfield_nrow[data]), int(m.hfield_ncol[data])
     start, (x, y, height, _) = int(m.hfield_adr[data]), m.hfield_size[data]
@@ -112,7 +112,7 @@ def _height_field(m: Any, data: int, *, solid: bool) -> Any:
     )
 
 
-def colliding_pairs(mujoco: Any, m: Any, geoms: Sequence[int]) -> list[tuple[int, int]]:
+def colliding_pairs(mujoco: Mujoco, m: MjModel, geoms: Sequence[int]) -> list[tuple[int, int]]:
     """Return the pairs of geoms that can collide in MuJoCo by masks, bodies and exclusions.
 
     Args:

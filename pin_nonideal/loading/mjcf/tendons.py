@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
-from pin_nonideal.description.forces import SpringDamper, UserForce
-from pin_nonideal.description.laws import UserFriction, UserLaw
+from pin_nonideal.description.forces import Force, SpringDamper, UserForce
+from pin_nonideal.description.laws import Law, UserFriction, UserLaw
 from pin_nonideal.types import Array
 
 from .motion import FixedTendon, SpatialTendon, Tendon
@@ -122,7 +121,7 @@ class ConstantForce:
 
 def tendon_forces(
     tree: Tree, tendons: list[Tendon | None], *, springs: bool, dampers: bool, friction: bool
-) -> tuple[list[Any], list[Any]]:
+) -> tuple[list[Law], list[Force]]:
     """Return springs as given forces, and dampers and friction as laws.
 
     Args:
@@ -134,8 +133,8 @@ def tendon_forces(
     """
     m = tree.compiled
     share = actuator_share(m, np.column_stack([m.actuator_damping, m.actuator_dampingpoly]), joints=False)
-    forces: list[Any] = []
-    laws: list[Any] = []
+    forces: list[Force] = []
+    laws: list[Law] = []
     for i, tendon in enumerate(tendons):
         if tendon is None:
             continue

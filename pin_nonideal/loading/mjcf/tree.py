@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -18,6 +17,7 @@ import pinocchio as pin
 from pin_nonideal.types import Array, JointModel, Model, Placement
 
 from .motion import Motion
+from .mujoco_types import MjModel, Mujoco
 
 FREE, BALL, SLIDE, HINGE = range(4)  # MuJoCo's mjtJoint
 GROUND = "universe"  # name that Pinocchio reserves
@@ -47,7 +47,7 @@ class Tree:
         key_names: names of the keyframes.
     """
 
-    compiled: Any
+    compiled: MjModel
     model: Model
     bodies: list[tuple[int, Placement]] = field(default_factory=list)
     body_names: list[str] = field(default_factory=list)
@@ -106,7 +106,7 @@ class Tree:
         ]
 
 
-def build_tree(mujoco: Any, compiled: Any, name: str) -> Tree:
+def build_tree(mujoco: Mujoco, compiled: MjModel, name: str) -> Tree:
     """Return the tree of a compiled model: bodies, joints, inertias, gravity, limits, sites and keyframes.
 
     Args:
@@ -137,7 +137,7 @@ def build_tree(mujoco: Any, compiled: Any, name: str) -> Tree:
     return tree
 
 
-def _names(m: Any, count: int, addresses: Array, kind: str, barred: str = "") -> list[str]:
+def _names(m: MjModel, count: int, addresses: Array, kind: str, barred: str = "") -> list[str]:
     """Return the names of all objects of a kind, with a new name for an unnamed object or a reserved name."""
     given = [m.names[adr : m.names.index(b"\0", adr)].decode() for adr in addresses[:count]]
     taken = {*given, barred}
@@ -174,7 +174,7 @@ def _add_body(tree: Tree, body: int, joint_names: list[str]) -> tuple[int, Place
     return carrier, place
 
 
-def _joint(m: Any, j: int) -> JointModel:
+def _joint(m: MjModel, j: int) -> JointModel:
     kind, axis = m.jnt_type[j], np.array(m.jnt_axis[j])
     if kind == FREE:
         return pin.JointModelFreeFlyer()
@@ -188,7 +188,7 @@ def _joint(m: Any, j: int) -> JointModel:
     return (pin.JointModelRevoluteUnaligned if kind == HINGE else pin.JointModelPrismaticUnaligned)(axis)
 
 
-def _reference_offset(m: Any, j: int) -> Placement:
+def _reference_offset(m: MjModel, j: int) -> Placement:
     """Return the placement from the reference pose of the file to the pose at coordinate zero."""
     axis, reference = np.array(m.jnt_axis[j]), float(m.qpos0[m.jnt_qposadr[j]])
     if m.jnt_type[j] == HINGE:
@@ -196,14 +196,14 @@ def _reference_offset(m: Any, j: int) -> Placement:
     return translation(-reference * axis) if m.jnt_type[j] == SLIDE else pin.SE3.Identity()
 
 
-def _inertia(m: Any, body: int) -> pin.Inertia:
+def _inertia(m: MjModel, body: int) -> pin.Inertia:
     """Return the inertia of a body in its own frame, from its principal moments."""
     turn = placement(np.zeros(3), m.body_iquat[body]).rotation
     moments = turn @ np.diag(m.body_inertia[body]) @ turn.T
     return pin.Inertia(float(m.body_mass[body]), np.array(m.body_ipos[body]), 0.5 * (moments + moments.T))
 
 
-def _set_limits(model: Model, m: Any, j: int, joint: int) -> None:
+def _set_limits(model: Model, m: MjModel, j: int, joint: int) -> None:
     """Set the ranges of position and of the total force of the drives; they do not affect the motion."""
     if m.jnt_type[j] <= BALL:
         return
@@ -214,7 +214,7 @@ def _set_limits(model: Model, m: Any, j: int, joint: int) -> None:
         model.lowerEffortLimit[i], model.upperEffortLimit[i] = m.jnt_actfrcrange[j]
 
 
-def actuator_share(m: Any, values: Array, *, joints: bool) -> Array:
+def actuator_share(m: MjModel, values: Array, *, joints: bool) -> Array:
     """Return the armature or damping that actuators add to their joints or tendons.
 
     Args:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import Any
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from .actuators import can_produce_force, is_supported
 from .equality import TENDON, equality_name
 from .fields import is_listed
 from .motion import Tendon
+from .mujoco_types import Mujoco
 from .shapes import colliding_pairs
 from .tendons import tendon_name
 from .transmissions import BODY
@@ -64,7 +64,7 @@ class UnsupportedFeatures:
 
 
 def report_unsupported(
-    mujoco: Any, tree: Tree, tendons: list[Tendon | None], unsupported: UnsupportedFeatures
+    mujoco: Mujoco, tree: Tree, tendons: list[Tendon | None], unsupported: UnsupportedFeatures
 ) -> None:
     """Report all unsupported features of a compiled model.
 
@@ -203,7 +203,7 @@ def _check_equalities(tree: Tree, tendons: list[Tendon | None], unsupported: Uns
         )
 
 
-def _check_contacts(mujoco: Any, tree: Tree, unsupported: UnsupportedFeatures) -> None:
+def _check_contacts(mujoco: Mujoco, tree: Tree, unsupported: UnsupportedFeatures) -> None:
     m, off = tree.compiled, mujoco.mjtDisableBit
     if m.opt.disableflags & (off.mjDSBL_CONTACT | off.mjDSBL_CONSTRAINT):
         return
@@ -229,7 +229,7 @@ def _check_limits(tree: Tree, tendons: list[Tendon | None], unsupported: Unsuppo
         unsupported.add_note(f"ranges of tendons that wrap around geoms are left out: {listed(wrapping)}")
 
 
-def _check_options(mujoco: Any, tree: Tree, unsupported: UnsupportedFeatures) -> None:
+def _check_options(mujoco: Mujoco, tree: Tree, unsupported: UnsupportedFeatures) -> None:
     m = tree.compiled
     if m.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP:
         unsupported.add_note("bodies do not fall asleep here, whatever the file's sleep flag")

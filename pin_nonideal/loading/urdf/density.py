@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
+
+from pin_nonideal.types import Array, CollisionGeometry
 
 from .validation import pose
 from .xml import listed, numbers
@@ -56,7 +57,7 @@ def add_inertias(root: ElementTree.Element, density: float, notes: list[str]) ->
         notes.append(f"meshes that are not closed count as their bounding boxes, in links {listed(boxes)}")
 
 
-def _inertia(shape: ElementTree.Element, density: float, link: str, boxes: list[str]) -> Any:
+def _inertia(shape: ElementTree.Element, density: float, link: str, boxes: list[str]) -> pin.Inertia:
     """Return the inertia of one shape in the link's frame, a pinocchio.Inertia."""
     where = f'link "{link}"'
     place = pose(shape.find("origin"), where)
@@ -66,14 +67,16 @@ def _inertia(shape: ElementTree.Element, density: float, link: str, boxes: list[
     return pin.Inertia(density * volume, center, density * moments).se3Action(place)
 
 
-def _solid(element: ElementTree.Element, where: str, boxes: list[str], link: str) -> tuple[float, Any, Any]:
+def _solid(
+    element: ElementTree.Element, where: str, boxes: list[str], link: str
+) -> tuple[float, Array, Array]:
     """Return volume, center and moments of inertia about the center at unit density, in the shape's axes."""
     import coal
 
     if element.tag == "mesh":
         return _mesh(element, where, boxes, link)
     if element.tag == "box":
-        solid: Any = coal.Box(numbers(element, "size", 3, None, where))
+        solid: CollisionGeometry = coal.Box(numbers(element, "size", 3, None, where))
     elif element.tag == "sphere":
         solid = coal.Sphere(float(numbers(element, "radius", 1, None, where)[0]))
     else:
@@ -83,7 +86,9 @@ def _solid(element: ElementTree.Element, where: str, boxes: list[str], link: str
     return solid.computeVolume(), solid.computeCOM(), solid.computeMomentofInertiaRelatedToCOM()
 
 
-def _mesh(element: ElementTree.Element, where: str, boxes: list[str], link: str) -> tuple[float, Any, Any]:
+def _mesh(
+    element: ElementTree.Element, where: str, boxes: list[str], link: str
+) -> tuple[float, Array, Array]:
     import coal
 
     scale = numbers(element, "scale", 3, (1, 1, 1), where)
@@ -104,7 +109,7 @@ def _mesh(element: ElementTree.Element, where: str, boxes: list[str], link: str)
     return box.computeVolume(), (low + high) / 2.0, box.computeMomentofInertiaRelatedToCOM()
 
 
-def _element(inertia: Any) -> ElementTree.Element:
+def _element(inertia: pin.Inertia) -> ElementTree.Element:
     """Return the `<inertial>` element of a pinocchio.Inertia."""
     element = ElementTree.Element("inertial")
     ElementTree.SubElement(element, "origin", {"xyz": " ".join(repr(float(x)) for x in inertia.lever)})

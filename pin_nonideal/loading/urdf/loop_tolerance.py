@@ -7,14 +7,14 @@ close, and dependent rows become slightly independent, which would determine ran
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
 from pin_nonideal.core_loader import core
-from pin_nonideal.description.constraints import FrameAnchor, JointCoupling, PointAnchor
+from pin_nonideal.description.constraints import Constraint, FrameAnchor, JointCoupling, PointAnchor
 from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.states.loop_closure import CLOSURE_TOLERANCE
 from pin_nonideal.states.projection import nearest_closure
@@ -43,7 +43,7 @@ class IndependentRows(NamedTuple):
     """
 
     model: Model
-    constraints: list[Any]
+    constraints: list[Constraint]
     q: Array
     note: str
 
@@ -88,7 +88,9 @@ def remove_dependent_rows(scene: Scene, tolerance: float) -> IndependentRows | N
     return IndependentRows(model, left, q, "; ".join(filter(None, (note, nearly))))
 
 
-def _split_welds(model: Model, constraints: list[Any], names: list[str]) -> tuple[Model, dict[int, _Points]]:
+def _split_welds(
+    model: Model, constraints: list[Constraint], names: list[str]
+) -> tuple[Model, dict[int, _Points]]:
     """Return the model with frames for the points of all two-frame welds, and the points by the weld's id."""
     welds: dict[int, _Points] = {}
     model = model.copy()
@@ -109,10 +111,10 @@ def _split_welds(model: Model, constraints: list[Any], names: list[str]) -> tupl
 
 
 def _remaining_constraints(
-    constraints: list[Any], welds: dict[int, _Points], program: core.Program, kept: NDArray[np.bool_]
-) -> tuple[list[Any], list[str]]:
+    constraints: list[Constraint], welds: dict[int, _Points], program: core.Program, kept: NDArray[np.bool_]
+) -> tuple[list[Constraint], list[str]]:
     """Return the remaining constraints, and descriptions of removed rows; complete welds stay welds."""
-    left: list[Any] = []
+    left: list[Constraint] = []
     gone: list[str] = []
     described = iter(program.constraints)
     first = 0
@@ -132,7 +134,7 @@ def _remaining_constraints(
     return left, gone
 
 
-def _select_rows(c: Any, kept: NDArray[np.bool_]) -> Any:
+def _select_rows(c: Constraint, kept: NDArray[np.bool_]) -> Constraint | None:
     """Return a constraint with some of its rows, or None without rows; unchanged if it cannot be divided."""
     if not kept.any():
         return None

@@ -17,6 +17,8 @@ import pinocchio as pin
 
 from pin_nonideal.description.constraints import Constraint, JointCoupling, PrescribedMotion
 from pin_nonideal.description.contacts import UserContact
+from pin_nonideal.description.forces import Force
+from pin_nonideal.description.laws import Law
 from pin_nonideal.description.time_functions import Constant
 from pin_nonideal.errors import LoadingError, nearest
 from pin_nonideal.types import Array, GeometryModel, Model
@@ -74,12 +76,12 @@ class RobotFile:
     visual: GeometryModel | None = None
     collision: GeometryModel | None = None
     constraints: list[Constraint] = field(default_factory=list)
-    forces: list[Any] = field(default_factory=list)
+    forces: list[Force] = field(default_factory=list)
     motors: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     q0: Array | None = None
     v0: Array | None = None
-    laws: list[Any] = field(default_factory=list)
+    laws: list[Law] = field(default_factory=list)
     actuation: Any = None
     keyframes: dict[str, Keyframe] = field(default_factory=dict)
     advice: str = ""
@@ -275,7 +277,7 @@ def _mimics(root: ElementTree.Element, path: Path) -> list[Constraint]:
 
 
 def _geometry(model: Model, root: ElementTree.Element, path: Path, kind: str, notes: list[str]) -> Any:
-    """Return the geometry of one kind, without unreadable meshes; each of them gives a note."""
+    """Return the geometry of one kind, without unreadable meshes; each such mesh gives a note."""
     geometry_type = pin.GeometryType.VISUAL if kind == "visual" else pin.GeometryType.COLLISION
     try:
         return pin.buildGeomFromUrdfString(

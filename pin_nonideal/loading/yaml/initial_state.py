@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pin_nonideal.errors import InputError, LoadingError, UnknownNameError, nearest, short_repr
 from pin_nonideal.loading.urdf.reader import RobotFile
 from pin_nonideal.states.held import Held
-from pin_nonideal.states.joint_order import order_words, tell_order
+from pin_nonideal.states.joint_order import describe_order, order_words
 from pin_nonideal.states.parsing import (
     joint_named,
     named_configuration,
@@ -171,5 +171,5 @@ def _requested_configuration(model: Model, start: Any, q0: NDArray[np.float64]) 
     """Return a configuration from a name, a table, or numbers in the order of the model."""
     if isinstance(start, (str, Mapping)):
         return named_configuration(model, start, q0, "load: q0")
-    tell_order(model, start, "load: q0", "nqs")
+    describe_order(model, start, "load: q0", "nqs")
     return with_unit_lengths(model, np.array(array("load: q0", start, (model.nq,))), "load: q0")

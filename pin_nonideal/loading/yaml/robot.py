@@ -13,6 +13,8 @@ from typing import Any, get_args
 
 from pin_nonideal.description import actuation, constraints, contacts, forces, laws
 from pin_nonideal.description import time_functions as timefunctions
+from pin_nonideal.description.constraints import Constraint
+from pin_nonideal.description.time_functions import TimeFunction
 from pin_nonideal.errors import InputError, LoadingError, nearest, short_repr
 from pin_nonideal.geometry.from_model import GeometryContact
 from pin_nonideal.types import Table
@@ -94,7 +96,7 @@ def _kind(value: object) -> str:
     return "nothing" if value is None else f"{'an' if kind[0] in 'aeiou' else 'a'} {kind}"
 
 
-def check_keys(table: Mapping[Any, Any], known: Iterable[str], where: str) -> None:
+def check_keys(table: Mapping[object, object], known: Iterable[str], where: str) -> None:
     """Check that all keys are known.
 
     Raises:
@@ -136,7 +138,7 @@ def build(kind: type, values: Any, where: str) -> Any:
         raise LoadingError(f"{where}: {error}") from None
 
 
-def time_function(table: Table, where: str) -> Any:
+def time_function(table: Table, where: str) -> TimeFunction:
     """Return a function of time from a table such as `{sinusoid: {amplitude: 1, omega: 2}}`.
 
     Raises:
@@ -145,7 +147,7 @@ def time_function(table: Table, where: str) -> Any:
     name, values = one_entry(table, where)
     if name not in FUNCTIONS:
         raise LoadingError(f'{where}: no function of time "{name}"{nearest(name, FUNCTIONS)}')
-    return build(FUNCTIONS[name], values, where)  # type: ignore[arg-type]
+    return build(FUNCTIONS[name], values, where)  # type: ignore[arg-type,no-any-return]
 
 
 def one_entry(table: Any, where: str) -> tuple[str, Any]:
@@ -213,7 +215,7 @@ def optional_string(table: Table, key: str, where: str) -> str | None:
     return value
 
 
-def loops(table: Table, where: str) -> list[Any]:
+def loops(table: Table, where: str) -> list[Constraint]:
     """Return anchors from the community keys `closed_loop` and `type` (6d without `type`).
 
     Raises:
@@ -236,7 +238,7 @@ def loops(table: Table, where: str) -> list[Any]:
         raise LoadingError(
             f"{where}: type must have one entry for each of the {len(pairs)} loops; got {found}"
         )
-    result: list[Any] = []
+    result: list[Constraint] = []
     for i, (pair, kind) in enumerate(zip(pairs, types, strict=True)):
         place = f"{where}: closed_loop[{i}]"
         if not isinstance(pair, list) or len(pair) != 2:

@@ -1,4 +1,4 @@
-"""Arrows of the constraint forces in the replay: at anchors, contacts and joints.
+"""Arrows of constraint, contact and friction forces in the replay: at anchors, contacts and joints.
 
 The arrow at an anchor is the reaction on the body of frame1, from the rows of the anchor in `lam`. With
 `lam_ideal` it is split into its ideal and its nonideal part. Its moment is an arc. `F_nonideal` and the

@@ -1,4 +1,4 @@
-"""Frictional elements at their positions: modes, friction over its limit, and cones of contacts."""
+"""Friction elements at their positions: modes, friction over its limit, and cones of contacts."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Element:
-    """Frictional element of the replay.
+    """Friction element of the replay.
 
     Attributes:
         name: name of the element in the run.

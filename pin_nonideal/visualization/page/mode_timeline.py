@@ -38,7 +38,7 @@ def mode_bands(t: Array, modes: NDArray[np.int8]) -> list[Bands]:
 
 
 def bands_of(run: Trajectory) -> list[tuple[str, Bands]]:
-    """Return the mode bands by name, for frictional elements and frictionless contacts that open or close.
+    """Return the mode bands by name, for friction elements and frictionless contacts that open or close.
 
     Contacts that stay open during the whole run are omitted, because two boxes already have 160 of them.
 

@@ -21,7 +21,7 @@ EVENTS = {
     "user": ("#65a30d", "a condition of the user's"),
     "other": ("#64748b", "something else"),
 }
-# Modes of frictional elements and contacts.
+# Modes of friction elements and contacts.
 MODES = {
     1: ("#0f766e", "slip +"),
     -1: ("#5eead4", "slip -"),

@@ -134,7 +134,7 @@ def test_errors_travel_with_what_they_tell(way):
     assert_same_run(again.trajectory, stopped.value.trajectory)
 
 
-# --- Files know their scene --------------------------------------------------------------------------------
+# --- Files with their scene --------------------------------------------------------------------------------
 
 
 def test_a_file_knows_what_it_was_made_from(tmp_path):

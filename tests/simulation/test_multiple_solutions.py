@@ -1,4 +1,4 @@
-"""Friction that follows its load leaves one motion, none, or several, and the answer says which.
+"""Load-dependent friction admits one motion, none or several, and the result reports which case holds.
 
 For one element the image g of its limit is convex, so that y = g(y) has two solutions at most; g has lengths
 of vectors in it, not sizes of numbers, and neither of two solutions need lie near the kink of a branch.

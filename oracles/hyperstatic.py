@@ -7,7 +7,7 @@ from scipy.optimize import linprog
 
 import pin_nonideal as pn
 
-from .given import given_force, mass_matrix
+from .applied_forces import given_force, mass_matrix
 from .rows import rows
 from .solutions import kkt_acceleration
 

@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from oracles.sharing import constraint_force, largest_least_load, least_norm, pressing_rows
+from oracles.hyperstatic import constraint_force, largest_least_load, least_norm, pressing_rows
 
 from ..support.mechanisms import GRAVITY, assert_close, body, empty, frame
 from ..support.seeds import seeds

@@ -305,7 +305,7 @@ def test_a_plank_rocks_on_a_lying_cylinder():
 @pytest.mark.parametrize("mu", [0.0, 0.5])
 @pytest.mark.parametrize("turn", [0.0, 1e-9, 0.01])
 def test_a_can_falls_on_two_rails(mu, turn):
-    """Edges along its side, which carry it at its rims; all the way its energy is told."""
+    """The edges along its side carry it at its rims, and the energy ledger closes at all times."""
     model, geometry = empty((0.0, 0.0, -GRAVITY)), pin.GeometryModel()
     joint = body(model, 0, pin.JointModelFreeFlyer(), "free", 1.0, inertia=0.01 * np.eye(3))
     across = pin.SE3(pin.rpy.rpyToMatrix(0.5 * np.pi, 0.0, 0.0), np.zeros(3))

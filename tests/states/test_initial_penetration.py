@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from oracles.nearest import distance, nearest_outside
+from oracles.nearest_closure import distance, nearest_outside
 
 from ..support.mechanisms import body, empty, frame, point_mass
 from ..support.seeds import seeds

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 from scipy.optimize import least_squares, minimize
 
-from .given import mass_matrix
+from .applied_forces import mass_matrix
 
 CLOSED = 1e-8  # residual of a closed configuration, relative to `size`
 

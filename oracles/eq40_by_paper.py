@@ -69,7 +69,7 @@ def letters(M, A, V=None):
     return Letters(root, B, V, J, D, E)
 
 
-def paper_road(M, F, A, b, C, V=None):
+def eq40_by_paper(M, F, A, b, C, V=None):
     """Solve by Eqs. (38)-(40) as printed."""
     root, B, _, J, _, _ = letters(M, A, V)
     n = len(M)

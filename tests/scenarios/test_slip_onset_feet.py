@@ -59,7 +59,7 @@ def drawn(seed):
 
 @cache
 def begun(seed):
-    """The solution at the start of a draw, which takes seconds with many feet."""
+    """Return the cached solution at the start of a random scene, which takes seconds with many feet."""
     scene, *_ = drawn(seed)
     return scene.solve(*scene.project(), 0.0)
 
