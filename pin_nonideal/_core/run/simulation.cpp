@@ -100,6 +100,7 @@ void Simulation::run() {
     while (!done() && between_steps()) {
         if (in_time) {
             time_stepping.step(options.dt, t_end, t_end);
+            growth.look();
             continue;
         }
         Proposal proposal = propose();
@@ -155,7 +156,7 @@ Simulation::Proposal Simulation::propose() {
     torques.sample();
     const bool adaptive = options.method.adaptive();
     if (p.searches_breaks) breaks.look(std::min(t_end, t + (adaptive ? h : options.dt)), adaptive);
-    double stop = torques.next_stop(t_end);
+    double stop = torques.next_stop(t, t_end);
     if (!adaptive)  // stay on the fixed grid, also after an event inside a step
         stop = std::min(stop, options.t0 + (whole_lengths(t - options.t0, options.dt) + 1.0) * options.dt);
     const double remaining = stop - t;

@@ -56,12 +56,12 @@ void Torques::take_rate_anew() {
     output_.configured_now();
 }
 
-double Torques::next_stop(double t_end) const {
+double Torques::next_stop(double after, double t_end) const {
     double stop = std::min(t_end, breaks_.next());
     if (const auto* sampled = std::get_if<SampledTorque>(&p.actuation))
         stop = std::min(stop, options_.t0 + now_.next_period * sampled->period);
     if (const auto* table = std::get_if<TorqueTable>(&p.actuation)) {
-        const auto next = std::upper_bound(table->times.begin(), table->times.end(), now_.t);
+        const auto next = std::upper_bound(table->times.begin(), table->times.end(), after);
         if (next != table->times.end()) stop = std::min(stop, *next);
     }
     return stop;

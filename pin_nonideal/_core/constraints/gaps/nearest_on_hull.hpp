@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "constraints/geometry.hpp"
@@ -51,6 +52,13 @@ struct Hull {
         double most = direction.dot(points[0]);
         for (const Vec3& point : points) most = std::max(most, direction.dot(point));
         return most;
+    }
+
+    // Return half of the least distance between a face and the points behind it.
+    double half_width() const {
+        double least = HUGE_VAL;
+        for (const Face& face : faces) least = std::min(least, 0.5 * (face.offset + support(-face.normal)));
+        return least;
     }
 
     template <class Vec>

@@ -33,6 +33,8 @@ struct Revolved {
         const Scalar high = half * along + above * across, low = below * across - half * along;
         return high > low ? high : low;
     }
+    // Return half of the least distance between opposite surfaces, for a cone in its middle.
+    double half_width() const { return std::min(half, middle()); }
     // Side of the solid: components of its normal away from the axis and along it, radius in the middle, growth along
     // the axis.
     double side_out() const { return 2.0 * half / std::hypot(2.0 * half, below - above); }

@@ -133,12 +133,17 @@ inline bool stays_apart(const Kind& kind, const Separation& a, const Separation&
 }
 
 // Maximum penetration at which the direction out of contact is defined. Segments, rims and sides need a penetration
-// below their rounding radius. Points in solids and over planes have no limit.
+// below their rounding radius. A point in a solid is nearest to another face beyond the middle between two faces. Points
+// over planes have no limit.
 inline double rounded_by(const Kind& kind) {
     if (const auto* capsules = std::get_if<CapsulesRow>(&kind)) return capsules->radius;
     if (const auto* line = std::get_if<LineRow>(&kind)) return line->radius;
     if (const auto* rim = std::get_if<RimRow>(&kind)) return rim->radius;
     if (const auto* rims = std::get_if<RimsRow>(&kind)) return rims->radius;
+    if (const auto* box = std::get_if<BoxRow>(&kind))
+        return box->radius + std::min({box->half[0], box->half[1], box->half[2]});
+    if (const auto* hull = std::get_if<HullRow>(&kind)) return hull->radius + hull->solid.half_width();
+    if (const auto* revolved = std::get_if<RevolvedRow>(&kind)) return revolved->radius + revolved->solid.half_width();
     return HUGE_VAL;
 }
 

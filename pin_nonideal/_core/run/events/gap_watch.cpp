@@ -156,6 +156,12 @@ void GapWatch::begin_time_steps(double least) {
     followed = gaps.current = false;
 }
 
+bool GapWatch::stays_open_in_step(int gap) const {
+    const WayBound::Pair& pair = ways.pair(gap);
+    if (!gaps.ways.summed || pair.unknown || pair.turns) return false;
+    return gaps.width[gap] > WayBound::change(pair, steps_of_far * ways.way_of_step(gaps.ways, gap), 0.0, 0.0);
+}
+
 const std::vector<int>& GapWatch::come(const VecX& way) {
     step(way, 1.0);
     gaps.ways.go_on();

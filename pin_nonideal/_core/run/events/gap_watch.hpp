@@ -65,6 +65,8 @@ public:
     // dof since the last sample, or since the state at which these steps began. `leave_far` then makes wide gaps far.
     const std::vector<int>& come(const VecX& way);
     void leave_far();
+    // Check if a near gap was wider at its sample than its bodies can close by the end of this step of time stepping.
+    bool stays_open_in_step(int gap) const;
     // Begin time stepping: all gaps become near, except far gaps wider than `least`.
     void begin_time_steps(double least);
 

@@ -52,7 +52,7 @@ void ModeChanges::change(FoundEvent event) {
 // End the bouncing. If the motion of a low flight is not found, bridge it by time stepping if possible.
 void ModeChanges::end_bouncing() {
     try {
-        landing_.end_bouncing(torques_.next_stop(options_.end()));
+        landing_.end_bouncing(torques_.next_stop(now_.t, options_.end()));
     } catch (const Failure& failure) {
         if (!leads_on(failure) || !step_over(failure)) throw;
     }

@@ -22,6 +22,8 @@ constexpr double longer = 5.0;
 // Maximum growth in one fixed step that counts. Faster growth comes from the method: the step is too long, and the
 // motion overflows.
 constexpr double growth_in_step = 0.1;
+// Speed [rad/s or m/s] that no mechanism has. A run that reaches it has failed, whatever the cause.
+constexpr double impossible_speed = 1e12;
 
 }  // namespace
 
@@ -61,9 +63,11 @@ bool GrowthGuard::is_costly() const {
 }
 
 void GrowthGuard::judge() {
-    if (!is_exponential() && !is_costly()) return;
-    const double rate = growth(progress_.growth_speeds.size() - 1);
-    if (!options_.method.adaptive() && rate * options_.dt > growth_in_step) return;
+    const size_t last = progress_.growth_speeds.size() - 1;
+    const bool impossible = progress_.growth_speeds.back() > impossible_speed && last >= half;
+    if (!impossible && !is_exponential() && !is_costly()) return;
+    const double rate = growth(last);
+    if (!impossible && !options_.method.adaptive() && rate * options_.dt > growth_in_step) return;
     int dof = 0;
     progress_.y.segment(system_.nq, system_.nv).cwiseAbs().maxCoeff(&dof);
     throw Failure(Failure::Kind::growing, progress_.t, {dof, largest_source()}, rate);

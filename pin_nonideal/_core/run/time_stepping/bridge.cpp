@@ -39,10 +39,20 @@ TimeStepping::TimeStepping(System& system, Progress& progress, GapWatch& watch, 
       moreau_contacts_(system, watch), lasts_(!may_differ(system.p, options)),
       asked_always_(asks_always(system.p, options)) {}
 
+// End of a step of this size: at a stop, a jump of the actuation or a due sample before it. Times that differ by rounding
+// are one end, the last of them.
 double TimeStepping::end_of_step(double size, double stop, double t_end) const {
-    double end = std::min({now_.t + size, stop, torques_.next_stop(t_end)});
-    if (options_.output_dt > 0.0) end = std::min(end, std::max(output_.next(), std::nextafter(now_.t, stop)));
-    return stop - end < least_part * size ? stop : end;
+    double end = now_.t + size;
+    const double rounding = least_part * size;
+    const auto meet = [&](double time) {
+        if (!(time > now_.t + rounding)) return;
+        if (time < end - rounding) end = time;
+        else if (time < end + rounding) end = std::max(end, time);
+    };
+    meet(torques_.next_stop(now_.t + rounding, t_end));
+    if (options_.output_dt > 0.0) meet(output_.next());
+    if (stop < end + rounding) end = stop;
+    return end;
 }
 
 // Check if nothing moves and the sticking elements leave no freedom.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "contact/impact.hpp"
 #include "dynamics/power.hpp"
 #include "dynamics/friction_limit.hpp"
 #include "dynamics/acceleration.hpp"
@@ -155,19 +156,22 @@ void Moreau::solve_friction(double t) {
     }
 }
 
-// Compute the velocity and the modes at the step's end. Elements below their limit stick.
+// Compute the velocity and the modes at the step's end. Elements below their limit
+// stick, and those whose slip is zero.
 void Moreau::end_velocity() {
     alpha_ = problem_.alpha0;
     alpha_.noalias() += problem_.W * force_;
     problem_.acceleration(p, w, force_, a_friction_);
     a_friction_ += a_free_;
     mean_.end(a_friction_, v1_);
+    const double still = rest_rate(v1_);
     for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e) {
         const int dim = problem_.dims[e];
         w.state.percussion.segment(p.blocks[p.frictions[e].block].row, dim) = force_.segment(at, dim);
         shifted_ = force_.segment(at, dim);
         if (dim == 1) shifted_[0] -= force_limit_.middle[at];
-        const bool held = shifted_.norm() < force_limit_[e] * (1.0 - limit_rounding);
+        const bool rests = h_ * alpha_.segment(at, dim).norm() <= still;
+        const bool held = shifted_.norm() < force_limit_[e] * (1.0 - limit_rounding) || rests;
         modes_[e] = held ? sticking : dim > 1 || alpha_[at] > 0.0 ? slip_plus : slip_minus;
         const Block& block = p.blocks[p.frictions[e].block];
         if (held && block.dof >= 0) v1_.segment(block.dof, block.total).setZero();

@@ -66,7 +66,7 @@ double MoreauContacts::allowed(double t, double h, const VecX& y) {
     bool placed = false;
     double shortest = h;
     for (int i : watch_.gaps.near_gaps) {
-        if (!(rounded_by_[i] < HUGE_VAL) || w.state.closed[i]) continue;
+        if (!(rounded_by_[i] < HUGE_VAL) || w.state.closed[i] || watch_.stays_open_in_step(i)) continue;
         if (!placed) {
             system_.read(y);
             kinematics(p.mechanism, w.now.terms, system_.q, system_.v);
@@ -412,11 +412,12 @@ bool MoreauContacts::solve_laws() {
     bool solved = error <= most_miss;
     const bool starts = v0_.cwiseAbs().maxCoeff() <= rest_speed;
     if (solved && !(starts && moves())) return true;
-    respond();
-    if (!solved) {
-        relaxed_f_ = f_.head(n);
-        f_.head(n) = guess_;
+    if (!solved && error <= most_relaxed) {
+        relax();
+        return true;
     }
+    respond();
+    if (!solved) f_.head(n) = guess_;
     const auto W = W_.topLeftCorner(n, n);
     f_.head(n) -= middle_.head(n);
     w1_.head(n) = w0_.head(n);
@@ -424,11 +425,6 @@ bool MoreauContacts::solve_laws() {
     if (!solved) solved = solver_.solve(W, w1_.head(n), cones_, true, f_.head(n), true) == ConeStatus::solved;
     if (starts) solved = keep_rest(solved) || solved;
     f_.head(n) += middle_.head(n);
-    if (!solved && error <= most_relaxed) {
-        f_.head(n) = relaxed_f_;
-        relax();
-        return true;
-    }
     return solved;
 }
 
@@ -450,6 +446,7 @@ void MoreauContacts::measure_end() {
 bool MoreauContacts::moves() {
     const int n = static_cast<int>(rows_.size());
     measure_end();
+    if (separate_) return !trees_.rests(v1_);
     return w1_.head(n).cwiseAbs().maxCoeff() > limit_rounding * w0_.head(n).cwiseAbs().maxCoeff();
 }
 

@@ -71,6 +71,14 @@ void SeparateTrees::keep_rest(double h, const VecX& v0, VecX& v1) const {
     }
 }
 
+bool SeparateTrees::rests(const VecX& a) const {
+    for (const BlockNode& node : solver_.problem.nodes) {
+        const double free = a_free_.segment(node.first, node.size).cwiseAbs().maxCoeff();
+        if (!(a.segment(node.first, node.size).cwiseAbs().maxCoeff() <= canceled * free)) return false;
+    }
+    return true;
+}
+
 ConeResiduals SeparateTrees::residuals(const VecX& middle, const VecX& f) {
     const int n = solver_.problem.rows;
     shift(middle);

@@ -23,6 +23,8 @@ public:
     void move(const VecX& f, VecX& a, VecX& w);
     // Set the velocity v1 of trees to zero that were at rest, v0 = 0, and whose forces cancel over the step h.
     void keep_rest(double h, const VecX& v0, VecX& v1) const;
+    // Check if accelerations of the trees with elements are rounding.
+    bool rests(const VecX& a) const;
     // Element that misses the laws most, and the velocity by which it misses them.
     const BlockSolver::Miss& miss() const { return solver_.miss(); }
     // Errors of the laws for the forces f.

@@ -1,0 +1,91 @@
+"""Time stepping of many bodies in contact, beside MuJoCo: time of whole runs, creep, errors of the laws."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+import pin_nonideal as pn
+
+from . import timing
+from .contact_scenes import ContactScene, balls_in_box, dominoes, heavy_on_light, mujocos, ours, stack, wall
+
+STEP = 1e-3  # [s]
+SCENES = (
+    *(stack(count) for count in (3, 5, 10, 20)),
+    *(heavy_on_light(ratio) for ratio in (1e2, 1e6)),
+    dominoes(10),
+    wall(5, 4),
+    balls_in_box(30),
+    balls_in_box(100),
+)
+QUICK = 4  # number of scenes of a quick run
+
+
+def measure(given: ContactScene, rounds: int, with_mujoco: bool) -> dict[str, Any]:
+    """Return the times of one scene, and what its motion shows.
+
+    The time of a run includes its start. It is that of the processor, by the minimum of some interleaved runs.
+    """
+    begin = timing.clock()
+    scene = ours(given)
+    row: dict[str, Any] = {"case": given.title, "made": timing.clock() - begin, "contacts": len(scene.contacts)}
+    steps = round(given.duration / STEP)
+    run = None
+    mine, theirs = [], []
+    for _ in range(rounds):
+        begin = timing.clock()
+        run = pn.simulate(
+            scene, given.duration, method="moreau", dt=STEP, output_dt=given.duration, progress=False
+        )
+        mine.append(timing.clock() - begin)
+        if not with_mujoco:
+            continue
+        import mujoco
+
+        begin = timing.clock()
+        model, data = mujocos(given, STEP)
+        row["mujoco_made"] = timing.clock() - begin
+        begin = timing.clock()
+        mujoco.mj_step(model, data, steps)
+        theirs.append(timing.clock() - begin)
+        row["mujoco_moved"] = moved(given, data.qpos.reshape(-1, 7)[:, :3])
+    assert run is not None
+    row |= {"seconds": min(mine), "steps": steps, "moved": moved(given, run.q[-1].reshape(-1, 7)[:, :3])}
+    row["residual"] = max(run.stats.signorini, run.stats.coulomb, run.stats.dissipation)
+    row["relaxed"] = sum(event.kind == "relaxed" for event in run.events)
+    if theirs:
+        row |= {"mujoco_seconds": min(theirs), "ratio": min(mine) / min(theirs)}
+    return row
+
+
+def moved(given: ContactScene, end: Any) -> float:
+    """Return the largest displacement of a body [m]."""
+    return float(np.abs(end - [body.at for body in given.bodies]).max())
+
+
+def run(rivals: Any, quick: bool, say: Callable[[str], None]) -> list[dict[str, Any]]:
+    """Measure all scenes.
+
+    Args:
+        rivals: names of the tools to compare with.
+        quick: whether to run the small scenes only, once.
+        say: function that prints a line.
+    """
+    rows = []
+    for given in SCENES[:QUICK] if quick else SCENES:
+        row = measure(given, 1 if quick else 3, "mujoco" in rivals)
+        rows.append(row)
+        per_step = row["seconds"] / row["steps"] * 1e6
+        line = f"  {given.title}: {per_step:.3g} us a step, made in {row['made']:.3g} s"
+        if "ratio" in row:
+            line += f"; ours over MuJoCo {row['ratio']:.2f}, making {row['made'] / row['mujoco_made']:.3g}"
+        line += f"; errors of the laws {row['residual']:.1e}, {row['relaxed']} relaxed"
+        if given.rests:
+            line += f"; moved {row['moved']:.1e} m" + (
+                f", MuJoCo {row['mujoco_moved']:.1e} m" if "mujoco_moved" in row else ""
+            )
+        say(line)
+    return rows
