@@ -77,7 +77,8 @@ MatX free_multipliers(const std::vector<Block>& blocks, const std::vector<double
     const std::vector<int> dependent = dependent_rows(s);
     const std::vector<int>& rows = s.envelope.row_at;
     MatX used = -dependence(blocks, B, s, dependent).transpose();
-    for (size_t k = 0; k < dependent.size(); ++k) used(s.envelope.position[dependent[k]], static_cast<Eigen::Index>(k)) = 1.0;
+    for (size_t k = 0; k < dependent.size(); ++k)
+        used(s.envelope.position[dependent[k]], static_cast<Eigen::Index>(k)) = 1.0;
     VecX inverse(rows.size());
     for (size_t l = 0; l < rows.size(); ++l) inverse[l] = 1.0 / all.weight[rows[l]];
     const MatX S = used.transpose() * inverse.asDiagonal() * used;

@@ -11,7 +11,6 @@ TreeBlocks::TreeBlocks(const Program& p) : size_(p.mechanism.nv, 0), node_(p.mec
     const Mechanism& m = p.mechanism;
     for (int dof = 0; dof < m.nv; ++dof) {
         const int root = m.dof_parent[dof] < 0 ? dof : root_[m.dof_parent[dof]];
-        if (root == dof) roots_.push_back(root);
         root_.push_back(root);
         local_.push_back(size_[root]++);
         contiguous_ = contiguous_ && root + local_[dof] == dof;

@@ -23,16 +23,11 @@ public:
     bool fill(const Program& p, const Workspace& w, const std::vector<StepRow>& rows,
               const std::vector<ConeElement>& cones, BlockProblem& problem);
 
-    // First dofs of all trees, and the number of dofs of a tree.
-    const std::vector<int>& roots() const { return roots_; }
-    int size(int root) const { return size_[root]; }
-
 private:
     bool is_well_conditioned(const Workspace& w, int root) const;
     int node_of(const Program& p, const Workspace& w, int root, BlockProblem& problem);
 
     std::vector<int> root_, local_, size_;  // by dof: first dof of its tree, index in it; by first dof: dofs of the tree
-    std::vector<int> roots_;                // first dofs of all trees
     bool contiguous_ = true;                // the dofs of every tree follow one another
     std::vector<std::vector<int>> trees_;   // first dofs of the trees that a block moves
     std::vector<int> node_;                 // node of a tree by first dof, -1 if it takes no part

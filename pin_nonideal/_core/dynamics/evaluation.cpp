@@ -21,6 +21,9 @@ constexpr double balance_rounding = 1e-14;
 // Rounding of a sum, relative to the sum of the magnitudes of its terms.
 constexpr double sum_rounding = 1e-13;
 
+// Evaluations between two looks at signals and wall time, which take a millisecond or less each.
+constexpr long evaluations_a_watch = 256;
+
 static void factor_mass(const Program& p, Workspace& w, double t) {
     const int dof = factorize(p.mechanism, w.now.terms);
     if (dof < 0) return;
@@ -117,7 +120,7 @@ static void place_wrenches(const Program& p, Workspace& w) {
 }
 
 void assemble_forces(const Program& p, Workspace& w, double t, const VecX& v) {
-    ++w.counters.evaluations;
+    if (++w.counters.evaluations % evaluations_a_watch == 0 && w.watch) w.watch(t);
     move_bodies(p.mechanism, w.now.terms, v);
     bias_forces(p.mechanism, w.now.terms);
     w.now.F = -w.now.terms.nle;

@@ -25,4 +25,9 @@ struct Failure : std::exception {
         : kind(k), time(t), elements(std::move(e)), value(x) {}
 };
 
+// Failure that ends a run whatever the search in which it occurs. No search may catch it.
+struct EndOfRun {
+    Failure failure;
+};
+
 }  // namespace pn

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <functional>
 
 #include "constraints/rank.hpp"
 #include "dynamics/implicit_drives.hpp"
@@ -139,6 +140,7 @@ struct Workspace {
     Scratch scratch;
     Counters counters;
     bool continues = false;  // among several motions select the nearest to the previous motion
+    std::function<void(double t)> watch;  // called every few evaluations, and may end the run by an exception
 
     explicit Workspace(const Program& p);
     Workspace(Workspace&&) noexcept;

@@ -121,7 +121,21 @@ void Simulation::run() {
     if (options.save) save();
 }
 
-// Runs are interrupted or saved only here, because the state between two steps is all that the next step needs.
+void Simulation::watch_evaluations() {
+    if (!options.tick && !(options.max_wall > 0.0)) return;
+    w.watch = [this](double at) {
+        if (options.tick) options.tick(at);
+        if (is_late()) throw EndOfRun{Failure(Failure::Kind::wall, t, {}, options.max_wall)};
+    };
+}
+
+Simulation::~Simulation() { w.watch = nullptr; }
+
+bool Simulation::is_late() const {
+    return options.max_wall > 0.0 && std::chrono::duration<double>(Clock::now() - begun).count() > options.max_wall;
+}
+
+// Runs are saved only here, because the state between two steps is all that the next step needs.
 bool Simulation::between_steps() {
     try {
         if (options.tick && ++ticks % steps_a_tick == 0) options.tick(t);
@@ -134,8 +148,7 @@ bool Simulation::between_steps() {
         throw Failure(Failure::Kind::step_size, t, {}, static_cast<double>(out.steps));
     if (options.max_steps > 0 && out.steps >= options.max_steps)
         throw Failure(Failure::Kind::steps, t, {}, static_cast<double>(out.steps));
-    if (options.max_wall > 0.0 && std::chrono::duration<double>(Clock::now() - begun).count() > options.max_wall)
-        throw Failure(Failure::Kind::wall, t, {}, options.max_wall);
+    if (is_late()) throw Failure(Failure::Kind::wall, t, {}, options.max_wall);
     return !options.callback || torques.ask_callback();
 }
 
@@ -365,6 +378,8 @@ static void keep_what_stops(Recording& out, Steps steps) {
         steps();
     } catch (const Failure& failure) {
         out.failure = failure;
+    } catch (const EndOfRun& end) {
+        out.failure = end.failure;
     } catch (...) {
         out.error = std::current_exception();
     }
@@ -372,6 +387,7 @@ static void keep_what_stops(Recording& out, Steps steps) {
 
 void simulate(const Program& p, Workspace& w, const VecX& q0, const VecX& v0, const Options& options, Recording& out) {
     Simulation simulation(p, w, options, out);
+    simulation.watch_evaluations();
     keep_what_stops(out, [&] {
         simulation.start(q0, v0);
         simulation.run();
@@ -380,6 +396,7 @@ void simulate(const Program& p, Workspace& w, const VecX& q0, const VecX& v0, co
 
 void resume(const Program& p, Workspace& w, const std::string& state, const Options& options, Recording& out) {
     Simulation simulation(p, w, options, out);
+    simulation.watch_evaluations();
     simulation.restore(state);
     keep_what_stops(out, [&] { simulation.run(); });
 }

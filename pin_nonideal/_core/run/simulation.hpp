@@ -26,6 +26,9 @@ public:
     void restore(const std::string& state);
     // Integrate to the end, from the start or from a restored state.
     void run();
+    // Look at signals and the wall time every few evaluations too. A step may take many of them.
+    void watch_evaluations();
+    ~Simulation();
 
 protected:
     struct Proposal {
@@ -56,6 +59,7 @@ protected:
     bool done() const { return t >= t_end || value_events.ends_run(); }
     // Report progress, save, check the limits of the run and call the callback. Return false if the run must stop.
     bool between_steps();
+    bool is_late() const;
     void save();
 
     const Program& p;

@@ -26,6 +26,8 @@ public:
     const Miss& miss() const { return miss_; }
     double error() const { return error_; }  // largest relative error of an element
     int newton_steps() const { return newton_.steps(); }
+    // Response of a row to its own force.
+    double own_response(int row, const VecX& f) const { return f[row] / newton_.stiffness(row); }
     const VecX& x() const { return x_; }  // motion by unknown, of the nodes
     const VecX& w() const { return w_; }  // rows of the motion
 

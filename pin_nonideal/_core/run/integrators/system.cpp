@@ -148,7 +148,10 @@ void System::settle(double t, VecX& y, VecX& dy, bool evaluates, bool goes_throu
         return kinetic_energy(p.mechanism, w.now.terms, v) + potential_energy(p.mechanism, w.now.terms);
     };
     // Factor the rows of the new modes. Sticking elements must not move during the projection.
-    bool chosen = begin_rows(p, w, t, q, v);
+    configure(p, w, t, q, v);
+    const bool near = ng == 0 && w.now.rows.orthogonal && !w.state.sticks_anywhere();
+    if (near) choose_rows_near(p, w, t, q, v);
+    bool chosen = near || configure_step(p, w);
     const double before = energy && !w.now.rows.blocks.empty() ? total() : 0.0;
     const double longest_single = longest_single_move(p, w);
     if (longest_single > 0.0) q_before_ = q;

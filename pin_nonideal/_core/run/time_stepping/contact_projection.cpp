@@ -23,7 +23,7 @@ static void hold_locked(const Program& p, const Workspace& w, VecX& x) {
 }
 
 ContactProjection::ContactProjection(const Program& p)
-    : blocks_(p), r_(VecX::Zero(p.layout.rows)), move_(VecX::Zero(p.mechanism.nv)) {}
+    : blocks_(p), flyers_(MeanVelocity::flyers(p)), r_(VecX::Zero(p.layout.rows)), move_(VecX::Zero(p.mechanism.nv)) {}
 
 // Add an element of the rows of a block, or join them to the last element.
 void ContactProjection::add(int block, int rows, bool joined) {
@@ -55,8 +55,8 @@ bool ContactProjection::pose(const Program& p, Workspace& w, bool sticks) {
     return blocks_.fill(p, w, rows_, elements_, least_.problem) && least_.pose();
 }
 
-// Move q until the gaps are closed. Return true if it moves.
-bool ContactProjection::close_gaps(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
+// Move q until the gaps are closed. Bodies that turn keep their momentum. Return true if q moves.
+bool ContactProjection::close_gaps(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
     const double floor = projection_floor * scene_size(p, w);
     double last = HUGE_VAL;
     bool moves = false;
@@ -69,6 +69,7 @@ bool ContactProjection::close_gaps(const Program& p, Workspace& w, double t, Vec
         hold_locked(p, w, move_);
         q_from_ = q;
         retract(p.mechanism, q_from_.data(), move_.data(), q.data());
+        for (const auto& flyer : flyers_) flyer.turn_axes(v, move_.segment<3>(flyer.dof + 3));
         place_bodies(p.mechanism, w.now.terms, q);
         for (int i : w.now.touching) measure_gap(p, w, t, v, i);
         moves = true;

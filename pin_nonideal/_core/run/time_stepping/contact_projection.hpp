@@ -3,6 +3,7 @@
 
 #include "complementarity/blocks/least_move.hpp"
 #include "contact/tree_blocks.hpp"
+#include "run/time_stepping/mean_velocity.hpp"
 
 namespace pn {
 
@@ -21,13 +22,14 @@ public:
 
 private:
     bool pose(const Program& p, Workspace& w, bool sticks);
-    bool close_gaps(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
+    bool close_gaps(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
     bool open_held_apart(const Program& p, Workspace& w);
     void meet_rates(const Program& p, Workspace& w, VecX& v);
     void rest(const Program& p, Workspace& w, VecX& v);
     void add(int block, int rows, bool joined);
 
     TreeBlocks blocks_;
+    std::vector<MeanVelocity::FreeFlyer> flyers_;
     LeastMove least_;
     std::vector<StepRow> rows_;
     std::vector<ConeElement> elements_;

@@ -12,38 +12,43 @@ constexpr double configuration_rounding = 1e-13;
 constexpr double close = 1e-9;
 constexpr int most_moves = 4;
 
-// Give the linear velocity of a free flyer in the axes into which its own turn in a time.
-static void turn_axes(VecX& v, int dof, double time) {
-    const Eigen::Vector3d angle = -time * v.segment<3>(dof + 3);
+void MeanVelocity::FreeFlyer::turn_axes(VecX& v, const Eigen::Vector3d& angle) const {
     const double size = angle.norm();
     if (size == 0.0) return;
-    v.segment<3>(dof) = Eigen::AngleAxisd(size, angle / size) * v.segment<3>(dof).eval();
+    const Eigen::Vector3d about_com = v.segment<3>(dof + 3).cross(com);
+    v.segment<3>(dof) = Eigen::AngleAxisd(-size, angle / size) * (v.segment<3>(dof) + about_com) - about_com;
 }
 
-MeanVelocity::MeanVelocity(const Program& p) : turning_(VecX::Zero(p.mechanism.nv)) {
+std::vector<MeanVelocity::FreeFlyer> MeanVelocity::flyers(const Program& p) {
+    std::vector<FreeFlyer> out;
     for (const Joint& joint : p.mechanism.joints)
-        if (joint.kind == JointKind::free_flyer) flyers_.push_back(joint.iv);
+        if (joint.kind == JointKind::free_flyer) out.push_back({joint.iv, joint.com.eigen()});
+    return out;
 }
+
+MeanVelocity::MeanVelocity(const Program& p) : flyers_(flyers(p)), turning_(VecX::Zero(p.mechanism.nv)) {}
 
 void MeanVelocity::begin(double h, const VecX& v0) {
     h_ = h;
     start_ = v0;
-    for (int dof : flyers_) turn_axes(start_, dof, 0.5 * h);
+    for (const FreeFlyer& flyer : flyers_) flyer.turn_axes(start_, 0.5 * h * v0.segment<3>(flyer.dof + 3));
     value_ = start_;
     moves_ = 0;
     measure();
 }
 
 void MeanVelocity::measure() {
-    for (int dof : flyers_)
-        turning_.segment<3>(dof) = value_.segment<3>(dof + 3).cross(value_.segment<3>(dof));
+    for (const FreeFlyer& flyer : flyers_) {
+        const Eigen::Vector3d v = value_.segment<3>(flyer.dof), omega = value_.segment<3>(flyer.dof + 3);
+        turning_.segment<3>(flyer.dof) = omega.cross(v + omega.cross(flyer.com));
+    }
     back_ = start_ - value_ + 0.5 * h_ * turning_;
 }
 
 void MeanVelocity::end(const VecX& a, VecX& v1) {
     end_ = start_ + h_ * (a + turning_);
     v1 = end_;
-    for (int dof : flyers_) turn_axes(v1, dof, 0.5 * h_);
+    for (const FreeFlyer& flyer : flyers_) flyer.turn_axes(v1, 0.5 * h_ * end_.segment<3>(flyer.dof + 3));
 }
 
 bool MeanVelocity::move() {

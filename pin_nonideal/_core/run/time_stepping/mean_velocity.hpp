@@ -1,6 +1,8 @@
 // Mean velocity of a time step, at which its forces are taken.
 #pragma once
 
+#include <Eigen/Geometry>
+
 #include "dynamics/workspace.hpp"
 
 namespace pn {
@@ -9,10 +11,18 @@ namespace pn {
 // takes the forces at the velocity of the start.
 //
 // The linear velocity v of a free flyer is given in axes that turn with it. Inside a step it is given in the axes at the
-// middle of the step. Its rate there is the acceleration plus w x v, so a body that rolls or flies keeps its speed while
-// it turns.
+// middle of the step, so that the velocity u = v + w x c of its center of mass c keeps its direction in space. Its rate
+// there is the acceleration plus w x u: a body that rolls or flies keeps its speed and momentum while it turns.
 class MeanVelocity {
 public:
+    struct FreeFlyer {
+        int dof = 0;           // first of its six dofs
+        Eigen::Vector3d com;   // center of mass of its body
+        // Give the velocity in axes turned by `angle`, with the velocity of the center of mass unchanged in space.
+        void turn_axes(VecX& v, const Eigen::Vector3d& angle) const;
+    };
+    static std::vector<FreeFlyer> flyers(const Program& p);
+
     explicit MeanVelocity(const Program& p);
 
     // Begin a step of length h at the velocity v0.
@@ -37,7 +47,7 @@ public:
 private:
     void measure();
 
-    std::vector<int> flyers_;  // first dofs of the free flyers
+    std::vector<FreeFlyer> flyers_;
     double h_ = 0.0;
     VecX value_, start_, end_, next_;
     VecX turning_;  // rates of the linear velocities by turning axes

@@ -46,13 +46,15 @@ void Moreau::step(double t, double h, VecX& y, double& moved_energy) {
     move_ = 0.5 * h * v0_;
     retract(m, y.data(), move_.data(), q_mid_.data());
     const double middle = t + 0.5 * h;
+    redundant_ = w.now.rows.redundant;
+    t0_ = t;
+    q0_ = y.head(system_.nq);
     set_modes(p, w, unloaded_);
     mean_.begin(h, v0_);
     system_.read(y);
     JointDrives::Step drives(drives_, p, w, t, h, system_.q, v0_);
-    sweep(middle, drives, begin_rows(p, w, middle, q_mid_, mean_.value()), true);
-    while (mean_.move())
-        sweep(middle, drives, p.has_user_rows && begin_rows(p, w, middle, q_mid_, mean_.value()), p.has_user_rows);
+    sweep(middle, drives, true);
+    while (mean_.move()) sweep(middle, drives, p.has_user_rows);
     flight_.move(p, w, h, y.data(), v0_, mean_.value(), v1_);
     if (system_.energy) {
         moved_energy += drives.energy(mean_.start(), mean_.finish());
@@ -67,9 +69,10 @@ void Moreau::step(double t, double h, VecX& y, double& moved_energy) {
 }
 
 // Solve the step with the forces at the mean velocity found so far. `anew`: the rows have changed.
-void Moreau::sweep(double t, JointDrives::Step& drives, bool chosen, bool anew) {
+void Moreau::sweep(double t, JointDrives::Step& drives, bool anew) {
     drives.move(mean_.start(), mean_.value());
-    solve_without_friction(t, chosen);
+    if (anew) begin_rows_inside(p, w, t0_, q0_, t, q_mid_, mean_.value(), redundant_);
+    solve_without_friction(t);
     if (anew) respond();
     pose_problem();
     solve_friction(t);
@@ -77,8 +80,9 @@ void Moreau::sweep(double t, JointDrives::Step& drives, bool chosen, bool anew) 
 }
 
 // Solve the motion without friction of the elements, with constraints satisfied at the step's end.
-void Moreau::solve_without_friction(double t, bool chosen) {
-    continue_step(p, w, t, mean_.value(), chosen);
+void Moreau::solve_without_friction(double t) {
+    assemble_forces(p, w, t, mean_.value());
+    solve_dynamics(p, w, t, mean_.value());
     a_free_ = w.now.a;
     lam_free_ = w.now.lam;
     if (w.now.rows.blocks.empty()) return;

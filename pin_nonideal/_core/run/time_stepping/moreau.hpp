@@ -27,8 +27,8 @@ public:
     void step(double t, double h, VecX& y, double& moved_energy);
 
 private:
-    void sweep(double t, JointDrives::Step& drives, bool chosen, bool anew);
-    void solve_without_friction(double t, bool chosen);
+    void sweep(double t, JointDrives::Step& drives, bool anew);
+    void solve_without_friction(double t);
     void respond();
     void pose_problem();
     void solve_friction(double t);
@@ -42,7 +42,9 @@ private:
     Workspace& w;
     FrictionProblem problem_;  // problem of all elements
     std::vector<Mode> modes_, unloaded_;
-    double h_ = 0.0;
+    double h_ = 0.0, t0_ = 0.0;  // length and start of the step
+    VecX q0_;
+    bool redundant_ = false;     // rows depend on others there
     MeanVelocity mean_;
     JointDrives drives_;
     FreeFlight flight_;

@@ -99,11 +99,14 @@ void MoreauContacts::step(double t, double h, VecX& y, double& moved_energy, dou
         q_looked_ = y.head(system_.nq);
         watch_.begin_time_steps(width_rounding * scene_size(p, w));
     }
+    redundant_ = p.first_gap > 0 && w.now.rows.redundant;
+    t0_ = t;
+    q0_ = y.head(system_.nq);
     select(open_, unloaded_, true);
     mean_.begin(h, v0_);
     system_.read(y);
     JointDrives::Step drives(drives_, p, w, t, h, system_.q, v0_);
-    sweep(middle, drives, begin_rows(p, w, middle, q_mid_, mean_.value()), true);
+    sweep(middle, drives, true);
     while (mean_.move() && correct(middle, drives)) {}
     flight_.begin();
     for (const StepRow& row : rows_) flight_.touch(p.blocks[row.block]);
@@ -133,9 +136,10 @@ bool MoreauContacts::project(double t, VecX& y, double& moved_energy) {
 }
 
 // Solve the step with the forces at the mean velocity found so far.
-void MoreauContacts::sweep(double t, JointDrives::Step& drives, bool chosen, bool first) {
+void MoreauContacts::sweep(double t, JointDrives::Step& drives, bool first) {
     drives.move(mean_.start(), mean_.value());
-    solve_free(t, chosen);
+    if (first || p.has_user_rows) begin_rows_inside(p, w, t0_, q0_, t, q_mid_, mean_.value(), redundant_);
+    solve_free(t);
     if (first) {
         find_touching(t);
         add_rows();
@@ -157,12 +161,12 @@ void MoreauContacts::sweep(double t, JointDrives::Step& drives, bool chosen, boo
 // sweep.
 bool MoreauContacts::correct(double t, JointDrives::Step& drives) {
     try {
-        sweep(t, drives, p.has_user_rows && begin_rows(p, w, t, q_mid_, mean_.value()), false);
+        sweep(t, drives, false);
         return true;
     } catch (const Failure& failure) {
         if (failure.kind != Failure::Kind::not_converged) throw;
         mean_.begin(h_, v0_);
-        sweep(t, drives, p.has_user_rows && begin_rows(p, w, t, q_mid_, mean_.value()), false);
+        sweep(t, drives, false);
         return false;
     }
 }
@@ -175,8 +179,9 @@ void MoreauContacts::select(const std::vector<char>& closed, const std::vector<M
 }
 
 // Solve the motion without contacts and dry friction, with constraints satisfied at the step's end.
-void MoreauContacts::solve_free(double t, bool chosen) {
-    continue_step(p, w, t, mean_.value(), chosen);
+void MoreauContacts::solve_free(double t) {
+    assemble_forces(p, w, t, mean_.value());
+    solve_dynamics(p, w, t, mean_.value());
     a_free_ = w.now.a;
     if (w.now.rows.blocks.empty()) {
         w.now.rows.distance = 1.0;

@@ -52,9 +52,9 @@ private:
 
     bool tells_way_out(int gap, double width) const { return width > -nearly_all * rounded_by_[gap]; }
     void select(const std::vector<char>& closed, const std::vector<Mode>& modes, bool flies);
-    void sweep(double t, JointDrives::Step& drives, bool chosen, bool first);
+    void sweep(double t, JointDrives::Step& drives, bool first);
     bool correct(double t, JointDrives::Step& drives);
-    void solve_free(double t, bool chosen);
+    void solve_free(double t);
     const VecX& way_since_last();
     void find_touching(double t);
     void move_touching(double t);
@@ -86,6 +86,9 @@ private:
     JointDrives drives_;
     FreeFlight flight_;
     double h_ = 0.0, last_change_ = 0.0;  // step, and last change of the limits between passes
+    double t0_ = 0.0;         // start of the step
+    VecX q0_;
+    bool redundant_ = false;  // rows depend on others there
     GapWatch& watch_;
     std::vector<int> touching_, own_;  // gaps that take part, and friction elements of no unilateral contact
     std::vector<int> rubbing_;         // friction elements that take part, except the sliding of contacts

@@ -4,7 +4,7 @@
 
 namespace pn {
 
-// Acceleration of a tree at rest that counts as rounding, relative to that without forces.
+// Acceleration of a tree at rest that counts as rounding, relative to the accelerations that cancel in it.
 constexpr double canceled = 1e-9;
 
 SeparateTrees::SeparateTrees(const Program& p) : blocks_(p) {}
@@ -62,21 +62,38 @@ void SeparateTrees::move(const VecX& f, VecX& a, VecX& w) {
     w.head(n) = solver_.w();
 }
 
-void SeparateTrees::keep_rest(double h, const VecX& v0, VecX& v1) const {
-    for (int root : blocks_.roots()) {
-        const int n = blocks_.size(root);
-        if ((v0.segment(root, n).array() != 0.0).any()) continue;
-        const double free = a_free_.segment(root, n).cwiseAbs().maxCoeff();
-        if (v1.segment(root, n).cwiseAbs().maxCoeff() <= canceled * h * free) v1.segment(root, n).setZero();
-    }
+// Compute the largest of the accelerations that cancel in each tree: that without forces, and the responses to the forces
+// of its elements.
+void SeparateTrees::measure_balance() {
+    const BlockProblem& problem = solver_.problem;
+    balanced_.clear();
+    for (const BlockNode& node : problem.nodes)
+        balanced_.push_back(a_free_.segment(node.first, node.size).cwiseAbs().maxCoeff());
+    for (const BlockElement& e : problem.elements)
+        for (int row = e.row; row < e.row + e.dim(); ++row)
+            for (int side = 0; side < 2 && e.node[side] >= 0; ++side) {
+                double& most = balanced_[e.node[side]];
+                most = std::max(most, std::abs(solver_.own_response(row, f_)));
+            }
 }
 
-bool SeparateTrees::rests(const VecX& a) const {
-    for (const BlockNode& node : solver_.problem.nodes) {
-        const double free = a_free_.segment(node.first, node.size).cwiseAbs().maxCoeff();
-        if (!(a.segment(node.first, node.size).cwiseAbs().maxCoeff() <= canceled * free)) return false;
+bool SeparateTrees::rests(const VecX& a) {
+    measure_balance();
+    for (size_t n = 0; n < balanced_.size(); ++n) {
+        const BlockNode& node = solver_.problem.nodes[n];
+        if (!(a.segment(node.first, node.size).cwiseAbs().maxCoeff() <= canceled * balanced_[n])) return false;
     }
     return true;
+}
+
+void SeparateTrees::keep_rest(double h, const VecX& v0, VecX& v1) {
+    measure_balance();
+    for (size_t n = 0; n < balanced_.size(); ++n) {
+        const BlockNode& node = solver_.problem.nodes[n];
+        if ((v0.segment(node.first, node.size).array() != 0.0).any()) continue;
+        if (v1.segment(node.first, node.size).cwiseAbs().maxCoeff() <= canceled * h * balanced_[n])
+            v1.segment(node.first, node.size).setZero();
+    }
 }
 
 ConeResiduals SeparateTrees::residuals(const VecX& middle, const VecX& f) {

@@ -22,9 +22,9 @@ public:
     // Compute the acceleration a and the rows w under the forces f.
     void move(const VecX& f, VecX& a, VecX& w);
     // Set the velocity v1 of trees to zero that were at rest, v0 = 0, and whose forces cancel over the step h.
-    void keep_rest(double h, const VecX& v0, VecX& v1) const;
-    // Check if accelerations of the trees with elements are rounding.
-    bool rests(const VecX& a) const;
+    void keep_rest(double h, const VecX& v0, VecX& v1);
+    // Check if the accelerations a of the trees under the forces of the last motion are rounding.
+    bool rests(const VecX& a);
     // Element that misses the laws most, and the velocity by which it misses them.
     const BlockSolver::Miss& miss() const { return solver_.miss(); }
     // Errors of the laws for the forces f.
@@ -33,10 +33,12 @@ public:
 private:
     bool applies(const Program& p, const Workspace& w) const;
     void shift(const VecX& middle);
+    void measure_balance();
 
     TreeBlocks blocks_;
     BlockSolver solver_;
     VecX a_free_, f_;
+    std::vector<double> balanced_;  // by node: largest acceleration that forces cancel
 };
 
 }  // namespace pn
