@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "contact/impact.hpp"
+#include "dynamics/evaluation.hpp"
 #include "dynamics/power.hpp"
 #include "dynamics/friction_limit.hpp"
 #include "dynamics/acceleration.hpp"
