@@ -75,6 +75,21 @@ double LeastMove::longest_single(int i, const VecX& r) {
     return longest;
 }
 
+// Replace a move by that of its forces f = -G (r + J dx) on the rows. The rows may have changed since the factor.
+void LeastMove::exert(int i, const VecX& r, VecX& move) {
+    for (int k : islands_[i].elements) {
+        const BlockElement& e = problem.elements[k];
+        problem.respond(e, move, scaled_);
+        for (int row = 0; row < e.dim(); ++row) {
+            double& force = scaled_[e.row + row];
+            force = -G_[9 * k + row * (e.dim() + 1)] * (r[e.row + row] + force);
+        }
+    }
+    for (int n : islands_[i].nodes) move.segment(problem.nodes[n].first, problem.nodes[n].size).setZero();
+    for (int k : islands_[i].elements) problem.push(problem.elements[k], scaled_, move);
+    for (int n : islands_[i].nodes) problem.solve_mass(n, move);
+}
+
 // Compute the move of an island. Lower the weights while it is too long.
 bool LeastMove::seek(int i, const VecX& r, VecX& move) {
     double longest = -1.0;
@@ -91,6 +106,7 @@ bool LeastMove::seek(int i, const VecX& r, VecX& move) {
             problem.push(e, scaled_, move);
         }
         factors_[i].solve(move);
+        exert(i, r, move);
         for (int n : islands_[i].nodes)
             size = std::max(size, move.segment(problem.nodes[n].first, problem.nodes[n].size).cwiseAbs().maxCoeff());
         if (size * short_lever <= residual) return true;

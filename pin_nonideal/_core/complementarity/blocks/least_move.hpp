@@ -12,7 +12,9 @@ namespace pn {
 
 class LeastMove {
 public:
-    BlockProblem problem;  // nodes, elements, M and J are set by the caller
+    // Nodes, elements, M and J are set by the caller. J may be set anew after pose: moves then follow the new rows, with
+    // the factor of the old ones, and exert equal and opposite forces on two nodes.
+    BlockProblem problem;
 
     // Prepare the problem once it is set. Return false if an inertia is not positive definite.
     bool pose();
@@ -27,6 +29,7 @@ public:
 private:
     bool factor(int island);
     double longest_single(int island, const VecX& r);
+    void exert(int island, const VecX& r, VecX& move);
     bool seek(int island, const VecX& r, VecX& move);
     void probe(int island);
 

@@ -138,6 +138,7 @@ bool ContactProjection::project(const Program& p, Workspace& w, double t, VecX& 
     }
     if (moves) place_rows(p, w, t, v);
     if (opens) pose(p, w, true);
+    else if (moves) blocks_.fill(p, w, rows_, elements_, least_.problem);
     meet_rates(p, w, v);
     rest(p, w, v);
     move_bodies(p.mechanism, w.now.terms, v);
