@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "constraints/geometry.hpp"
@@ -11,6 +12,9 @@ namespace pn {
 
 template <class Sides>
 struct NearestOnHull;
+
+// Cosine of the angle between two faces below which they count as faces of different directions.
+constexpr double other_direction = 0.7;
 
 // Convex solid with flat faces: its corners, the planes of its faces, and its edges, each between two faces.
 struct Hull {
@@ -59,6 +63,18 @@ struct Hull {
         double least = HUGE_VAL;
         for (const Face& face : faces) least = std::min(least, 0.5 * (face.offset + support(-face.normal)));
         return least;
+    }
+
+    // Return the distances of a point behind the plane of its nearest face, and of the next face of another direction.
+    std::pair<double, double> nearest_planes(const Vec3& at) const {
+        size_t first = 0;
+        const auto behind = [&](size_t f) { return faces[f].offset - faces[f].normal.dot(at); };
+        for (size_t f = 1; f < faces.size(); ++f)
+            if (behind(f) < behind(first)) first = f;
+        double next = HUGE_VAL;
+        for (size_t f = 0; f < faces.size(); ++f)
+            if (faces[f].normal.dot(faces[first].normal) < other_direction) next = std::min(next, behind(f));
+        return {behind(first), next};
     }
 
     template <class Vec>

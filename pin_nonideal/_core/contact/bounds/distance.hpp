@@ -147,6 +147,49 @@ inline double rounded_by(const Kind& kind) {
     return HUGE_VAL;
 }
 
+// Depth that a point in front of a face, or behind it, may still reach before another face is nearer, from its distances
+// to the planes of the nearest and of the next face behind which it lies. Both are positive inside.
+inline double depth_to_next_face(double nearest, double next) {
+    return next > 0.0 ? next - std::max(nearest, 0.0) : 0.0;
+}
+
+// Further penetration over which the direction out of contact stays defined, for a gap of a width with `rounded_by`.
+inline double depth_left(const Program& p, const Workspace& w, int gap, double width) {
+    const Kind& kind = p.blocks[p.gaps[gap].block].kind;
+    const double all = rounded_by(kind) + std::min(width, 0.0);
+    const auto at = [&](const Frame& frame1, const Frame& frame2) {
+        const Sides<Pose> s{{p.mechanism, w.now.terms, frame1}, {p.mechanism, w.now.terms, frame2}, 0.0};
+        const Vec3 apart = s.a.x - s.b.x;
+        return Vec3(s.b.R.col(0).dot(apart), s.b.R.col(1).dot(apart), s.b.R.col(2).dot(apart));
+    };
+    double nearest = HUGE_VAL, next = HUGE_VAL;
+    const auto add = [&](double inside) {
+        next = std::min(next, std::max(nearest, inside));
+        nearest = std::min(nearest, inside);
+    };
+    double radius = 0.0;
+    if (const auto* box = std::get_if<BoxRow>(&kind)) {
+        const Vec3 x = at(box->frame1, box->frame2);
+        for (int k = 0; k < 3; ++k) add(box->half[k] - std::abs(x[k]));
+        radius = box->radius;
+    } else if (const auto* hull = std::get_if<HullRow>(&kind)) {
+        const Vec3 x = at(hull->frame1, hull->frame2);
+        const auto [first, second] = hull->solid.nearest_planes(x);
+        add(first);
+        add(second);
+        radius = hull->radius;
+    } else if (const auto* revolved = std::get_if<RevolvedRow>(&kind)) {
+        const Vec3 x = at(revolved->frame1, revolved->frame2);
+        const Revolved& solid = revolved->solid;
+        add(solid.half - std::abs(x[2]));
+        add(solid.middle() + solid.widening() * x[2] - std::hypot(x[0], x[1]));
+        radius = revolved->radius;
+    } else {
+        return all;
+    }
+    return std::min(all, radius + depth_to_next_face(nearest, next));
+}
+
 // Check if the gap is the lowest point of a body over a plane. Each point then stays above its own bound.
 inline bool has_lowest_point(const Program& p, int gap) {
     return std::holds_alternative<EllipsoidRow>(p.blocks[p.gaps[gap].block].kind);

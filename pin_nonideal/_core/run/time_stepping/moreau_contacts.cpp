@@ -75,7 +75,7 @@ double MoreauContacts::allowed(double t, double h, const VecX& y) {
         follow_gap(p, w, t, system_.v, i);
         const double width = gap_width(p, w, i), rate = gap_rate(p, w, i);
         if (!(rate < 0.0) || !tells_way_out(i, width)) continue;
-        const double reach = width + (width > 0.0 ? 0.5 : 1.0) * rounded_by_[i];
+        const double reach = std::max(width, 0.0) + (width > 0.0 ? 0.5 : 1.0) * depth_left(p, w, i, width);
         shortest = std::min(shortest, reach / -rate);
     }
     return shortest;
