@@ -95,7 +95,11 @@ def impacts(count, elastic, velocities=20):
                 return
 
 
-FEW_AND_MANY = [1000, pytest.param(100000, marks=pytest.mark.stress)]
+FEW_AND_MANY = [
+    300,
+    pytest.param(1000, marks=pytest.mark.slow),
+    pytest.param(100000, marks=pytest.mark.stress),
+]
 
 
 @pytest.mark.parametrize("count", FEW_AND_MANY)

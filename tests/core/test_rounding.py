@@ -103,15 +103,15 @@ def test_a_resumed_run_is_limited_alike(tmp_path):
     def torque(t, q, v):
         nonlocal calls
         calls += 1
-        if calls == 50_000:
+        if calls == 15_000:
             raise KeyboardInterrupt
         return [0.0, 0.0]
 
     asked = {**START, "rtol": 1e-12, "atol": 1e-12, "output_dt": 0.1}
     scene = pn.Scene(model, actuation=torque)
     with pytest.raises(pn.RunInterrupted):
-        pn.simulate(scene, 0.5, checkpoint=path, checkpoint_interval=0.01, **asked)
+        pn.simulate(scene, 0.2, checkpoint=path, checkpoint_interval=0.01, **asked)
     again = pn.resume(path, scene)
-    whole = pn.simulate(scene, 0.5, **asked)
+    whole = pn.simulate(scene, 0.2, **asked)
     assert_same_run(again, whole)
     assert whole.stats.limited_by_rounding > 0

@@ -96,8 +96,15 @@ def sledge():
 SCENES = {"chain": lambda: chain([0.01, 0.02]), "stiff chain": lambda: chain([0.01, 100.0]), "loop": linkage}
 
 
-@pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("name", [*SCENES, "sledge"])
+# Every scene by Radau, and each method on several scenes; the loop takes seconds.
+ANSWERED = [
+    pytest.param(name, method, marks=[pytest.mark.slow] * (name == "loop" and method != "Radau"))
+    for name in (*SCENES, "sledge")
+    for method in METHODS
+]
+
+
+@pytest.mark.parametrize(("name", "method"), ANSWERED)
 def test_the_answer_of_dop853(method, name):
     scene = sledge() if name == "sledge" else SCENES[name]()
     options = {"output_dt": 0.25, "record": "energy"}

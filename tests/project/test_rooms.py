@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import graphlib
 import importlib
 import re
@@ -20,6 +21,7 @@ ROOMS = toml.loads((ROOT / "layers.toml").read_text(encoding="utf-8"))
 CORRIDOR = 12  # modules that lie in no room
 
 
+@functools.cache
 def modules() -> list[str]:
     """Dotted names below the package, whose own name is empty."""
     paths = [path.relative_to(PACKAGE).with_suffix("") for path in PACKAGE.rglob("*.py")]

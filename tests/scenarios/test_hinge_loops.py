@@ -21,6 +21,8 @@ RTOL = 1e-9
 NEAR, SCIPY_NEAR = 1e3 * RTOL, 1e-4
 # Error of a fixed step that rounding and the oracle may leave; least ratio of errors when the step is halved.
 FLOOR, RATIOS = 1e-8, {"rk4": 8.0, "semi_implicit_euler": 1.6}
+# Families of driven loops: every second one, the others with -m slow.
+DRIVEN = [*FAMILIES[::2], *(pytest.param(family, marks=pytest.mark.slow) for family in FAMILIES[1::2])]
 # Least rate of the driven hinge along the unit vector of all rates.
 TURNS = 0.2
 
@@ -159,7 +161,7 @@ def test_overconstrained_loops_by_scipy(family: Callable[..., Any], method: str)
 
 
 @pytest.mark.parametrize("seed", seeds(range(300), count=1))
-@pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.__name__)
+@pytest.mark.parametrize("family", DRIVEN, ids=lambda family: family.__name__)
 def test_driven_loops_follow_their_drive(family: Callable[..., Any], seed: int) -> None:
     """The first hinge swings as told: no freedom is left, and all other hinges follow at every sample."""
     times = np.linspace(0.0, DURATION, 16)

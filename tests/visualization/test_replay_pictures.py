@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator
 from dataclasses import replace as changed_run
 from pathlib import Path
@@ -98,26 +99,21 @@ def test_forty_revolutions_a_second_are_drawn_closed(opened: Any) -> None:
         assert page.run("() => replay.gap") < GAP * link
 
 
-def paper_runs() -> dict[str, tuple[Any, Any]]:
-    """Return the three examples of the paper, with the printed forces."""
-    a, b, c = (example(name) for name in ("paper_a_particle", "paper_b_ring", "paper_c_incline"))
-    particle, ring, block = a.Particle(), b.Ring(), c.Incline()
-    q = np.array([0.3, -0.2, 0.9])
+@functools.cache
+def paper_run(name: str) -> tuple[Any, Any]:
+    """Return an example of the paper, with the printed forces."""
     options = {"record": ("forces", "energy"), "rtol": 1e-10, "atol": 1e-10}
-    return {
-        "particle": (
-            pn.simulate(particle.scene(), 2.0, q=q, v=particle.start(q, (1.1, -0.6)), **options),
-            lambda t, q, v: particle.paper_force(t, q, v),
-        ),
-        "ring": (
-            pn.simulate(ring.scene(), 0.5, *ring.at(0.0, 4.0), **options),
-            lambda t, q, v: ring.paper_force(q, v, ring.mu * abs(ring.normal(q, v))),
-        ),
-        "incline": (
-            pn.simulate(block.scene(), 1.0, *block.at(0.0, 0.1), **options),
-            lambda t, q, v: (block.paper_ideal(t), block.paper_nonideal(t, v)),
-        ),
-    }
+    if name == "particle":
+        particle, q = example("paper_a_particle").Particle(), np.array([0.3, -0.2, 0.9])
+        run = pn.simulate(particle.scene(), 2.0, q=q, v=particle.start(q, (1.1, -0.6)), **options)
+        return run, lambda t, q, v: particle.paper_force(t, q, v)
+    if name == "ring":
+        ring = example("paper_b_ring").Ring()
+        run = pn.simulate(ring.scene(), 0.5, *ring.at(0.0, 4.0), **options)
+        return run, lambda t, q, v: ring.paper_force(q, v, ring.mu * abs(ring.normal(q, v)))
+    block = example("paper_c_incline").Incline()
+    run = pn.simulate(block.scene(), 1.0, *block.at(0.0, 0.1), **options)
+    return run, lambda t, q, v: (block.paper_ideal(t), block.paper_nonideal(t, v))
 
 
 SEEN = ["ring", *(pytest.param(name, marks=pytest.mark.slow) for name in ("particle", "incline"))]
@@ -125,7 +121,7 @@ SEEN = ["ring", *(pytest.param(name, marks=pytest.mark.slow) for name in ("parti
 
 @pytest.mark.parametrize("name", SEEN)
 def test_the_papers_examples_show_constraint_path_and_forces(opened: Any, name: str) -> None:
-    run, paper = paper_runs()[name]
+    run, paper = paper_run(name)
     page = opened(run)
     k = len(run.t) // 2
     picture = page.picture(float(run.t[k]))
@@ -150,11 +146,11 @@ def test_a_ring_closes_and_an_incline_vibrates() -> None:
     from pin_nonideal.visualization.page.constraint_curves import guides_of
     from pin_nonideal.visualization.page.frames import sample
 
-    run, _ = paper_runs()["ring"]
+    run, _ = paper_run("ring")
     (ring,) = guides_of(run, sample(run))
     assert ring.closed
     np.testing.assert_allclose(np.linalg.norm(ring.points[:, :2], axis=1), 1.0, atol=1e-9)
-    run, _ = paper_runs()["incline"]
+    run, _ = paper_run("incline")
     motion = sample(run)
     (plane,) = guides_of(run, motion)
     block = example("paper_c_incline").Incline()
