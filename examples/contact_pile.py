@@ -11,7 +11,7 @@ walls = {"floor": "z", "west": (1, 0, 0), "east": (-1, 0, 0), "south": (0, 1, 0)
 model, shapes, rng = pin.Model(), pin.GeometryModel(), np.random.default_rng(0)
 for name, normal in walls.items():
     height = 0.0 if name == "floor" else -wall
-    shapes.addGeometryObject(pn.ground(name, normal=normal, height=height, color=(0.6, 0.7, 0.8, 0.15)))
+    shapes.addGeometryObject(pn.ground(name, normal=normal, height=height))
 for k in range(12):
     grid = np.array([k % 2 - 0.5, k // 2 % 2 - 0.5, k // 4 + 0.7])
     place = 2.4 * radius * grid + 0.1 * radius * rng.uniform(-1.0, 1.0, 3)
