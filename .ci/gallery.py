@@ -1,4 +1,4 @@
-"""Gallery page of the package's robots and the paper's examples, with an image and a replay of each.
+"""Gallery page of the package's robots, the paper's examples and contact scenes, each with image and replay.
 
 Run: python .ci/gallery.py [FOLDER]   (default docs/gallery; index.html is the page)
 """
@@ -15,12 +15,22 @@ from pathlib import Path
 from typing import Any
 
 import pin_nonideal as pn
+from pin_nonideal.cli.examples import examples
 
 ROOT = Path(__file__).resolve().parent.parent
 PAPER = {
     "paper_a_particle": "a nonlinear nonholonomic constraint",
     "paper_b_ring": "a bead on a rough ring",
     "paper_c_incline": "a block on a vibrating incline",
+}
+# Examples with contacts, and the time of their image [s].
+CONTACTS = {
+    "contact_stack": 0.25,
+    "contact_dominoes": 0.4,
+    "contact_gripper": 1.4,
+    "contact_car": 1.1,
+    "contact_pile": 0.35,
+    "contact_humanoid": 0.6,
 }
 RECORD = ("forces", "energy", "reactions")
 DURATIONS = {"andrews_squeezer": 0.03, "n_four_bar": 3.0, "solo12_standing": 2.0, "panda_settling": 2.0}
@@ -47,8 +57,8 @@ CARD = """<a href="{name}.html"><img src="{name}.png" alt="{title}" width="{widt
 <h2>{title}</h2><p>{words}</p></a>"""
 
 
-def paper_run(name: str) -> Any:
-    """Run an example of the paper in a temporary folder and return its trajectory."""
+def example_run(name: str) -> Any:
+    """Run an example in a temporary folder and return its trajectory."""
     here = Path.cwd()
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
@@ -73,13 +83,15 @@ def main(folder: str | Path = ROOT / "docs" / "gallery") -> None:
     """Write the page, and a replay and an image for each entry."""
     target, begun = Path(folder), time.perf_counter()
     target.mkdir(parents=True, exist_ok=True)
-    entries = [(name, words, lambda name=name: paper_run(name)) for name, words in PAPER.items()]
+    told = PAPER | {name: words for name, words in examples() if name in CONTACTS}
+    entries = [(name, words, lambda name=name: example_run(name)) for name, words in told.items()]
     entries += [(name, words, lambda name=name: robot_run(name)) for name, words in pn.robots()]
     cards = []
     for name, words, make in entries:
         run = make()
         pn.replay(run, target / f"{name}.html", title=name)
-        pn.render(run, target / f"{name}.png", width=STILL[0], height=STILL[1])
+        at = CONTACTS.get(name)
+        pn.render(run, target / f"{name}.png", width=STILL[0], height=STILL[1], time=at)
         texts = {"title": html.escape(name.replace("_", " ")), "words": html.escape(words)}
         cards.append(CARD.format(name=name, width=STILL[0], height=STILL[1], **texts))
         print(f"{name}: {time.perf_counter() - begun:.0f} s")

@@ -45,8 +45,8 @@ def free_body(
             of the shape.
         visual_model: pinocchio.GeometryModel for display, to which the shape is added too.
         place: pose in the world as a pinocchio.SE3, or the position alone [m], (3,); None for the origin.
-        color: red, green, blue and optionally opacity of the shape, 0 to 1, (3,) or (4,); None for the colors
-            of Pinocchio or of the replay.
+        color: red, green, blue and optionally opacity of the shape, 0 to 1, (3,) or (4,); None for the color
+            that the replay gives to the link.
 
     Returns:
         Index of the joint, as `model.addJoint` returns it.
@@ -74,7 +74,7 @@ def free_body(
         if geometry is not None:
             item = pin.GeometryObject(name, joint, frame, pin.SE3.Identity(), shape)
             if rgba is not None:
-                item.meshColor = rgba
+                item.meshColor, item.overrideMaterial = rgba, True
             geometry.addGeometryObject(item)
     return joint
 

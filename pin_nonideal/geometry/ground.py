@@ -26,13 +26,15 @@ def ground(
 
     The points x with n . x <= height belong to the ground. `GeometryContact("box", pn.ground())` takes it as
     it is. `collision_model.addGeometryObject(pn.ground())` makes it a shape of the scene, which contacts find
-    by its name. A replay draws the floor in both cases.
+    by its name. A replay draws the floor of contacts as a grid, and other planes as plates around the
+    contact points.
 
     Args:
         name: name of the shape.
         height: distance of the surface from the world's origin along the normal [m].
         normal: outward normal in world axes: "x", "y", "z" or three numbers; scaled to length 1.
-        color: red, green, blue and optionally opacity, 0 to 1, (3,) or (4,); None for gray.
+        color: red, green, blue and optionally opacity, 0 to 1, (3,) or (4,), for viewers of geometry
+            models; None for gray.
 
     Returns:
         pinocchio.GeometryObject on the world with a coal.Halfspace.

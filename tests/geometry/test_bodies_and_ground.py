@@ -8,6 +8,9 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
+from pin_nonideal.visualization.page.body_overlays import colored_collisions
+from pin_nonideal.visualization.page.contact_surfaces import ground_of, planes_of
+from pin_nonideal.visualization.page.visuals import LINK_COLORS
 
 from ..support.mechanisms import GRAVITY
 from ..support.refusals import refuses
@@ -98,6 +101,32 @@ def test_joint_frame_and_shapes_have_the_name():
     )
     np.testing.assert_array_equal(model.jointPlacements[second].translation, [0.0, 0.0, 2.0])
     assert visual.ngeoms == 2
+
+
+def test_a_replay_draws_shapes_in_their_own_colors():
+    """Without a visual model it draws collision shapes: in the given color, or in that of the link."""
+    model, shapes = table()
+    box = coal.Box(0.2, 0.2, 0.2)
+    pn.free_body(model, "red", box, mass=1.0, collision_model=shapes, color=(1.0, 0.0, 0.0))
+    pn.free_body(model, "plain", box, mass=1.0, collision_model=shapes)
+    contacts = pn.ground_contacts(model, shapes)
+    drawn = colored_collisions(pn.Scene(model, contacts=contacts, collision_model=shapes))
+    colors = {visual.name: visual.color for visual in drawn}
+    assert colors == {"red": (1.0, 0.0, 0.0, 1.0), "plain": LINK_COLORS[2]}
+
+
+@pytest.mark.parametrize("ground", [None, "ground"])
+def test_a_replay_draws_the_floor(ground):
+    """The grid of a replay lies at the height of the ground, as an object or as a shape of the scene."""
+    model, shapes = table(height=-0.5)
+    pn.free_body(model, "ball", coal.Sphere(0.1), mass=1.0, collision_model=shapes)
+    given = pn.ground(height=-0.5) if ground is None else ground
+    contacts = pn.ground_contacts(model, shapes, ["ball"], given)
+    scene = pn.Scene(model, contacts=contacts, collision_model=shapes)
+    assert scene.contact_names == ["ball on ground"]
+    floor = ground_of(planes_of(scene), np.array([0.0, 0.0, 1.0]))
+    assert floor is not None
+    assert floor.point[2] == pytest.approx(-0.5)
 
 
 def test_a_body_falls_on_the_ground_and_rests():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,7 +10,7 @@ import pinocchio as pin
 
 from pin_nonideal.types import Table
 
-from .visuals import Visual, visuals_of
+from .visuals import LINK_COLORS, Visual, visuals_of
 
 if TYPE_CHECKING:
     from pin_nonideal.scene.scene import Scene
@@ -40,3 +41,18 @@ def collisions_of(scene: Scene) -> list[Visual]:
             room -= len(visual.shape.triangles)
             found.append(visual)
     return found
+
+
+def colored_collisions(scene: Scene) -> list[Visual]:
+    """Return collision shapes in place of visuals: in the color of their link, unless they override it.
+
+    Args:
+        scene: scene of the replay.
+    """
+    if scene.collision_model is None:
+        return []
+    own = {item.name for item in scene.collision_model.geometryObjects if item.overrideMaterial}
+    return [
+        shape if shape.name in own else replace(shape, color=LINK_COLORS[shape.joint % len(LINK_COLORS)])
+        for shape in collisions_of(scene)
+    ]

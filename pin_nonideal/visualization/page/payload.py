@@ -13,7 +13,7 @@ from pin_nonideal.types import Array, Table
 
 from .applied_forces import applied_force_arrows
 from .binary import Payload, Shapes
-from .body_overlays import collisions_of, inertia_box
+from .body_overlays import collisions_of, colored_collisions, inertia_box
 from .camera import link_length, pattern_spacings, upward, view
 from .constraint_curves import Guide, guides_of
 from .contact_points import contact_point_marks, contact_points
@@ -30,7 +30,7 @@ from .signal_list import Signal, rounding_of, signals_of, without_rounding
 from .signals import Chosen, Plot, default_plot_names, parse_plots, plots_of
 from .stick_figure import link_bars
 from .style import table
-from .visuals import LINK_COLORS, Visual, joint_axis, visuals_of
+from .visuals import Visual, joint_axis, visuals_of
 
 if TYPE_CHECKING:
     from pin_nonideal.scene.scene import Scene
@@ -129,15 +129,10 @@ def packed_runs(
 def _drawn(scene: Scene, motion: Motion, ends: list[tuple[int, Array]]) -> tuple[list[Visual], bool]:
     """Return the visuals of a scene or else its collision shapes, and whether it has neither."""
     visuals = visuals_of(scene.visual_model) if scene.visual_model is not None else []
-    visuals = visuals or [_colored(shape) for shape in collisions_of(scene)]
+    visuals = visuals or colored_collisions(scene)
     if visuals:
         return visuals, False
     return link_bars(scene.model, ends, link_length(scene.model, ends, motion.size)), True
-
-
-def _colored(visual: Visual) -> Visual:
-    """Return a collision shape, which seldom has a color, in the color of its link."""
-    return replace(visual, color=LINK_COLORS[visual.joint % len(LINK_COLORS)])
 
 
 def _other(payload: Payload, shapes: Shapes, run: Trajectory, motion: Motion, name: str) -> Table:
