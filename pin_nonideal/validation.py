@@ -35,13 +35,16 @@ def label(description: Any) -> str:
 
 
 def by_name(value: Any) -> dict[Any, Any] | None:
-    """Entries by name of a mapping, a pandas Series or a pandas DataFrame; None of anything else.
+    """Entries by name of a mapping, a pandas Series or DataFrame, or a structured array; None of others.
 
     Args:
         value: any object.
     """
     if isinstance(value, Mapping):
         return dict(value)
+    if isinstance(value, np.ndarray):
+        names = value.dtype.names
+        return None if names is None else {name: value[name] for name in names}
     is_pandas = type(value).__module__.split(".")[0] == "pandas" and hasattr(value, "items")
     return dict(value.items()) if is_pandas else None
 

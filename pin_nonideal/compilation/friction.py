@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from pin_nonideal.core_loader import core
-from pin_nonideal.description.constraints import HingeAnchor, JointCoupling, PointAnchor, Rolling
+from pin_nonideal.description.constraints import HingeAnchor, JointCoupling, PointAnchor, Rolling, is_mimic
 from pin_nonideal.description.contacts import Contact, UserContact
 from pin_nonideal.description.contacts.round import BoxContact
 from pin_nonideal.description.contacts.solids import (
@@ -96,7 +96,7 @@ def friction_joint(name: str, who: str, context: LoweringContext, *, freedoms: t
     """
     joint = context.resolver.joint(name, who, freedoms=freedoms)
     for c in context.constraints.values():
-        if isinstance(c, JointCoupling) and c.joint1 == name and (c.name or "").endswith("mimic"):
+        if is_mimic(c) and c.joint1 == name:
             raise InputError(
                 f'{who}: joint "{name}" is a mimic joint, driven by "{c.joint2}"; '
                 f'put the friction on "{c.joint2}"'

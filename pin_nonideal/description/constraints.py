@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeGuard
 
 from pin_nonideal.errors import InputError, short_repr
 from pin_nonideal.validation import (
@@ -384,3 +384,12 @@ Constraint = (
     | Rolling
     | UserConstraint
 )
+
+
+def is_mimic(constraint: object) -> TypeGuard[JointCoupling]:
+    """Check if a constraint is the coupling of a mimic joint of a file.
+
+    Args:
+        constraint: the description.
+    """
+    return isinstance(constraint, JointCoupling) and (constraint.name or "").endswith("mimic")

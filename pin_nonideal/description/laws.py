@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from pin_nonideal.description.constraints import is_mimic
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
 from pin_nonideal.validation import (
     choice,
@@ -144,7 +145,7 @@ class JointFriction:
         Args:
             scene: a Scene or a pinocchio.Model.
             joints: by joint name the dry friction `coulomb` or a table of coefficients, or names alone; None
-                for all joints of one degree of freedom.
+                for all joints of one degree of freedom. Mimic joints of a Scene are then left out.
             **coefficients: coefficients of all joints; a table replaces them for its joint.
 
         Returns:
@@ -157,9 +158,9 @@ class JointFriction:
         model: Any = getattr(scene, "model", scene)
         known = [str(name) for name in model.names][1:]
         if joints is None:
-            joints = [
-                name for name, joint in zip(known, list(model.joints)[1:], strict=True) if joint.nv == 1
-            ]
+            mimics = {c.joint1 for c in getattr(scene, "constraints", ()) if is_mimic(c)}
+            single = [name for name, j in zip(known, list(model.joints)[1:], strict=True) if j.nv == 1]
+            joints = [name for name in single if name not in mimics]
         table = joints if isinstance(joints, Mapping) else {name: {} for name in joints}
         laws = []
         for joint, given in table.items():

@@ -172,7 +172,10 @@ def named_joint_samples(model: Model, given: Any, count: int, what: str) -> Arra
     if table is None:
         values = array(what, given, (count, None))
         if values.shape[1] != model.nv:
-            raise InputError(f"{what} must have {model.nv} columns (nv); got {values.shape[1]}")
+            raise InputError(
+                f"{what} must have {model.nv} columns (nv); got {values.shape[1]}; "
+                "give columns by joint name, {joint: samples}, to leave joints out"
+            )
         return values
     values = np.zeros((count, model.nv))
     for name, samples in table.items():

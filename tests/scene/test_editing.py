@@ -137,6 +137,13 @@ def test_put_on_ground_says_what_it_needs(make, message):
     assert message in str(error.value)
 
 
+def test_friction_for_all_joints_of_a_robot_leaves_mimic_joints_out():
+    panda = pn.load("panda")
+    laws = pn.JointFriction.for_joints(panda, coulomb=1.0)
+    assert [law.joint for law in laws] == [*(f"panda_joint{k}" for k in range(1, 8)), "panda_finger_joint1"]
+    panda.replace(add_laws=laws)
+
+
 def test_friction_for_joints():
     model = pn.load("four_bar").model
     laws = pn.JointFriction.for_joints(model, mu=0.1, radius=0.02)

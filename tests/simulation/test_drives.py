@@ -97,6 +97,20 @@ def test_columns_by_name_are_the_columns_of_an_array():
         np.testing.assert_array_equal(one.v, other.v)
 
 
+def test_columns_of_a_structured_array_are_columns_by_name(tmp_path):
+    """Such arrays come from numpy.genfromtxt(file, names=True)."""
+    lines = [",".join(map(str, (t, *row))) for t, row in zip(TIMES, VALUES, strict=True)]
+    (tmp_path / "log.csv").write_text("\n".join(["t,shoulder,elbow", *lines]))
+    log = np.genfromtxt(tmp_path / "log.csv", delimiter=",", names=True)
+    columns = pn.Table(log["t"], log[["shoulder", "elbow"]])
+    np.testing.assert_array_equal(run(columns).q, run(pn.Table(TIMES, VALUES)).q)
+
+
+def test_a_table_of_too_few_columns_is_refused_with_the_form_by_name():
+    with pytest.raises(pn.InputError, match=r"must have 2 columns \(nv\); got 1; give columns by joint name"):
+        pn.Scene(pendulum(), actuation=pn.Table(TIMES, VALUES[:, :1]))
+
+
 def test_methods_of_scipy_refuse_jumps():
     with pytest.raises(pn.InputError, match=r"Table needs one of the core's methods"):
         run(pn.Table(TIMES, VALUES, interpolation="hold"), method="BDF")
