@@ -72,7 +72,7 @@ class Called(NamedTuple):
 Part = Constant | Timed | Spring | Called
 
 
-def lower_actuation(u: Any, out: core.Builder, resolver: Resolver, spec: SceneSpec) -> None:
+def lower_actuation(u: object, out: core.Builder, resolver: Resolver, spec: SceneSpec) -> None:
     """Set the actuation of the scene.
 
     Args:
@@ -118,7 +118,7 @@ def _write(part: Part, out: core.Builder) -> None:
 # --- one drive ----------------------------------------------------------------------------------------------
 
 
-def _lowered(u: Any, resolver: Resolver, spec: SceneSpec, who: str) -> tuple[Part, Mask]:
+def _lowered(u: object, resolver: Resolver, spec: SceneSpec, who: str) -> tuple[Part, Mask]:
     """Return the torques of one drive, and the mask of the degrees of freedom that it commands, (nv,)."""
     model, everything = resolver.model, np.ones(resolver.model.nv, dtype=bool)
     if isinstance(u, SampledControl):
@@ -158,7 +158,7 @@ def delayed_torque(u: SampledControl, model: Model, t0: float, by_thread: bool) 
     return DelayedTorque(function, u.delay_in_samples, initial, t0, by_thread)
 
 
-def _sampled_torque(u: SampledControl, model: Model) -> Callable[..., Any]:
+def _sampled_torque(u: SampledControl, model: Model) -> Callable[..., object]:
     who = f"{words(u)}: function"
     return checked(_torques_of(u.function, model, who), who, (model.nv,))
 
@@ -183,17 +183,17 @@ class _Identified:
         source: the drive.
     """
 
-    def __init__(self, function: Callable[..., Any], source: object) -> None:
+    def __init__(self, function: Callable[..., object], source: object) -> None:
         self.function, self.source = function, source
 
-    def __call__(self, t: float, q: Array, v: Array) -> Any:
+    def __call__(self, t: float, q: Array, v: Array) -> object:
         return self.function(t, q, v)
 
 
-def _torques_of(function: Callable[..., Any], model: Model, who: str) -> Callable[..., Any]:
+def _torques_of(function: Callable[..., object], model: Model, who: str) -> Callable[..., object]:
     """A function of torques that may return them by joint name."""
 
-    def torques(*arguments: Any) -> Any:
+    def torques(*arguments: object) -> object:
         tau = function(*arguments)
         if type(tau) is np.ndarray or by_name(tau) is None:
             return tau
@@ -212,7 +212,7 @@ def _held(times: Array, values: Array) -> Timed:
     return Timed(np.append(both, times[-1]), np.vstack([np.repeat(values[:-1], 2, axis=0), values[-1:]]))
 
 
-def gains_of(model: Model, gain: Any, who: str) -> Array:
+def gains_of(model: Model, gain: object, who: str) -> Array:
     """Return a gain for each degree of freedom; a scalar acts on joints with one degree of freedom.
 
     Args:
@@ -229,7 +229,7 @@ def gains_of(model: Model, gain: Any, who: str) -> Array:
     return named_joint_values(model, gain, who)
 
 
-def commanded(model: Model, given: Any) -> Mask:
+def commanded(model: Model, given: object) -> Mask:
     """Return the mask of the degrees of freedom that torques, samples or gains command, (nv,).
 
     A table by joint name commands its joints. A number commands the joints with one degree of freedom, and an
@@ -265,7 +265,7 @@ def _require_vectors(model: Model, kp: Array, who: str) -> None:
             )
 
 
-def _limits(u: Any, model: Model, acts: Sequence[Mask]) -> tuple[Array, Array] | None:
+def _limits(u: object, model: Model, acts: Sequence[Mask]) -> tuple[Array, Array] | None:
     """Return the lower and upper effort limits, (nv,), or None without limits.
 
     Limits of one drive of a list apply to the degrees of freedom that it commands.
@@ -305,7 +305,7 @@ def _efforts(u: EffortLimits, model: Model) -> tuple[Array, Array]:
 # --- several drives -----------------------------------------------------------------------------------------
 
 
-def _require_separate(model: Model, drives: Sequence[Any], acts: Sequence[Mask]) -> None:
+def _require_separate(model: Model, drives: Sequence[object], acts: Sequence[Mask]) -> None:
     """Check that no joint is commanded by two drives.
 
     Raises:
@@ -325,14 +325,14 @@ def _require_separate(model: Model, drives: Sequence[Any], acts: Sequence[Mask])
         )
 
 
-def _kind(drive: Any) -> str:
+def _kind(drive: object) -> str:
     """Return a label of a drive for messages."""
     if isinstance(drive, (list, tuple, np.ndarray)) or by_name(drive) is not None:
         return "constant torques"
     return label(drive)
 
 
-def _sum(parts: Sequence[Part], drives: Sequence[Any], model: Model) -> Part:
+def _sum(parts: Sequence[Part], drives: Sequence[object], model: Model) -> Part:
     """Return the sum of torques that act on separate joints.
 
     Raises:
@@ -403,7 +403,7 @@ def _sum_of_springs(springs: Sequence[Spring], model: Model) -> Spring:
     return Spring(np.sum([s.kp for s in springs], axis=0), np.sum([s.kd for s in springs], axis=0), q)
 
 
-def _function_of(part: Part, model: Model) -> Callable[..., Any]:
+def _function_of(part: Part, model: Model) -> Callable[..., object]:
     """Return the torques of a part as a function (t, q, v) -> tau."""
     if isinstance(part, Called):
         return part.function

@@ -8,9 +8,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
+from pin_nonideal.types import Model
 from pin_nonideal.validation import (
     choice,
     count,
@@ -154,7 +154,7 @@ class JointFriction:
             InputError: a coefficient is invalid, or all coefficients of a joint are zero.
             UnknownNameError: there is no such joint.
         """
-        model: Any = getattr(scene, "model", scene)
+        model: Model = getattr(scene, "model", scene)
         known = [str(name) for name in model.names][1:]
         if joints is None:
             joints = [

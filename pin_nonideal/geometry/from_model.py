@@ -132,7 +132,9 @@ def geometry_contacts(
     return found
 
 
-def expand_geometry_contacts(contacts: Iterable[Any], model: pin.Model, geometry: Any) -> tuple[Any, ...]:
+def expand_geometry_contacts(
+    contacts: Iterable[object], model: pin.Model, geometry: object
+) -> tuple[Any, ...]:
     """Return contacts in which each `GeometryContact` is replaced by the contacts of its manifold.
 
     Args:

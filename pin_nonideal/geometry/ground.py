@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pinocchio as pin
 
 from pin_nonideal.errors import InputError
-from pin_nonideal.types import Array, GeometryModel, Model, Placement
+from pin_nonideal.types import Array, GeometryModel, GeometryObject, Model, Placement
 
 
 def lowest_height(model: Model, shapes: GeometryModel, q: Array, plane: Placement) -> float:
@@ -35,7 +33,7 @@ def lowest_height(model: Model, shapes: GeometryModel, q: Array, plane: Placemen
     return min(heights)
 
 
-def depth(item: Any, place: Placement) -> float:
+def depth(item: GeometryObject, place: Placement) -> float:
     """Return the height of the lowest point of one shape above the plane z = 0 [m].
 
     Args:
@@ -67,7 +65,7 @@ def depth(item: Any, place: Placement) -> float:
     return height + float((points @ normal).min())
 
 
-def _vertices(item: Any) -> Array | None:
+def _vertices(item: GeometryObject) -> Array | None:
     """Return the vertices of a mesh, or None for other shapes."""
     mesh, kind = item.geometry, type(item.geometry).__name__
     if kind.startswith("Convex"):

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from pin_nonideal.description.contacts.convex_hull import check_convex, convex_hull
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
-from pin_nonideal.types import Array, Placement
+from pin_nonideal.types import Array, CollisionGeometry, Placement
 
 # Corners of a box of half edges 1.
 CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))
@@ -101,7 +100,7 @@ def shape_of(who: str, name: str, model: pin.Model, geometry: pin.GeometryModel)
     return Shape(name, "convex mesh", frame, place, located(corners), solid=True)
 
 
-def _corners(what: str, mesh: Any, scale: Array) -> Array:
+def _corners(what: str, mesh: CollisionGeometry, scale: Array) -> Array:
     """Return the corners of a convex mesh.
 
     Raises:

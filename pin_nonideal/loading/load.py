@@ -7,7 +7,7 @@ import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -41,7 +41,7 @@ def load(
     v0: Start = None,
     assembly_tolerance: float = ASSEMBLY_TOLERANCE,
     limits: bool = False,
-    **parameters: Any,
+    **parameters: object,
 ) -> Scene:
     """Load a robot as a scene.
 
@@ -161,7 +161,7 @@ class ShapeReader:
     origin: Table
     kind: str
 
-    def __call__(self) -> Any:
+    def __call__(self) -> object:
         """Return the shapes."""
         return getattr(load_from_origin(self.origin), self.kind)
 
