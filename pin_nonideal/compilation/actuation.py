@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from pin_nonideal.core_loader import core
@@ -29,47 +27,17 @@ from pin_nonideal.states.parsing import (
     named_joint_values,
 )
 from pin_nonideal.types import Array, Model
-from pin_nonideal.validation import by_name, label
+from pin_nonideal.validation import by_name
 
 from .callbacks import checked
 from .delay import DelayedTorque
 from .resolver import Resolver, words
+from .torques import Called, Constant, Part, Spring, Timed, kind_of_drive, sum_of_torques
 
 Mask = NDArray[np.bool_]
 
 # Efforts from here on are unlimited: Pinocchio stores the largest float for no limit.
 UNBOUNDED = 1e300
-
-
-class Constant(NamedTuple):
-    """Constant torques tau, (nv,)."""
-
-    tau: Array
-
-
-class Timed(NamedTuple):
-    """Torques `values`, (nt, nv), at `times` [s], (nt,), linear in between. Steps end at every time."""
-
-    times: Array
-    values: Array
-
-
-class Spring(NamedTuple):
-    """Torques kp (q - q_now) - kd v, with gains (nv,) and a configuration q, (nq,)."""
-
-    kp: Array
-    kd: Array
-    q: Array
-
-
-class Called(NamedTuple):
-    """Torques of a function (t, q, v) -> tau, held between samples of `period` [s] if it is not None."""
-
-    function: Callable[..., Any]
-    period: float | None
-
-
-Part = Constant | Timed | Spring | Called
 
 
 def lower_actuation(u: object, out: core.Builder, resolver: Resolver, spec: SceneSpec) -> None:
@@ -95,7 +63,7 @@ def lower_actuation(u: object, out: core.Builder, resolver: Resolver, spec: Scen
     ]
     if listed:
         _require_separate(model, drives, [acts for _, acts in lowered])
-    _write(lowered[0][0] if not listed else _sum([part for part, _ in lowered], drives, model), out)
+    _write(lowered[0][0] if not listed else sum_of_torques([part for part, _ in lowered], drives, model), out)
     limits = _limits(u, model, [acts for _, acts in lowered])
     if limits is not None:
         out.limit_effort(least=limits[0], most=limits[1])
@@ -320,95 +288,7 @@ def _require_separate(model: Model, drives: Sequence[object], acts: Sequence[Mas
         assert second is not None
         raise InputError(
             f'actuation: each joint must be commanded by one drive; "{place.name}" is commanded by drive '
-            f"{first} ({_kind(drives[first])}) and drive {second} ({_kind(drives[second])}) of the list; "
+            f"{first} ({kind_of_drive(drives[first])}) and drive {second} "
+            f"({kind_of_drive(drives[second])}) of the list; "
             "drives by joint name command the joints that they name, and the others command all joints"
         )
-
-
-def _kind(drive: object) -> str:
-    """Return a label of a drive for messages."""
-    if isinstance(drive, (list, tuple, np.ndarray)) or by_name(drive) is not None:
-        return "constant torques"
-    return label(drive)
-
-
-def _sum(parts: Sequence[Part], drives: Sequence[object], model: Model) -> Part:
-    """Return the sum of torques that act on separate joints.
-
-    Raises:
-        InputError: sampled torques cannot be added to torques that change between their samples.
-    """
-    if all(isinstance(part, Constant) for part in parts):
-        return Constant(np.sum([part.tau for part in parts], axis=0))  # type: ignore[union-attr]
-    if all(isinstance(part, (Constant, Timed)) for part in parts):
-        return _sum_of_tables(parts)
-    springs = [part for part in parts if isinstance(part, Spring)]
-    if len(springs) == len(parts):
-        return _sum_of_springs(springs, model)
-    functions = [_function_of(part, model) for part in parts]
-
-    def total(t: float, q: Array, v: Array) -> Array:
-        tau = np.zeros(model.nv)
-        for function in functions:
-            tau += function(t, q, v)
-        return tau
-
-    periods = {part.period for part in parts if isinstance(part, Called)} - {None}
-    if not periods:
-        return Called(total, None)
-    steady = [isinstance(part, Constant) or getattr(part, "period", None) is not None for part in parts]
-    if len(periods) > 1 or not all(steady):
-        sampled = next(k for k, part in enumerate(parts) if getattr(part, "period", None) is not None)
-        other = steady.index(False) if not all(steady) else None
-        got = "several periods" if other is None else _kind(drives[other])
-        raise InputError(
-            f"actuation: torques that {_kind(drives[sampled])} holds between samples add to constant torques "
-            f"and to torques of the same period only; got {got}; give all drives one period, or compute "
-            "their sum in one function"
-        )
-    return Called(total, periods.pop())
-
-
-def _sum_of_tables(parts: Sequence[Part]) -> Timed:
-    """Return the sum of tables and constant torques: a table with all times."""
-    tables = [part for part in parts if isinstance(part, Timed)]
-    times = np.unique(np.concatenate([table.times for table in tables]))
-    values = np.zeros((times.size, tables[0].values.shape[1]))
-    for part in parts:
-        if isinstance(part, Timed):
-            values += np.array([_interpolated(part, float(t)) for t in times])
-        elif isinstance(part, Constant):
-            values += part.tau
-    return Timed(times, values)
-
-
-def _interpolated(table: Timed, t: float) -> Array:
-    """Return the torques of a table at a time, as the core computes them, (nv,)."""
-    times, values = table
-    if t <= times[0] or t >= times[-1]:
-        return np.asarray(values[0] if t <= times[0] else values[-1])
-    k = int(np.searchsorted(times, t, side="right")) - 1
-    s = (t - times[k]) / (times[k + 1] - times[k])
-    return np.asarray((1.0 - s) * values[k] + s * values[k + 1])
-
-
-def _sum_of_springs(springs: Sequence[Spring], model: Model) -> Spring:
-    """Return one spring with the gains of all and the configuration that each holds."""
-    q = springs[0].q.copy()
-    for spring in springs[1:]:
-        for place in joint_places(model):
-            if spring.kp[place.v_first : place.v_first + place.nv].any():
-                own = slice(place.q_first, place.q_first + place.nq)
-                q[own] = spring.q[own]
-    return Spring(np.sum([s.kp for s in springs], axis=0), np.sum([s.kd for s in springs], axis=0), q)
-
-
-def _function_of(part: Part, model: Model) -> Callable[..., object]:
-    """Return the torques of a part as a function (t, q, v) -> tau."""
-    if isinstance(part, Called):
-        return part.function
-    if isinstance(part, Timed):
-        return lambda t, q, v: _interpolated(part, t)
-    if isinstance(part, Constant):
-        return lambda t, q, v: part.tau
-    return lambda t, q, v: part.kp * pin.difference(model, q, part.q) - part.kd * v
