@@ -27,7 +27,7 @@ from .problems import Problem
 DT = 2e-3
 STATES, STEPS = 64, 200
 LONG = 0.2  # minimum time of a batch in one thread [s]
-MOST_STATES = 4096
+MAX_STATES = 4096
 SPREAD = 0.05  # standard deviation of the initial velocities around the scene's [rad/s or m/s]
 OURS, RIVALS = "pin_nonideal", ("mujoco Euler", "mujoco implicitfast")
 
@@ -152,7 +152,7 @@ def long_batch(problem: Problem, scene: pn.Scene, steps: int) -> int:
     """Return the number of states of a batch of at least LONG seconds, a multiple of STATES."""
     call = ours(scene, *starts(problem, scene, STATES), steps, 1)
     seconds = min(batch_of(call, time.process_time)(1) for _ in range(3))
-    return min(STATES * math.ceil(LONG / seconds), MOST_STATES)
+    return min(STATES * math.ceil(LONG / seconds), MAX_STATES)
 
 
 def measure_case(name: str, states: int | None, steps: int, rounds: int) -> dict[str, Any]:

@@ -63,6 +63,7 @@ EPILOG = """parts:
   features     what a loop, a law, sticking, recording add to an evaluation and a step
   batches      steps a second of many states in one and two threads
   contacts     bouncing, sliding, standing: time against error, a step, an impact, open contacts
+  bodies       stacks, dominoes, walls and piles: time of a step, creep, errors of the laws
   long         ten simulated seconds: cost, closure gap, energy change
   footprint    time and memory of an import
 actions:
@@ -203,6 +204,13 @@ def contacts(options: argparse.Namespace) -> Any:
     return contacts.measure(rivals, options.quick, options.only, say)
 
 
+def bodies(options: argparse.Namespace) -> Any:
+    from . import many_contacts
+
+    rivals = {tool.name for tool in chosen_tools(options)}
+    return many_contacts.measure_all(rivals, options.quick, options.only, say)
+
+
 def footprint(options: argparse.Namespace) -> Any:
     from . import footprint
 
@@ -258,7 +266,7 @@ def report(options: argparse.Namespace) -> int:
 
 PARTS: dict[str, Callable[[argparse.Namespace], Any]] = {
     part.__name__: part
-    for part in (evaluation, scaling, growth, accuracy, features, batches, contacts, long, footprint)
+    for part in (evaluation, scaling, growth, accuracy, features, batches, contacts, bodies, long, footprint)
 }
 ACTIONS: dict[str, Callable[[argparse.Namespace], int]] = {
     "build": build,

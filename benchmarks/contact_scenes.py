@@ -41,6 +41,7 @@ class Body:
 
     @property
     def is_ball(self) -> bool:
+        """Whether the body is a ball."""
         return len(self.size) == 1
 
 
@@ -140,7 +141,10 @@ def stack(count: int) -> ContactScene:
 def heavy_on_light(ratio: float) -> ContactScene:
     """Return two boxes, the upper one `ratio` times as heavy."""
     edge = 0.2
-    bodies = [Body((edge,) * 3, (0.0, 0.0, 0.5 * edge)), Body((edge,) * 3, (0.01, 0.0, 1.5 * edge), density=ratio * DENSITY)]
+    bodies = [
+        Body((edge,) * 3, (0.0, 0.0, 0.5 * edge)),
+        Body((edge,) * 3, (0.01, 0.0, 1.5 * edge), density=ratio * DENSITY),
+    ]
     return ContactScene(f"a box of {ratio:.0e} times the mass on another", bodies, rests=True)
 
 

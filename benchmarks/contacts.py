@@ -26,7 +26,7 @@ STEPS = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4)  # [s]
 LEVELS = (1e-2, 1e-4, 1e-6, 1e-8)
 STEP = 1e-3  # step of time stepping for the timing of one step [s]
 OPEN = (4, 40, 400)  # numbers of open contacts
-LEAST_STEPS = 1000  # minimum number of time steps in a batch
+MIN_STEPS = 1000  # minimum number of time steps in a batch
 FALLS = (1, 2, 4, 8)  # numbers of simultaneous impacts
 RIVALS = {"mujoco": mujocos, "drake": drakes}
 
@@ -69,10 +69,10 @@ def curve(case: Case, rivals: Collection[str], quick: bool, say: Callable[[str],
 
 
 def steps_of(scene: pn.Scene, h: float, **start: Any) -> timing.Batch:
-    """Return a batch of time steps; at least LEAST_STEPS, so that the start of a run is negligible."""
+    """Return a batch of time steps; at least MIN_STEPS, so that the start of a run is negligible."""
 
     def batch(count: int) -> float:
-        steps = max(count, LEAST_STEPS)
+        steps = max(count, MIN_STEPS)
         begin = timing.clock()
         pn.simulate(scene, steps * h, method="moreau", dt=h, output_dt=steps * h, **start)
         return (timing.clock() - begin) / steps

@@ -24,10 +24,10 @@ from .evaluation import our_batch
 from .problems import Problem
 
 OURS, ABA, ODEINT, MUJOCO = "pin_nonideal", "pinocchio aba in C++", "aba + odeint in C++", "mujoco"
-MOST_NESTED = 300  # maximum nesting of XML elements that Python writes
-MOST_CUBED = 500  # maximum nv of tools with memory of order nv^3
+MAX_NESTED = 300  # maximum nesting of XML elements that Python writes
+MAX_CUBED = 500  # maximum nv of tools with memory of order nv^3
 SWAYING = 0.2  # duration of the first phase of the humanoid's motion [s]
-LEAST_RUN, LONG_RUN = 1e-3, 0.05  # length of a turn [s]
+MIN_RUN, LONG_RUN = 1e-3, 0.05  # length of a turn [s]
 COULOMB: dict[str, Any] = {"coulomb": 0.1}
 LOADED: dict[str, Any] = {"mu": 0.1, "radius": 0.05}
 
@@ -152,7 +152,7 @@ def forward(model: Any, q: Any, v: Any) -> tuple[timing.Batch, Any] | None:
 
 def peers(model: Any) -> dict[str, Any]:
     """Return the built C++ peers of Pinocchio; their data take 32 nv^3 bytes."""
-    if model.nv > MOST_CUBED:
+    if model.nv > MAX_CUBED:
         return {}
     modules = {name: build_peers.load(name) for name in build_peers.NAMES}
     return {name: module.Peer(model, [], 0.0, 1) for name, module in modules.items() if module is not None}
@@ -177,7 +177,7 @@ def chains(sizes: tuple[int, ...]) -> Iterator[Row]:
         for name, peer in peers(model).items():
             row.batches[f"{ABA} ({name})"] = timing.counted(partial(peer.time_aba, q, v, world=False))
             row.errors[f"{ABA} ({name})"] = largest(pin.aba(model, model.createData(), q, v, none), exact)
-        if links <= MOST_NESTED and (theirs := forward(model, q, v)):
+        if links <= MAX_NESTED and (theirs := forward(model, q, v)):
             row.batches[MUJOCO], row.errors[MUJOCO] = theirs[0], largest(theirs[1], exact)
         yield row
 
@@ -330,7 +330,7 @@ def measure(quick: bool, only: str | None, say: Callable[[str], None] = print) -
 
 def timed(row: Row, rounds: int) -> dict[str, Any]:
     """Return a row with the times of its contestants, and ours over each of the others."""
-    times = timing.paired(row.batches, rounds, LEAST_RUN if row.what == "evaluation" else LONG_RUN)
+    times = timing.paired(row.batches, rounds, MIN_RUN if row.what == "evaluation" else LONG_RUN)
     return {
         "group": row.group,
         "size": row.size,

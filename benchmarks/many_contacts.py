@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any
 
 import numpy as np
@@ -27,11 +27,15 @@ QUICK = 4  # number of scenes of a quick run
 def measure(given: ContactScene, rounds: int, with_mujoco: bool) -> dict[str, Any]:
     """Return the times of one scene, and what its motion shows.
 
-    The time of a run includes its start. It is that of the processor, by the minimum of some interleaved runs.
+    The time of a run includes its start. It is the processor's, by the minimum of some interleaved runs.
     """
     begin = timing.clock()
     scene = ours(given)
-    row: dict[str, Any] = {"case": given.title, "made": timing.clock() - begin, "contacts": len(scene.contacts)}
+    row: dict[str, Any] = {
+        "case": given.title,
+        "made": timing.clock() - begin,
+        "contacts": len(scene.contacts),
+    }
     steps = round(given.duration / STEP)
     run = None
     mine, theirs = [], []
@@ -66,26 +70,36 @@ def moved(given: ContactScene, end: Any) -> float:
     return float(np.abs(end - [body.at for body in given.bodies]).max())
 
 
-def run(rivals: Any, quick: bool, say: Callable[[str], None]) -> list[dict[str, Any]]:
-    """Measure all scenes.
+def report_line(given: ContactScene, row: dict[str, Any]) -> str:
+    """Return the results of one scene as a line."""
+    line = (
+        f"  {given.title}: {row['seconds'] / row['steps'] * 1e6:.3g} us a step, made in {row['made']:.3g} s"
+    )
+    if "ratio" in row:
+        making = row["made"] / row["mujoco_made"]
+        line += f"; ours over MuJoCo {row['ratio']:.2f}, making {making:.3g}"
+    line += f"; errors of the laws {row['residual']:.1e}, {row['relaxed']} relaxed"
+    if given.rests:
+        line += f"; moved {row['moved']:.1e} m"
+        line += f", MuJoCo {row['mujoco_moved']:.1e} m" if "mujoco_moved" in row else ""
+    return line
+
+
+def measure_all(
+    rivals: Collection[str], quick: bool, only: str | None, say: Callable[[str], None]
+) -> list[dict[str, Any]]:
+    """Measure the scenes.
 
     Args:
         rivals: names of the tools to compare with.
         quick: whether to run the small scenes only, once.
+        only: part of the title of the scenes to run, or None for all.
         say: function that prints a line.
     """
     rows = []
     for given in SCENES[:QUICK] if quick else SCENES:
-        row = measure(given, 1 if quick else 3, "mujoco" in rivals)
-        rows.append(row)
-        per_step = row["seconds"] / row["steps"] * 1e6
-        line = f"  {given.title}: {per_step:.3g} us a step, made in {row['made']:.3g} s"
-        if "ratio" in row:
-            line += f"; ours over MuJoCo {row['ratio']:.2f}, making {row['made'] / row['mujoco_made']:.3g}"
-        line += f"; errors of the laws {row['residual']:.1e}, {row['relaxed']} relaxed"
-        if given.rests:
-            line += f"; moved {row['moved']:.1e} m" + (
-                f", MuJoCo {row['mujoco_moved']:.1e} m" if "mujoco_moved" in row else ""
-            )
-        say(line)
+        if only is not None and only not in given.title:
+            continue
+        rows.append(measure(given, 1 if quick else 3, "mujoco" in rivals))
+        say(report_line(given, rows[-1]))
     return rows

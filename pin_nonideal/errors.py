@@ -20,7 +20,7 @@ NAME_MAX = 64  # characters of a name that is compared with known names
 class PinNonidealError(Exception):
     """Root of all errors raised by this package."""
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         # The constructor cannot be used, since its arguments differ from `args`.
         return _made_again, (type(self), self.args, dict(self.__dict__))
 
@@ -30,7 +30,7 @@ class PinNonidealError(Exception):
 
 
 def _made_again(
-    kind: type[PinNonidealError], args: tuple[Any, ...], state: dict[str, Any]
+    kind: type[PinNonidealError], args: tuple[object, ...], state: dict[str, object]
 ) -> PinNonidealError:
     """Rebuild an error from another process."""
     error = kind.__new__(kind, *args)
@@ -122,8 +122,8 @@ class FrictionParadoxError(RunError):
         element: str,
         determinant: float,
         time: float | None = None,
-        solutions: Iterable[Any] = (),
-        limits: Iterable[Any] = (),
+        solutions: Iterable[object] = (),
+        limits: Iterable[object] = (),
     ) -> None:
         super().__init__(message, time=time)
         self.element = element

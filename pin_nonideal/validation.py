@@ -23,7 +23,7 @@ Vector3 = tuple[float, float, float]
 AXES: dict[str, Vector3] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
-def label(description: Any) -> str:
+def label(description: object) -> str:
     """Return the label of a description in messages: its class and, if it has one, its name.
 
     Args:

@@ -16,7 +16,7 @@ from benchmarks import build_peers
 from .base import Outcome, Setting, tolerances
 from .pinocchio_scipy import anchors, proximal
 
-MOST_EVALUATIONS = 1_000_000
+MAX_EVALUATIONS = 1_000_000
 # Number of evaluations for the selection of the build.
 TRIED = 2000
 METHODS = (("fehlberg78", 13), ("dopri5", 9), ("bulirsch_stoer", 13))
@@ -56,10 +56,10 @@ class PinocchioOdeint:
         def run() -> Outcome:
             q, v = np.empty(samples * nv), np.empty(nv)
             count = peer.integrate(
-                q0, v0, tau, times, setting.family, rtol, rtol, MOST_EVALUATIONS, q_out=q, v_out=v
+                q0, v0, tau, times, setting.family, rtol, rtol, MAX_EVALUATIONS, q_out=q, v_out=v
             )
             if count < 0 or not np.isfinite(q).all():
-                return Outcome(None, MOST_EVALUATIONS, failure="it does not end" if count < 0 else "diverged")
+                return Outcome(None, MAX_EVALUATIONS, failure="it does not end" if count < 0 else "diverged")
             return Outcome(q.reshape(samples, nv), count, v=v)
 
         return run

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 # Proximal term of constraintDynamics for redundant rows, such as one of the three rows of a planar loop.  The
 # manual of Pinocchio recommends 1e-12.  The relative error of the acceleration is then 1e-13.
 REDUNDANT_MU = 1e-12
-MOST_EVALUATIONS = 200_000
+MAX_EVALUATIONS = 200_000
 
 
 def anchors(problem: Any) -> list[Any]:
@@ -100,7 +100,7 @@ class PinocchioSciPy:
                     rtol=rtol,
                     atol=rtol,
                     full_output=True,
-                    mxstep=MOST_EVALUATIONS,
+                    mxstep=MAX_EVALUATIONS,
                 )
             steps = int(info["nst"][-1])
             if info["message"] != "Integration successful." or not np.isfinite(y).all():
@@ -108,11 +108,11 @@ class PinocchioSciPy:
             return Outcome(y[1:, :nq], steps, v=y[-1, nq:])
 
         def copied(t: float, y: Array) -> Array:
-            """Return a copy of the rate, which SciPy stores; raise TimeoutError after MOST_EVALUATIONS."""
+            """Return a copy of the rate, which SciPy stores; raise TimeoutError after MAX_EVALUATIONS."""
             nonlocal count
             count += 1
-            if count > MOST_EVALUATIONS:
-                raise TimeoutError(f"more than {MOST_EVALUATIONS} evaluations")
+            if count > MAX_EVALUATIONS:
+                raise TimeoutError(f"more than {MAX_EVALUATIONS} evaluations")
             return rate(t, y).copy()
 
         def dop853() -> Outcome:

@@ -27,7 +27,7 @@ from pin_nonideal.visualization.replay import replay
 SWEEP_KEYS = ("robot", "parameters", "duration", "grid", "samples", "options", "store", "jobs", "failures")
 
 
-def plain_value(text: str) -> Any:
+def plain_value(text: str) -> object:
     """Return a word as an integer, a number or a truth value, else as text.
 
     Args:
@@ -63,7 +63,7 @@ def named_values(words: Sequence[str], option: str) -> Table | None:
                 f"{option} needs JOINT=NUMBER, JOINT=NUMBER,NUMBER,... or JOINT.PIECE=NUMBER,..., such as "
                 f'{option} elbow=0.5 or {option} base.xyz=0,0,1; got "{word}"'
             )
-        value: Any = numbers[0] if len(numbers) == 1 else numbers
+        value: object = numbers[0] if len(numbers) == 1 else numbers
         joint, dot, piece = name.rpartition(".")
         if dot and piece in ("xyz", "rpy", "quaternion", "xy", "angle", "linear", "angular"):
             table.setdefault(joint, {})[piece] = value
@@ -187,7 +187,7 @@ class _Robot:
     def __init__(self, robot: str, fixed: Mapping[str, Any]) -> None:
         self.robot, self.fixed = robot, dict(fixed)
 
-    def __call__(self, **parameters: Any) -> Scene:
+    def __call__(self, **parameters: object) -> Scene:
         """Return the scene of the robot."""
         return load(self.robot, **{**self.fixed, **parameters})
 

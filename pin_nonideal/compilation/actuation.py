@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from pin_nonideal.core_loader import core
@@ -29,11 +27,12 @@ from pin_nonideal.states.parsing import (
     named_joint_values,
 )
 from pin_nonideal.types import Array, Model
-from pin_nonideal.validation import by_name, label
+from pin_nonideal.validation import by_name
 
 from .callbacks import checked
 from .delay import DelayedTorque
 from .resolver import Resolver, words
+from .torques import Called, Constant, Part, Spring, Timed, kind_of_drive, sum_of_torques
 
 Mask = NDArray[np.bool_]
 
@@ -41,42 +40,7 @@ Mask = NDArray[np.bool_]
 UNBOUNDED = 1e300
 
 
-class Constant(NamedTuple):
-    """Constant torques tau, (nv,)."""
-
-    tau: Array
-
-
-class Timed(NamedTuple):
-    """Torques `values`, (nt, nv), at `times` [s], (nt,), linear in between. Steps end at every time."""
-
-    times: Array
-    values: Array
-
-
-class Spring(NamedTuple):
-    """Torques kp (q - q_now) - kd v, with gains (nv,) and a configuration q, (nq,)."""
-
-    kp: Array
-    kd: Array
-    q: Array
-
-
-class Called(NamedTuple):
-    """Torques of a function (t, q, v) -> tau, held between samples of `period` [s] if it is not None.
-
-    Steps end at the times `breaks` [s], (n,), where torques that are not held may jump.
-    """
-
-    function: Callable[..., Any]
-    period: float | None
-    breaks: Array = np.zeros(0)
-
-
-Part = Constant | Timed | Spring | Called
-
-
-def lower_actuation(u: Any, out: core.Builder, resolver: Resolver, spec: SceneSpec) -> None:
+def lower_actuation(u: object, out: core.Builder, resolver: Resolver, spec: SceneSpec) -> None:
     """Set the actuation of the scene.
 
     Args:
@@ -99,7 +63,7 @@ def lower_actuation(u: Any, out: core.Builder, resolver: Resolver, spec: SceneSp
     ]
     if listed:
         _require_separate(model, drives, [acts for _, acts in lowered])
-    _write(lowered[0][0] if not listed else _sum([part for part, _ in lowered], drives, model), out)
+    _write(lowered[0][0] if not listed else sum_of_torques([part for part, _ in lowered], drives, model), out)
     limits = _limits(u, model, [acts for _, acts in lowered])
     if limits is not None:
         out.limit_effort(least=limits[0], most=limits[1])
@@ -123,7 +87,7 @@ def _write(part: Part, out: core.Builder) -> None:
 # --- one drive ----------------------------------------------------------------------------------------------
 
 
-def _lowered(u: Any, resolver: Resolver, spec: SceneSpec, who: str) -> tuple[Part, Mask]:
+def _lowered(u: object, resolver: Resolver, spec: SceneSpec, who: str) -> tuple[Part, Mask]:
     """Return the torques of one drive, and the mask of the degrees of freedom that it commands, (nv,)."""
     model, everything = resolver.model, np.ones(resolver.model.nv, dtype=bool)
     if isinstance(u, SampledControl):
@@ -163,7 +127,7 @@ def delayed_torque(u: SampledControl, model: Model, t0: float, by_thread: bool) 
     return DelayedTorque(function, u.delay_in_samples, initial, t0, by_thread)
 
 
-def _sampled_torque(u: SampledControl, model: Model) -> Callable[..., Any]:
+def _sampled_torque(u: SampledControl, model: Model) -> Callable[..., object]:
     who = f"{words(u)}: function"
     return checked(_torques_of(u.function, model, who), who, (model.nv,))
 
@@ -188,17 +152,17 @@ class _Identified:
         source: the drive.
     """
 
-    def __init__(self, function: Callable[..., Any], source: object) -> None:
+    def __init__(self, function: Callable[..., object], source: object) -> None:
         self.function, self.source = function, source
 
-    def __call__(self, t: float, q: Array, v: Array) -> Any:
+    def __call__(self, t: float, q: Array, v: Array) -> object:
         return self.function(t, q, v)
 
 
-def _torques_of(function: Callable[..., Any], model: Model, who: str) -> Callable[..., Any]:
+def _torques_of(function: Callable[..., object], model: Model, who: str) -> Callable[..., object]:
     """A function of torques that may return them by joint name."""
 
-    def torques(*arguments: Any) -> Any:
+    def torques(*arguments: object) -> object:
         tau = function(*arguments)
         if type(tau) is np.ndarray or by_name(tau) is None:
             return tau
@@ -217,7 +181,7 @@ def _held(times: Array, values: Array) -> Timed:
     return Timed(np.append(both, times[-1]), np.vstack([np.repeat(values[:-1], 2, axis=0), values[-1:]]))
 
 
-def gains_of(model: Model, gain: Any, who: str) -> Array:
+def gains_of(model: Model, gain: object, who: str) -> Array:
     """Return a gain for each degree of freedom; a scalar acts on joints with one degree of freedom.
 
     Args:
@@ -234,7 +198,7 @@ def gains_of(model: Model, gain: Any, who: str) -> Array:
     return named_joint_values(model, gain, who)
 
 
-def commanded(model: Model, given: Any) -> Mask:
+def commanded(model: Model, given: object) -> Mask:
     """Return the mask of the degrees of freedom that torques, samples or gains command, (nv,).
 
     A table by joint name commands its joints. A number commands the joints with one degree of freedom, and an
@@ -270,7 +234,7 @@ def _require_vectors(model: Model, kp: Array, who: str) -> None:
             )
 
 
-def _limits(u: Any, model: Model, acts: Sequence[Mask]) -> tuple[Array, Array] | None:
+def _limits(u: object, model: Model, acts: Sequence[Mask]) -> tuple[Array, Array] | None:
     """Return the lower and upper effort limits, (nv,), or None without limits.
 
     Limits of one drive of a list apply to the degrees of freedom that it commands.
@@ -310,7 +274,7 @@ def _efforts(u: EffortLimits, model: Model) -> tuple[Array, Array]:
 # --- several drives -----------------------------------------------------------------------------------------
 
 
-def _require_separate(model: Model, drives: Sequence[Any], acts: Sequence[Mask]) -> None:
+def _require_separate(model: Model, drives: Sequence[object], acts: Sequence[Mask]) -> None:
     """Check that no joint is commanded by two drives.
 
     Raises:
@@ -325,97 +289,7 @@ def _require_separate(model: Model, drives: Sequence[Any], acts: Sequence[Mask])
         assert second is not None
         raise InputError(
             f'actuation: each joint must be commanded by one drive; "{place.name}" is commanded by drive '
-            f"{first} ({_kind(drives[first])}) and drive {second} ({_kind(drives[second])}) of the list; "
+            f"{first} ({kind_of_drive(drives[first])}) and drive {second} "
+            f"({kind_of_drive(drives[second])}) of the list; "
             "drives by joint name command the joints that they name, and the others command all joints"
         )
-
-
-def _kind(drive: Any) -> str:
-    """Return a label of a drive for messages."""
-    if isinstance(drive, (list, tuple, np.ndarray)) or by_name(drive) is not None:
-        return "constant torques"
-    return label(drive)
-
-
-def _sum(parts: Sequence[Part], drives: Sequence[Any], model: Model) -> Part:
-    """Return the sum of torques that act on separate joints.
-
-    Raises:
-        InputError: sampled torques cannot be added to torques that change between their samples.
-    """
-    if all(isinstance(part, Constant) for part in parts):
-        return Constant(np.sum([part.tau for part in parts], axis=0))  # type: ignore[union-attr]
-    if all(isinstance(part, (Constant, Timed)) for part in parts):
-        return _sum_of_tables(parts)
-    springs = [part for part in parts if isinstance(part, Spring)]
-    if len(springs) == len(parts):
-        return _sum_of_springs(springs, model)
-    functions = [_function_of(part, model) for part in parts]
-
-    def total(t: float, q: Array, v: Array) -> Array:
-        tau = np.zeros(model.nv)
-        for function in functions:
-            tau += function(t, q, v)
-        return tau
-
-    periods = {part.period for part in parts if isinstance(part, Called)} - {None}
-    if not periods:
-        times = [part.times for part in parts if isinstance(part, Timed)]
-        times += [part.breaks for part in parts if isinstance(part, Called)]
-        return Called(total, None, np.unique(np.concatenate([np.zeros(0), *times])))
-    steady = [isinstance(part, Constant) or getattr(part, "period", None) is not None for part in parts]
-    if len(periods) > 1 or not all(steady):
-        sampled = next(k for k, part in enumerate(parts) if getattr(part, "period", None) is not None)
-        other = steady.index(False) if not all(steady) else None
-        got = "several periods" if other is None else _kind(drives[other])
-        raise InputError(
-            f"actuation: torques that {_kind(drives[sampled])} holds between samples add to constant torques "
-            f"and to torques of the same period only; got {got}; give all drives one period, or compute "
-            "their sum in one function"
-        )
-    return Called(total, periods.pop())
-
-
-def _sum_of_tables(parts: Sequence[Part]) -> Timed:
-    """Return the sum of tables and constant torques: a table with all times."""
-    tables = [part for part in parts if isinstance(part, Timed)]
-    times = np.unique(np.concatenate([table.times for table in tables]))
-    values = np.zeros((times.size, tables[0].values.shape[1]))
-    for part in parts:
-        if isinstance(part, Timed):
-            values += np.array([_interpolated(part, float(t)) for t in times])
-        elif isinstance(part, Constant):
-            values += part.tau
-    return Timed(times, values)
-
-
-def _interpolated(table: Timed, t: float) -> Array:
-    """Return the torques of a table at a time, as the core computes them, (nv,)."""
-    times, values = table
-    if t <= times[0] or t >= times[-1]:
-        return np.asarray(values[0] if t <= times[0] else values[-1])
-    k = int(np.searchsorted(times, t, side="right")) - 1
-    s = (t - times[k]) / (times[k + 1] - times[k])
-    return np.asarray((1.0 - s) * values[k] + s * values[k + 1])
-
-
-def _sum_of_springs(springs: Sequence[Spring], model: Model) -> Spring:
-    """Return one spring with the gains of all and the configuration that each holds."""
-    q = springs[0].q.copy()
-    for spring in springs[1:]:
-        for place in joint_places(model):
-            if spring.kp[place.v_first : place.v_first + place.nv].any():
-                own = slice(place.q_first, place.q_first + place.nq)
-                q[own] = spring.q[own]
-    return Spring(np.sum([s.kp for s in springs], axis=0), np.sum([s.kd for s in springs], axis=0), q)
-
-
-def _function_of(part: Part, model: Model) -> Callable[..., Any]:
-    """Return the torques of a part as a function (t, q, v) -> tau."""
-    if isinstance(part, Called):
-        return part.function
-    if isinstance(part, Timed):
-        return lambda t, q, v: _interpolated(part, t)
-    if isinstance(part, Constant):
-        return lambda t, q, v: part.tau
-    return lambda t, q, v: part.kp * pin.difference(model, q, part.q) - part.kd * v

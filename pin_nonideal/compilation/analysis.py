@@ -97,7 +97,7 @@ def without_functions(spec: SceneSpec, nv: int) -> SceneSpec | None:
     return spec._replace(constraints=constraints, contacts=contacts, laws=laws)
 
 
-def _without_function(c: Any, nv: int) -> Any:
+def _without_function(c: object, nv: int) -> Any:
     """Return a copy with zeros for user rows, gaps and directions, and constants for functions of time."""
     if isinstance(c, UserConstraint):
         rows, zeros = (np.zeros((c.size, nv)), np.zeros(c.size)), np.zeros(c.size)

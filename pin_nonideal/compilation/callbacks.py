@@ -25,7 +25,7 @@ COARSE = 0.1  # relative tolerance: separately interpolated tables of value and 
 ROUNDING = 1e-7  # absolute tolerance: above the rounding of a difference quotient over two steps
 
 
-def checked(function: Callable[..., Any], who: str, *shapes: tuple[int, ...]) -> Callable[..., Any]:
+def checked(function: Callable[..., object], who: str, *shapes: tuple[int, ...]) -> Callable[..., Any]:
     """Wrap a user function: contiguous finite results of the given shapes, and errors that name it.
 
     Args:
@@ -35,7 +35,7 @@ def checked(function: Callable[..., Any], who: str, *shapes: tuple[int, ...]) ->
     """
     ask = named(function, who)
 
-    def call(*arguments: Any) -> Any:
+    def call(*arguments: object) -> object:
         value = ask(*arguments)
         if type(value) is np.ndarray and value.dtype == FLOATS and (value.shape,) == shapes:
             row = value.reshape(-1)
@@ -53,7 +53,7 @@ def checked(function: Callable[..., Any], who: str, *shapes: tuple[int, ...]) ->
     return call
 
 
-def named(function: Callable[..., Any], who: str) -> Callable[..., Any]:
+def named(function: Callable[..., object], who: str) -> Callable[..., Any]:
     """Wrap a user function so that errors name it.
 
     Args:
@@ -61,7 +61,7 @@ def named(function: Callable[..., Any], who: str) -> Callable[..., Any]:
         who: words for messages.
     """
 
-    def call(*arguments: Any) -> Any:
+    def call(*arguments: object) -> object:
         try:
             return function(*arguments)
         except RunError:
@@ -72,13 +72,13 @@ def named(function: Callable[..., Any], who: str) -> Callable[..., Any]:
     return call
 
 
-def _failed(message: str, arguments: Sequence[Any]) -> UserFunctionError:
+def _failed(message: str, arguments: Sequence[object]) -> UserFunctionError:
     """Return the error of a user function; it includes the time if the first argument is a float."""
     time = float(arguments[0]) if arguments and isinstance(arguments[0], float) else None
     return UserFunctionError(message if time is None else f"{message} (at t = {time:.6g} s)")
 
 
-def numbers_of(part: Any, shape: tuple[int, ...], who: str) -> Array:
+def numbers_of(part: object, shape: tuple[int, ...], who: str) -> Array:
     """Convert a result of a user function to a contiguous array of finite numbers.
 
     Args:
@@ -99,7 +99,7 @@ def numbers_of(part: Any, shape: tuple[int, ...], who: str) -> Array:
     return np.asarray(result.reshape(shape), order="C")
 
 
-def checked_limits(function: Callable[..., Any], who: str) -> Callable[..., tuple[float, float]]:
+def checked_limits(function: Callable[..., object], who: str) -> Callable[..., tuple[float, float]]:
     """Wrap a user's friction limit so that it returns two numbers: against forward and backward slip.
 
     Args:
@@ -108,7 +108,7 @@ def checked_limits(function: Callable[..., Any], who: str) -> Callable[..., tupl
     """
     ask = named(function, who)
 
-    def call(*arguments: Any) -> tuple[float, float]:
+    def call(*arguments: object) -> tuple[float, float]:
         value = ask(*arguments)
         if type(value) is float and 0.0 <= value < math.inf:
             return value, value
@@ -147,7 +147,7 @@ def time_function(function: Any, who: str) -> Any:
     return lambda t: tuple(float(x) for x in jet(t))
 
 
-def breaks(function: Any, who: str) -> list[float]:
+def breaks(function: object, who: str) -> list[float]:
     """Return the times [s] at which pieces of a user's function of time meet, from its attribute `breaks`.
 
     Args:

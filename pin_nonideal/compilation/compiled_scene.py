@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
-from typing import Any
 
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.actuation import SampledControl, delayed_control, switching_drives
@@ -26,7 +25,7 @@ from .error_context import Circumstances, named_failure
 from .lowering import lower
 from .resolver import Resolver, unique_names
 
-MOST_QUOTED = 4  # names in a message
+MAX_QUOTED = 4  # names in a message
 
 
 class CompiledScene:
@@ -181,16 +180,16 @@ class CompiledScene:
         return Circumstances(self.explicit_only, sources, pairs)
 
 
-def _frames_of(contact: Any) -> tuple[str, str]:
+def _frames_of(contact: object) -> tuple[str, str]:
     """Return the frames of a contact, empty for the world or if it has none."""
     first = getattr(contact, "frame", None) or getattr(contact, "frame1", None)
     second = getattr(contact, "plane", None) or getattr(contact, "frame2", None)
     return (str(first or ""), str(second or ""))
 
 
-def _quoted(kind: str, descriptions: Sequence[Any]) -> str:
+def _quoted(kind: str, descriptions: Sequence[object]) -> str:
     """Return the names of descriptions of a kind, at most the first few."""
     names = unique_names(descriptions, set())
-    shown = ", ".join(f'"{name}"' for name in names[:MOST_QUOTED])
-    shown += ", ..." if len(names) > MOST_QUOTED else ""
+    shown = ", ".join(f'"{name}"' for name in names[:MAX_QUOTED])
+    shown += ", ..." if len(names) > MAX_QUOTED else ""
     return f"{kind} {shown}" if len(names) == 1 else f"one of the {kind}s {shown}"

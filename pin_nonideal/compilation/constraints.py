@@ -34,7 +34,7 @@ from .callbacks import breaks, checked, time_function
 from .resolver import Frame, Resolver, placed_on, words
 
 # Largest denominator of a rational gear ratio for which the coupled angle of endless joints is constrained.
-LARGEST_GEAR = 64
+MAX_GEAR = 64
 # A ratio within this distance of a fraction is treated as that fraction.
 GEAR_ROUNDING = 1e-12
 # Step of central differences in time, relative to max(1 s, |t|): a compromise of rounding and curvature.
@@ -131,7 +131,7 @@ def _(c: JointCoupling, name: str, out: core.Builder, resolver: Resolver) -> Non
     if endless[0] and endless[1]:
         from fractions import Fraction
 
-        gear = Fraction(c.ratio).limit_denominator(LARGEST_GEAR)
+        gear = Fraction(c.ratio).limit_denominator(MAX_GEAR)
         position = abs(float(gear) - c.ratio) < GEAR_ROUNDING
         period = turn / gear.denominator
     elif endless[0]:
@@ -202,7 +202,7 @@ def user_rows(c: UserConstraint | UserContact, size: int, who: str, resolver: Re
         return lambda t, q, v: function(t, q, v, None)
     local = threading.local()
 
-    def rows(t: float, q: Array, v: Array) -> Any:
+    def rows(t: float, q: Array, v: Array) -> object:
         if not hasattr(local, "data"):
             local.data = model.createData()
         data = local.data

@@ -5,7 +5,6 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
@@ -30,7 +29,12 @@ class DelayedTorque:
     """
 
     def __init__(
-        self, function: Callable[..., Any], samples: int, initial: Array, t0: float, by_thread: bool = False
+        self,
+        function: Callable[..., object],
+        samples: int,
+        initial: Array,
+        t0: float,
+        by_thread: bool = False,
     ) -> None:
         self._function, self._samples, self._initial = function, samples, initial
         self._t0, self._by_thread = t0, by_thread

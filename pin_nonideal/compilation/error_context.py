@@ -26,7 +26,7 @@ from pin_nonideal.errors import (
 from pin_nonideal.states.rows import block_names
 from pin_nonideal.types import Model
 
-MOST_NAMED = 4  # names in a message
+MAX_NAMED = 4  # names in a message
 
 
 def opened(name: str, gaps: dict[str, float], t: float, after: str = "") -> LoopClosureError:
@@ -116,9 +116,9 @@ def named_failure(
 
 def _listed(names: Sequence[str]) -> str:
     """Return names for a message: each in quotes, and the number of those beyond the first few."""
-    shown = [f'"{name}"' for name in names[:MOST_NAMED]]
-    if len(names) > MOST_NAMED:
-        shown.append(f"{len(names) - MOST_NAMED} more")
+    shown = [f'"{name}"' for name in names[:MAX_NAMED]]
+    if len(names) > MAX_NAMED:
+        shown.append(f"{len(names) - MAX_NAMED} more")
     return shown[0] if len(shown) == 1 else f"{', '.join(shown[:-1])} and {shown[-1]}"
 
 

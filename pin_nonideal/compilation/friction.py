@@ -22,6 +22,7 @@ from pin_nonideal.description.contacts.solids import (
 )
 from pin_nonideal.description.laws import JointFriction
 from pin_nonideal.errors import InputError, UnknownNameError, UserFunctionError, nearest
+from pin_nonideal.types import Array
 
 from .callbacks import ReactionNames, checked, named
 from .constraints import frames_of
@@ -179,7 +180,7 @@ def _in_constraint(
     law: JointFriction, name: str, out: core.Builder, context: LoweringContext
 ) -> list[FrictionSite]:
     """Return the friction sites of an anchor or a coupling."""
-    c: Any = context.constraints[law.joint]
+    c: object = context.constraints[law.joint]
     who, anchor, resolver = words(law, name), context.reactions.blocks[law.joint], context.resolver
     if isinstance(c, JointCoupling):
         return [_in_coupling(law, who, name, c, anchor, out, resolver)]
@@ -384,7 +385,7 @@ def _flat_slip(c: Any, name: str, out: core.Builder, resolver: Resolver) -> list
     return elements
 
 
-def _turned(frame: Frame, axes: Any) -> Frame:
+def _turned(frame: Frame, axes: Array) -> Frame:
     """Return the frame with new axes, which are the columns of `axes` in the old axes."""
     joint, R, p = frame
     return joint, (np.reshape(R, (3, 3)) @ axes).ravel().tolist(), p

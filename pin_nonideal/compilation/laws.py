@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import singledispatch
-from typing import Any
 
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.laws import Drag, JointFriction, LuGre, SigmoidFriction, UserFriction, UserLaw
@@ -74,7 +73,7 @@ def _(law: UserLaw, name: str, out: core.Builder, context: LoweringContext) -> N
     shapes = ((nv,), (law.states,)) if law.states else ((nv,),)
     function = checked(law.function, f"{words(law, name)}: function", *shapes)
 
-    def call(t: float, q: Array, v: Array, view: core.ReactionView | None, *z: Array) -> Any:
+    def call(t: float, q: Array, v: Array, view: core.ReactionView | None, *z: Array) -> object:
         return function(t, q, v, None if view is None else Reactions(view, names), *z)
 
     reaction = core.Reaction[law.reaction or "none"]

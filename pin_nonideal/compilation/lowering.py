@@ -29,13 +29,13 @@ class LoweredItem(NamedTuple):
         kind: "constraint", "contact", "law", "force" or "actuation".
         name: unique among its kind.
         description: the description.
-        again: function of (description, builder) that adds a replacement of the description.
+        relower: function of (description, builder) that adds a replacement of the description.
     """
 
     kind: str
     name: str
     description: Any
-    again: Callable[[Any, Any], object]
+    relower: Callable[[object, Any], object]
 
 
 def lower(spec: SceneSpec, builder: core.Builder, resolver: Resolver) -> dict[str, Constraint | Contact]:
@@ -52,8 +52,8 @@ def lower(spec: SceneSpec, builder: core.Builder, resolver: Resolver) -> dict[st
     Raises:
         InputError, UnknownNameError: a frame, joint or constraint does not exist or does not fit.
     """
-    written = lowered(spec, builder, resolver)
-    return {each.name: each.description for each in written if each.kind in ("constraint", "contact")}
+    items = lowered(spec, builder, resolver)
+    return {each.name: each.description for each in items if each.kind in ("constraint", "contact")}
 
 
 def lowered(spec: SceneSpec, builder: core.Builder, resolver: Resolver) -> Iterator[LoweredItem]:
@@ -72,39 +72,41 @@ def lowered(spec: SceneSpec, builder: core.Builder, resolver: Resolver) -> Itera
     law_names = unique_names(spec.laws, set())
     for c, name in zip(spec.constraints, constraint_names, strict=True):
         lower_constraint(c, name, builder, resolver)
-        yield LoweredItem("constraint", name, c, partial(_again, lower_constraint, name, resolver))
+        yield LoweredItem("constraint", name, c, partial(_relower, lower_constraint, name, resolver))
     for name, contact in lower_contacts(
         list(zip(contact_names, spec.contacts, strict=True)), builder, resolver
     ):
-        yield LoweredItem("contact", name, contact, partial(_again, lower_gaps, name, resolver))
+        yield LoweredItem("contact", name, contact, partial(_relower, lower_gaps, name, resolver))
     joints = {name: i for i, name in enumerate(resolver.model.names) if i}
     blocks = {c.name: block for block, c in enumerate(builder.constraints)}
     names = ReactionNames(row_slices(builder), blocks, joints)
     context = LoweringContext(resolver, dict(zip(constraint_names, spec.constraints, strict=True)), names)
     for law, name in zip(spec.laws, law_names, strict=True):
         lower_law(law, name, builder, context)
-        yield LoweredItem("law", name, law, partial(_again, lower_law, name, context))
+        yield LoweredItem("law", name, law, partial(_relower, lower_law, name, context))
     rolling = [
         (c, name)
         for c, name in zip(spec.constraints, constraint_names, strict=True)
         if isinstance(c, Rolling)
     ]
     contacts = zip(spec.contacts, contact_names, strict=True)
-    for rubbing, name in [*rolling, *(pair for pair in contacts if not isinstance(pair[0], JointLimit))]:
-        lower_contact_friction(rubbing, name, builder, context)
-        yield LoweredItem("contact", name, rubbing, partial(_again, lower_contact_friction, name, context))
+    for touching, name in [*rolling, *(pair for pair in contacts if not isinstance(pair[0], JointLimit))]:
+        lower_contact_friction(touching, name, builder, context)
+        yield LoweredItem("contact", name, touching, partial(_relower, lower_contact_friction, name, context))
     for name, f in zip(unique_names(spec.forces, set()), spec.forces, strict=True):
         lower_force(f, builder, resolver)
         yield LoweredItem("force", name, f, lambda f, out: lower_force(f, out, resolver))
     lower_actuation(spec.actuation, builder, resolver, spec)
-    again = partial(_actuation_again, resolver, spec)
-    yield LoweredItem("actuation", "actuation", spec.actuation, again)
+    relower = partial(_relower_actuation, resolver, spec)
+    yield LoweredItem("actuation", "actuation", spec.actuation, relower)
     builder.set_impact(core.ImpactLaw[spec.impact])  # last, since it belongs to no description
 
 
-def _again(write: Callable[..., object], name: str, context: Any, description: Any, out: Any) -> None:
+def _relower(
+    write: Callable[..., object], name: str, context: object, description: object, out: object
+) -> None:
     write(description, name, out, context)
 
 
-def _actuation_again(resolver: Resolver, spec: SceneSpec, actuation: Any, out: Any) -> None:
+def _relower_actuation(resolver: Resolver, spec: SceneSpec, actuation: object, out: Any) -> None:
     lower_actuation(actuation, out, resolver, spec)

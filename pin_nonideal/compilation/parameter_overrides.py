@@ -37,9 +37,9 @@ class Call(NamedTuple):
 
     name: str
     number: int
-    positional: tuple[Any, ...]
+    positional: tuple[object, ...]
     named: Table
-    result: Any
+    result: object
 
 
 class ParameterOverrides(NamedTuple):
@@ -54,7 +54,7 @@ class ParameterOverrides(NamedTuple):
     values: Array
 
 
-def parse_overrides(compiled: CompiledScene, parameters: Mapping[str, Any], n: int) -> ParameterOverrides:
+def parse_overrides(compiled: CompiledScene, parameters: Mapping[str, object], n: int) -> ParameterOverrides:
     """Convert parameters of the runs to numbers of the core's program.
 
     Args:
@@ -114,15 +114,15 @@ def _parts(compiled: CompiledScene) -> dict[str, list[tuple[LoweredItem, _Relowe
     parts: dict[str, list[tuple[LoweredItem, _Relower]]] = {}
     kinds: dict[str, str] = {}
     begin = 0
-    for written in lowered(spec, builder, Resolver(compiled.model, compiled.q0)):
-        kind = kinds.setdefault(written.name, written.kind)
-        name = written.name if kind == written.kind else f"{written.kind} {written.name}"
-        parts.setdefault(name, []).append((written, _Relower(builder, builder.calls[begin:])))
+    for item in lowered(spec, builder, Resolver(compiled.model, compiled.q0)):
+        kind = kinds.setdefault(item.name, item.kind)
+        name = item.name if kind == item.kind else f"{item.kind} {item.name}"
+        parts.setdefault(name, []).append((item, _Relower(builder, builder.calls[begin:])))
         begin = len(builder.calls)
     return parts
 
 
-def _body(compiled: CompiledScene, name: str, given: Mapping[str, Any], n: int) -> dict[Any, Array]:
+def _body(compiled: CompiledScene, name: str, given: Mapping[str, object], n: int) -> dict[Any, Array]:
     """Return mass, center of mass and inertia of a joint's body for all runs."""
     who = f'rollout: parameters: "{name}"'
     if compiled.spec.terms != "core":
@@ -161,21 +161,23 @@ def _body(compiled: CompiledScene, name: str, given: Mapping[str, Any], n: int) 
     } | {("body", joint, f"inertia {axis}"): turns[:, :, k] for k, axis in enumerate("xyz")}
 
 
-def _columns(name: str, given: Any, n: int, parts: list[tuple[LoweredItem, _Relower]]) -> dict[Any, Array]:
+def _columns(name: str, given: object, n: int, parts: list[tuple[LoweredItem, _Relower]]) -> dict[Any, Array]:
     """Return the numbers of the program that depend on the given fields of a description, for all runs."""
     described = parts[0][0].description
     others = list(_descriptions(name, described, given, n))
-    columns: dict[Any, Array] = {}
-    for written, again in parts:
-        told = [again.told(written, other, name) for other in others]
-        for k, call in enumerate(again.calls):
+    columns: dict[object, Array] = {}
+    for item, relower in parts:
+        arguments = [relower.arguments(item, other, name) for other in others]
+        for k, call in enumerate(relower.calls):
             for key, base in call.named.items():
-                if isinstance(base, NUMBERS) and any(not np.array_equal(one[k][key], base) for one in told):
-                    columns[call.name, call.number, key] = np.array([one[k][key] for one in told])
+                if isinstance(base, NUMBERS) and any(
+                    not np.array_equal(one[k][key], base) for one in arguments
+                ):
+                    columns[call.name, call.number, key] = np.array([one[k][key] for one in arguments])
     return columns
 
 
-def _descriptions(name: str, described: Any, given: Any, n: int) -> Iterator[Any]:
+def _descriptions(name: str, described: object, given: object, n: int) -> Iterator[object]:
     """Yield the description of each run, with the checks of its constructor."""
     who = f'rollout: parameters: "{name}"'
     if isinstance(described, np.ndarray):
@@ -208,12 +210,12 @@ class _Recorder:
         self.calls: list[Call] = []
         self._counts: dict[str, int] = {}
 
-    def __getattr__(self, name: str) -> Any:
+    def __getattr__(self, name: str) -> object:
         method = getattr(self._builder, name)
         if not name.startswith(WRITES):
             return method
 
-        def call(*positional: Any, **named: Any) -> Any:
+        def call(*positional: object, **named: object) -> object:
             result = method(*positional, **named)
             index = self._counts.get(name, 0)
             self._counts[name] = index + 1
@@ -233,34 +235,34 @@ class _Relower:
         calls: recorded calls of the description.
     """
 
-    def __init__(self, builder: Any, calls: list[Call]) -> None:
+    def __init__(self, builder: object, calls: list[Call]) -> None:
         self._builder, self.calls = builder, calls
-        self._told: list[Table] = []
+        self._arguments: list[Table] = []
         self._differs = False
 
-    def told(self, written: LoweredItem, other: Any, name: str) -> list[Table]:
+    def arguments(self, item: LoweredItem, other: object, name: str) -> list[Table]:
         """Return the keyword arguments of the calls of another description.
 
         Raises:
             InputError: the calls differ in more than numbers.
         """
-        self._told, self._differs = [], False
-        written.again(other, self)
-        if self._differs or len(self._told) != len(self.calls):
+        self._arguments, self._differs = [], False
+        item.relower(other, self)
+        if self._differs or len(self._arguments) != len(self.calls):
             raise InputError(
                 f'rollout: parameters: "{name}" with {short_repr(other)} is more than other numbers: '
                 "something would "
                 "begin or cease to act; keep zeros zero and others positive, or let sweep make a scene for "
                 "each"
             )
-        return self._told
+        return self._arguments
 
-    def __getattr__(self, name: str) -> Any:
+    def __getattr__(self, name: str) -> object:
         if not name.startswith(WRITES):
             return getattr(self._builder, name)
 
-        def call(*positional: Any, **named: Any) -> Any:
-            k = len(self._told)
+        def call(*positional: object, **named: object) -> object:
+            k = len(self._arguments)
             expected = self.calls[k] if k < len(self.calls) else None
             if expected is None or expected.name != name or expected.named.keys() != named.keys():
                 self._differs = True
@@ -268,13 +270,13 @@ class _Relower:
             fixed = {key: value for key, value in expected.named.items() if not isinstance(value, NUMBERS)}
             self._differs |= not _same(expected.positional, positional)
             self._differs |= not all(_same(value, named[key]) for key, value in fixed.items())
-            self._told.append(named)
+            self._arguments.append(named)
             return expected.result
 
         return call
 
 
-def _same(a: Any, b: Any) -> bool:
+def _same(a: object, b: Any) -> bool:
     """Check if two arguments are equal; any two functions count as equal unless their sources differ."""
     if isinstance(a, (tuple, list)):
         return isinstance(b, (tuple, list)) and len(a) == len(b) and all(map(_same, a, b))

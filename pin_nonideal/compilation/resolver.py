@@ -201,7 +201,7 @@ class Resolver:
         return core.Load.prismatic, (lin / np.linalg.norm(lin)).tolist()
 
 
-def moved(frame: Frame, by: Any) -> Frame:
+def moved(frame: Frame, by: Sequence[float] | Array) -> Frame:
     """Return the frame translated on its body.
 
     Args:
@@ -229,7 +229,7 @@ def along(frame: Frame, ends: Array, who: str) -> tuple[Frame, float]:
     return (joint, R, p), half
 
 
-def turned(frame: Frame, rpy: Any) -> Frame:
+def turned(frame: Frame, rpy: Sequence[float] | Array) -> Frame:
     """Return the frame rotated about its origin.
 
     Args:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -106,7 +105,7 @@ def _cell(row: Table, key: str) -> str:
     return _words(row[key])
 
 
-def _words(value: Any) -> str:
+def _words(value: object) -> str:
     if isinstance(value, list):
         return " ".join(_words(x) for x in value)
     return "-" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
@@ -182,7 +181,7 @@ def _limit(x: float) -> float | None:
     return float(x) if np.isfinite(x) and abs(x) < NO_LIMIT else None
 
 
-def _made(spec: Any) -> Table:
+def _made(spec: object) -> Table:
     """Return the kind of a description and its arguments as plain values; functions appear by name."""
     fields = (
         {f.name: getattr(spec, f.name) for f in dataclasses.fields(spec)}
@@ -201,7 +200,7 @@ def _made(spec: Any) -> Table:
     return {"kind": kind, "made_with": {key: _plain(x) for key, x in fields.items()}}
 
 
-def _plain(x: Any) -> Any:
+def _plain(x: object) -> object:
     if isinstance(x, np.ndarray):
         return x.tolist()
     if isinstance(x, (list, tuple)):

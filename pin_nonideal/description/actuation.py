@@ -38,7 +38,7 @@ __all__ = [
     "Table",
 ]
 
-MOST_DELAY = 1_000_000_000  # samples
+MAX_DELAY = 1_000_000_000  # samples
 WHOLE = 1e-9  # a delay this part of a period above a whole number of periods is rounded down
 Gain = float | Sequence[float] | NDArray[np.float64] | Mapping[str, ArrayLike]
 
@@ -79,16 +79,16 @@ class SampledControl:
         function(f"{who}: function", self.function, "(t, q, v) -> tau")
         object.__setattr__(self, "period", positive(f"{who}: period", self.period))
         object.__setattr__(self, "delay", nonnegative(f"{who}: delay", self.delay))
-        samples = count(f"{who}: delay_samples", self.delay_samples, most=MOST_DELAY)
+        samples = count(f"{who}: delay_samples", self.delay_samples, most=MAX_DELAY)
         object.__setattr__(self, "delay_samples", samples)
         if self.delay and samples:
             raise InputError(
                 f"{who}: the delay must be given once; got delay={self.delay:g} s and "
                 f"delay_samples={samples}; leave one of them out"
             )
-        if self.delay / self.period > MOST_DELAY:
+        if self.delay / self.period > MAX_DELAY:
             raise InputError(
-                f"{who}: delay must be at most {MOST_DELAY:g} periods; got {self.delay:g} s with a period of "
+                f"{who}: delay must be at most {MAX_DELAY:g} periods; got {self.delay:g} s with a period of "
                 f"{self.period:g} s"
             )
         if self.initial is not None:
@@ -211,7 +211,7 @@ Drive = (
 Actuation = Drive | Sequence[Drive]
 
 
-def checked_gain(what: str, value: Any) -> float | Array | dict[str, Array]:
+def checked_gain(what: str, value: object) -> float | Array | dict[str, Array]:
     """Return a number, an array or a table by joint name of numbers that are not negative.
 
     Args:
@@ -253,7 +253,7 @@ def sample_times(who: str, given: object) -> Array:
     return times
 
 
-def checked_samples(what: str, given: Any, count: int) -> Array | dict[str, Array]:
+def checked_samples(what: str, given: object, count: int) -> Array | dict[str, Array]:
     """Return samples of all joints, (nt, n), or by joint name, (nt,) or (nt, n) for each joint.
 
     Args:
@@ -273,7 +273,7 @@ def checked_samples(what: str, given: Any, count: int) -> Array | dict[str, Arra
     }
 
 
-def given_actuation(actuation: Any) -> Any:
+def given_actuation(actuation: object) -> Any:
     """Return an actuation, with a list of drives as a tuple.
 
     A list or tuple is a list of drives if an entry is a description, a function, a table by joint name or an
@@ -296,7 +296,7 @@ def given_actuation(actuation: Any) -> Any:
     return tuple(actuation)
 
 
-def _is_drive(entry: Any) -> bool:
+def _is_drive(entry: object) -> bool:
     """Check if an entry of a list is a drive and not a number of constant torques."""
     arrays = isinstance(entry, (list, tuple)) or (isinstance(entry, np.ndarray) and entry.ndim > 0)
     return arrays or callable(entry) or is_dataclass(entry) or by_name(entry) is not None
@@ -314,19 +314,19 @@ def drives_of(actuation: Any) -> tuple[Any, ...]:
     return actuation if is_list else (actuation,)
 
 
-def requesting_drives(actuation: Any) -> list[Any]:
+def requesting_drives(actuation: object) -> list[object]:
     """Return the drives that request torques, those within effort limits included.
 
     Args:
         actuation: the actuation of a scene, as returned by `given_actuation`.
     """
-    found: list[Any] = []
+    found: list[object] = []
     for drive in drives_of(actuation):
         found += drives_of(drive.actuation) if isinstance(drive, EffortLimits) else [drive]
     return found
 
 
-def sampled_drives(actuation: Any) -> list[Any]:
+def sampled_drives(actuation: object) -> list[Any]:
     """Return the drives that hold their torque between samples of a period.
 
     Args:
@@ -336,7 +336,7 @@ def sampled_drives(actuation: Any) -> list[Any]:
     return [d for d in requesting_drives(actuation) if isinstance(d, kinds) and d.period is not None]
 
 
-def delayed_control(actuation: Any) -> SampledControl | None:
+def delayed_control(actuation: object) -> SampledControl | None:
     """Return the sampled control with a delay, or None; it commands all joints, so there is one at most.
 
     Args:
@@ -346,7 +346,7 @@ def delayed_control(actuation: Any) -> SampledControl | None:
     return next((d for d in controls if d.delay_in_samples), None)
 
 
-def switching_drives(actuation: Any) -> list[Any]:
+def switching_drives(actuation: object) -> list[object]:
     """Return the drives whose torques jump at times that end steps.
 
     Args:

@@ -44,7 +44,7 @@ __all__ = [
 
 Axis = str | Sequence[float]
 TIME_FUNCTION = "t -> (value, rate, acceleration)"
-MOST_ROWS = 10_000  # rows of a user constraint: A takes a gigabyte at 10,000 degrees of freedom
+MAX_ROWS = 10_000  # rows of a user constraint: A takes a gigabyte at 10,000 degrees of freedom
 
 
 def _frames(description: Any) -> None:
@@ -59,7 +59,7 @@ def _name(description: Any) -> None:
     optional_text(f"{type(description).__name__}: name", description.name)
 
 
-def _axis(description: Any, key: str = "axis") -> None:
+def _axis(description: object, key: str = "axis") -> None:
     object.__setattr__(description, key, unit_axis(f"{label(description)}: {key}", getattr(description, key)))
 
 
@@ -366,7 +366,7 @@ class UserConstraint:
         _name(self)
         who = label(self)
         function(f"{who}: function", self.function, "(t, q, v, data) -> (A, b)")
-        object.__setattr__(self, "size", count(f"{who}: size", self.size, least=1, most=MOST_ROWS))
+        object.__setattr__(self, "size", count(f"{who}: size", self.size, least=1, most=MAX_ROWS))
         if self.residual is not None:
             function(f"{who}: residual", self.residual, "(t, q) -> phi")
         if self.rate is not None:

@@ -8,10 +8,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from pin_nonideal.description.constraints import is_mimic
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
+from pin_nonideal.types import Model
 from pin_nonideal.validation import (
     choice,
     count,
@@ -155,7 +155,7 @@ class JointFriction:
             InputError: a coefficient is invalid, or all coefficients of a joint are zero.
             UnknownNameError: there is no such joint.
         """
-        model: Any = getattr(scene, "model", scene)
+        model: Model = getattr(scene, "model", scene)
         known = [str(name) for name in model.names][1:]
         if joints is None:
             mimics = {c.joint1 for c in getattr(scene, "constraints", ()) if is_mimic(c)}

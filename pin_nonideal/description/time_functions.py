@@ -9,12 +9,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pin_nonideal.errors import InputError
+from pin_nonideal.types import Array
 from pin_nonideal.validation import array, choice, number
 
 Sample = tuple[float, float, float]
@@ -212,7 +212,7 @@ def spline(times: ArrayLike, values: ArrayLike, ends: str = "clamped") -> Spline
     return Spline(times, values, ends)  # type: ignore[arg-type]
 
 
-def _horner(coefficients: Any, s: float) -> Sample:
+def _horner(coefficients: Sequence[float] | Array, s: float) -> Sample:
     """Return value and two derivatives of a polynomial with coefficients in ascending powers."""
     value = rate = half = 0.0
     for c in reversed(coefficients):

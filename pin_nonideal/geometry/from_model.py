@@ -262,7 +262,7 @@ def _share_a_joint(model: Model, first: int, second: int) -> bool:
     return bool(first and second and (model.parents[first] == second or model.parents[second] == first))
 
 
-def expand_geometry_contacts(contacts: Iterable[Any], model: Model, geometry: Any) -> tuple[Any, ...]:
+def expand_geometry_contacts(contacts: Iterable[object], model: Model, geometry: object) -> tuple[Any, ...]:
     """Return contacts in which each `GeometryContact` is replaced by the contacts of its manifold.
 
     Args:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
@@ -76,7 +74,7 @@ def lowest_height(model: Model, shapes: GeometryModel, q: Array, plane: Placemen
     return min(heights)
 
 
-def depth(item: Any, place: Placement) -> float:
+def depth(item: GeometryObject, place: Placement) -> float:
     """Return the height of the lowest point of one shape above the plane z = 0 [m].
 
     Args:
@@ -108,7 +106,7 @@ def depth(item: Any, place: Placement) -> float:
     return height + float((points @ normal).min())
 
 
-def _vertices(item: Any) -> Array | None:
+def _vertices(item: GeometryObject) -> Array | None:
     """Return the vertices of a mesh, or None for other shapes."""
     mesh, kind = item.geometry, type(item.geometry).__name__
     if kind.startswith("Convex"):

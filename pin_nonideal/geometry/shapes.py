@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
-from typing import Any
 
 import numpy as np
 
 from pin_nonideal.description.contacts.convex_hull import check_convex, convex_hull
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
-from pin_nonideal.types import Array, GeometryModel, GeometryObject, Model, Placement
+from pin_nonideal.types import Array, CollisionGeometry, GeometryModel, GeometryObject, Model, Placement
 
 # Corners of a box of half edges 1.
 CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))
@@ -112,7 +111,7 @@ def shape_of(who: str, item: GeometryObject, model: Model) -> Shape:
     return Shape(name, "convex mesh", frame, place, located(corners), solid=True)
 
 
-def _corners(what: str, mesh: Any, scale: Array) -> Array:
+def _corners(what: str, mesh: CollisionGeometry, scale: Array) -> Array:
     """Return the corners of a convex mesh.
 
     Raises:

@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -42,7 +42,7 @@ def load(
     v0: Start = None,
     assembly_tolerance: float = ASSEMBLY_TOLERANCE,
     limits: bool = False,
-    **parameters: Any,
+    **parameters: object,
 ) -> Scene:
     """Load a robot as a scene.
 
@@ -183,7 +183,7 @@ class ShapeReader:
     origin: Table
     kind: str
 
-    def __call__(self) -> Any:
+    def __call__(self) -> object:
         """Return the shapes."""
         return getattr(load_from_origin(self.origin), self.kind)
 

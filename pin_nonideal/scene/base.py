@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import pinocchio as pin
 
@@ -60,7 +60,7 @@ class Origin:
     """
 
     table: Table | None
-    shapes: tuple[Any, Any] | None
+    shapes: tuple[object, object] | None
     assembly_tolerance: float
 
 
@@ -133,7 +133,7 @@ class SceneBase:
         self._stepper = SceneStepper(compiled, self._states, self._evaluator)
         self._compiled = compiled
 
-    def __setattr__(self, key: str, value: Any) -> None:
+    def __setattr__(self, key: str, value: object) -> None:
         if key in FROZEN_FIELDS and "_compiled" in self.__dict__:
             raise InputError(
                 f'{key} of scene "{self.name}" is what the scene was made of and cannot be exchanged; make a '
@@ -141,10 +141,10 @@ class SceneBase:
             )
         super().__setattr__(key, value)
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         return rebuilt, (type(self), packed(self._parts(), self.name))
 
-    def __deepcopy__(self: S, memo: dict[int, Any]) -> S:
+    def __deepcopy__(self: S, memo: dict[int, object]) -> S:
         return copied(self, self._parts(), memo)  # type: ignore[no-any-return]
 
     def _parts(self) -> Table:
@@ -198,7 +198,7 @@ def with_origin(
     scene: S,
     table: Table | None,
     *,
-    shapes: tuple[Any, Any] | None = None,
+    shapes: tuple[object, object] | None = None,
     friction: dict[str, tuple[float, float, float]] | None = None,
     held: Held | None = None,
 ) -> S:

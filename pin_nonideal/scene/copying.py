@@ -26,7 +26,7 @@ class Packed:
         self.content = content
 
 
-def parts_of(scene: Any, source: Any, shapes: tuple[Any, Any], held: Held) -> Table:
+def parts_of(scene: Any, source: Any, shapes: tuple[Any, object], held: Held) -> Table:
     """Return the constructor arguments and the later state of a scene.
 
     Args:
@@ -67,7 +67,7 @@ def rebuilt(kind: type, parts: Table) -> Any:
     return scene
 
 
-def copied(scene: Any, parts: Table, memo: dict[int, Any]) -> Any:
+def copied(scene: Any, parts: Table, memo: dict[int, object]) -> Any:
     """Return a deep copy of a scene with a copy of its model; user functions are shared.
 
     Args:
@@ -101,7 +101,7 @@ def packed(parts: Table, name: str) -> Table:
     return {**parts, "made": made}
 
 
-def _packed(value: Any, what: str, scene: str) -> Any:
+def _packed(value: object, what: str, scene: str) -> object:
     if value is None or isinstance(value, str):
         return value
     try:
@@ -122,7 +122,7 @@ def _packed(value: Any, what: str, scene: str) -> Any:
     raise InputError(f'scene "{scene}" cannot be pickled: {what} cannot ({reason}); {advice}')
 
 
-def _unpacked(value: Any) -> Any:
+def _unpacked(value: object) -> object:
     if isinstance(value, tuple):
         return tuple(_unpacked(each) for each in value)
     return pickle.loads(value.content) if isinstance(value, Packed) else value

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -35,7 +34,7 @@ UNCHANGED = Unchanged()
 
 def parts_after(
     compiled: CompiledScene, new: Table, added: Table, remove: Iterable[str]
-) -> dict[str, tuple[Any, ...]]:
+) -> dict[str, tuple[object, ...]]:
     """Descriptions of a scene after a change, by kind.
 
     Args:
@@ -49,7 +48,7 @@ def parts_after(
         UnknownNameError: there is no description of a name in `remove`.
     """
     spec = compiled.spec
-    now: dict[str, tuple[Any, ...]] = {kind: tuple(getattr(spec, kind)) for kind in KINDS}
+    now: dict[str, tuple[object, ...]] = {kind: tuple(getattr(spec, kind)) for kind in KINDS}
     names = dict(
         zip(("laws", "forces"), (unique_names(now[k], set()) for k in ("laws", "forces")), strict=True)
     )
@@ -123,7 +122,7 @@ def held_after(model: Model, held: Held, q0: State | None, v0: State | None) -> 
     )
 
 
-def on_ground(model: Model, shapes: Any, q: Array, plane: str | None) -> Array:
+def on_ground(model: Model, shapes: object, q: Array, plane: str | None) -> Array:
     """Configuration with the floating trees moved along a plane's normal until a shape touches it, (nq,).
 
     Args:

@@ -16,7 +16,6 @@ from pin_nonideal.description.forces import Force
 from pin_nonideal.description.laws import Law
 from pin_nonideal.equation import Solution
 from pin_nonideal.geometry.from_model import GeometryContact
-from pin_nonideal.html_tables import names, table
 from pin_nonideal.states.report import ProjectionReport
 from pin_nonideal.types import Array, State
 from pin_nonideal.validation import choice, number
@@ -25,6 +24,7 @@ from .base import SceneBase, compiled_scene, scene_origin, scene_states, with_or
 from .copying import rebuilt
 from .editing import UNCHANGED, Unchanged, on_ground, parts_of_replacement
 from .stepping import Stepper
+from .text import html_summary, notes_of
 
 __all__ = ["Scene", "compiled_scene", "scene_origin", "scene_states", "with_origin"]
 
@@ -91,19 +91,7 @@ class Scene(SceneBase):
         )
 
     def _repr_html_(self) -> str:
-        joints = [str(name) for name in self.model.names[1:]]
-        actuation = type(self.actuation).__name__ if self.actuation is not None else "none"
-        contacts = set(self.contact_names)
-        rows = [
-            ("joints", names(joints)),
-            ("degrees of freedom", self.model.nv),
-            ("constraints", names([name for name in self.constraint_slices if name not in contacts])),
-            ("contacts", names(self.contact_names)),
-            ("laws", names(self.law_names)),
-            ("forces", len(self.forces)),
-            ("actuation", "a function" if actuation == "function" else actuation),
-        ]
-        return table(f'Scene "{self.name}"', rows)
+        return html_summary(self)
 
     # --- states ---------------------------------------------------------------------------------------------
 
@@ -428,9 +416,5 @@ class Scene(SceneBase):
 
     def report(self) -> str:
         """Return a text with joints, constraints, rows, rank, mobility and removed rows of the scene."""
-        q, v = self.initial_state()
-        rank = self._evaluator.rank(q, v)
-        notes = [f"note: {n}" for n in (*self.notes, *self._states.start_notes())]
-        credits = {"source": self.source, "licence": self.licence}
-        notes += [f"{key}: {value}" for key, value in credits.items() if value]
-        return report(self._compiled, self.name, rank, notes)
+        rank = self._evaluator.rank(*self.initial_state())
+        return report(self._compiled, self.name, rank, notes_of(self, self._states.start_notes()))

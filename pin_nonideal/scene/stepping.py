@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -110,7 +109,7 @@ class Stepper:
             self._delayed.begin(time)
         self._guarded(lambda torque: self._run.begin(at, speed, time, torque), tau)
 
-    def _guarded(self, act: Callable[[Any], None], tau: ArrayLike | None) -> None:
+    def _guarded(self, act: Callable[[object], None], tau: ArrayLike | None) -> None:
         try:
             act(tau)
         except (TypeError, ValueError):

@@ -208,15 +208,15 @@ class _Transcript:
         if not callable(method):
             return method
 
-        def told(*arguments: Any, **named: Any) -> Any:
+        def record(*arguments: object, **named: object) -> object:
             said = [name, _plain(arguments), {key: _plain(value) for key, value in named.items()}]
             self._digest.update(json.dumps(said).encode())
             return method(*arguments, **named)
 
-        return told
+        return record
 
 
-def _plain(x: Any) -> Any:
+def _plain(x: object) -> object:
     """Convert arguments to JSON values; functions become a placeholder."""
     if isinstance(x, (list, tuple, np.ndarray)):
         return [_plain(each) for each in x]

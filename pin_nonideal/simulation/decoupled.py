@@ -83,8 +83,8 @@ def run_decoupled(
     outcomes = []
     for k, part in enumerate(parts):
         own = _options_of(part, options, len(v0))
-        told = _after(tick, k, len(parts), options)
-        outcome = run_together(part.scene, q0[part.q], v0[part.v], own, tick=told)
+        own_tick = _after(tick, k, len(parts), options)
+        outcome = run_together(part.scene, q0[part.q], v0[part.v], own, tick=own_tick)
         stopped = outcome.stopped
         if isinstance(stopped, core.CoreFailure):
             return None

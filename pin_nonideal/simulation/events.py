@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,12 +69,12 @@ def parse_events(events: object) -> RunRequests:
     return RunRequests(watched, tuple(names), len(functions) < len(listed))
 
 
-def _valued(f: Callable[..., Any], who: str) -> Callable[..., float]:
+def _valued(f: Callable[..., object], who: str) -> Callable[..., float]:
     call = checked(f, who, ())
     return lambda t, q, v: float(call(t, q, v))
 
 
-def _direction(f: Callable[..., Any], who: str) -> int:
+def _direction(f: Callable[..., object], who: str) -> int:
     """Return the sign of the attribute `direction`, as in solve_ivp."""
     given = getattr(f, "direction", 0)
     if isinstance(given, bool) or not isinstance(given, (int, float, np.number)) or not np.isfinite(given):
@@ -84,7 +84,7 @@ def _direction(f: Callable[..., Any], who: str) -> int:
     return int(np.sign(given))
 
 
-def _terminal(f: Callable[..., Any], who: str) -> int:
+def _terminal(f: Callable[..., object], who: str) -> int:
     """Return the number of events that ends the run, 0 for none, from the attribute `terminal`."""
     given = getattr(f, "terminal", False)
     if given is None or isinstance(given, (bool, np.bool_)):
@@ -92,7 +92,7 @@ def _terminal(f: Callable[..., Any], who: str) -> int:
     return count(f"{who}: terminal", given)
 
 
-def parse_callback(callback: object, nv: int) -> Callable[[float, Array, Array], Any] | None:
+def parse_callback(callback: object, nv: int) -> Callable[[float, Array, Array], object] | None:
     """Wrap the callback between steps, with its result checked.
 
     Args:
@@ -108,7 +108,7 @@ def parse_callback(callback: object, nv: int) -> Callable[[float, Array, Array],
         raise InputError(f"simulate: callback must be a function (t, q, v); got {short_repr(callback)}")
     ask = named(callback, "callback")
 
-    def call(t: float, q: Array, v: Array) -> Any:
+    def call(t: float, q: Array, v: Array) -> object:
         answer = ask(t, q, v)
         if answer is None or isinstance(answer, (bool, np.bool_)):
             return True if answer else None

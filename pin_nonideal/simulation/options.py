@@ -26,14 +26,14 @@ RECORDS = ("a", "forces", "energy", "power", "laws", "reactions", "tau", "dense"
 FIELDS = {"F_ideal": "forces", "F_nonideal": "forces", "lam": "forces", "lam_ideal": "forces"}
 DEFAULT_RTOL, DEFAULT_ATOL = 1e-8, 1e-10
 # Minimum length of a step in spacings of floating-point times. A shorter step has an error above one percent.
-LEAST_SPACINGS = 100.0
+MIN_SPACINGS = 100.0
 NO_LIMIT = 2**62  # steps of a run without limit
-MOST_KEPT = 32  # maximum number of cached options of a scene
-MOST_SAMPLES = 1e8  # some gigabytes for a small robot
+MAX_KEPT = 32  # maximum number of cached options of a scene
+MAX_SAMPLES = 1e8  # some gigabytes for a small robot
 # Smallest tolerances: no step meets rtol below rounding, and the square of error / atol must not overflow.
-LEAST_RTOL, LEAST_ATOL = 1e-14, 1e-100
+MIN_RTOL, MIN_ATOL = 1e-14, 1e-100
 # Largest relative tolerance: a step that changes a coordinate by more than a tenth of it follows nothing.
-MOST_RTOL = 0.1
+MAX_RTOL = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +157,7 @@ def run_options(
         duration=length,
         t0=begin,
         rtol=relative,
-        atol=np.ascontiguousarray(np.maximum(tolerance, LEAST_ATOL)),
+        atol=np.ascontiguousarray(np.maximum(tolerance, MIN_ATOL)),
         dt=lengths.get("dt", 0.0),
         output_dt=lengths.get("output_dt", 0.0),
         max_steps=_most_steps(max_steps),
@@ -191,7 +191,7 @@ def check_values(
     record: str | Sequence[str] = (),
     several: str = "error",
     strict: bool = False,
-    **others: Any,
+    **others: object,
 ) -> None:
     """Check the options of `simulate` that do not depend on the scene.
 
@@ -233,14 +233,14 @@ def cached_options(scene: Scene, *asked: Any) -> RunOptions:
         scene: scene to simulate, which holds the cache.
         *asked: the other arguments of `run_options`, in order.
     """
-    kept: dict[Any, RunOptions] = scene.__dict__.setdefault("_cached_options", {})
+    kept: dict[object, RunOptions] = scene.__dict__.setdefault("_cached_options", {})
     key = (asked, tuple(map(type, asked)))  # types separate True from 1.0
     try:
         if key in kept:
             return kept[key]
     except TypeError:  # lists and arrays are mutable, so their options are not cached
         return run_options(scene, *asked)
-    if len(kept) >= MOST_KEPT:
+    if len(kept) >= MAX_KEPT:
         kept.clear()
     kept[key] = options = run_options(scene, *asked)
     return options
@@ -274,9 +274,9 @@ def _relative(rtol: float | None) -> float:
     if rtol is None:
         return DEFAULT_RTOL
     relative = nonnegative("simulate: rtol", rtol)
-    if relative and not LEAST_RTOL <= relative <= MOST_RTOL:
+    if relative and not MIN_RTOL <= relative <= MAX_RTOL:
         raise InputError(
-            f"simulate: rtol must be from {LEAST_RTOL:g} (rounding) to {MOST_RTOL:g}, or zero for atol alone"
+            f"simulate: rtol must be from {MIN_RTOL:g} (rounding) to {MAX_RTOL:g}, or zero for atol alone"
             f"; got {relative:g}"
         )
     return relative
@@ -368,21 +368,21 @@ def _check_clock(scene: Scene, t0: float, duration: float, lengths: dict[str, fl
     for control in controls:
         named[f"{label(control)}: period"] = control.period
     for what, value in named.items():
-        if not value >= LEAST_SPACINGS * spacing:  # true for an infinite end as well
+        if not value >= MIN_SPACINGS * spacing:  # true for an infinite end as well
             raise InputError(
-                f"{what} must be at least {LEAST_SPACINGS:g} times the spacing of floating-point times, "
+                f"{what} must be at least {MIN_SPACINGS:g} times the spacing of floating-point times, "
                 f"which is {spacing:.2g} s at t = {end:g} s; got {value:g} s"
             )
     key = next((key for key in ("output_dt", "dt") if key in lengths), None)
-    if key is not None and duration / lengths[key] > MOST_SAMPLES:
+    if key is not None and duration / lengths[key] > MAX_SAMPLES:
         raise InputError(
-            f"simulate: {key} must leave at most {MOST_SAMPLES:g} samples; {lengths[key]:g} s leaves "
+            f"simulate: {key} must leave at most {MAX_SAMPLES:g} samples; {lengths[key]:g} s leaves "
             f"{duration / lengths[key]:.2g}; set a longer {'output_dt' if key == 'dt' else key}"
         )
     for control in controls:
-        if duration / control.period > MOST_SAMPLES:
+        if duration / control.period > MAX_SAMPLES:
             raise InputError(
-                f"{label(control)}: period must leave at most {MOST_SAMPLES:g} calls in a run; "
+                f"{label(control)}: period must leave at most {MAX_SAMPLES:g} calls in a run; "
                 f"{control.period:g} s leaves {duration / control.period:.2g}; "
                 "set a longer period"
             )

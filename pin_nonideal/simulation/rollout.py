@@ -23,7 +23,7 @@ from .options import SCIPY, RunOptions, run_options
 from .results import finish
 from .rollout_arrays import RunArrays, run_arrays
 
-MOST_JOBS = 100_000  # of negative numbers: -n leaves n - 1 processors free
+MAX_JOBS = 100_000  # of negative numbers: -n leaves n - 1 processors free
 
 
 def rollout(
@@ -32,7 +32,7 @@ def rollout(
     v: ArrayLike | None,
     duration: float,
     *,
-    parameters: Mapping[str, Any] | None = None,
+    parameters: Mapping[str, object] | None = None,
     t0: float = 0.0,
     method: str = "dop853",
     rtol: float | None = None,
@@ -123,12 +123,12 @@ def _threads(jobs: int) -> int:
     Raises:
         InputError: it is zero or no number of jobs.
     """
-    if count("rollout: jobs", jobs, least=-MOST_JOBS) == 0:
+    if count("rollout: jobs", jobs, least=-MAX_JOBS) == 0:
         raise InputError("rollout: jobs must not be zero; use 1 for no parallel jobs, -1 for all processors")
     return jobs if jobs > 0 else max(1, (os.cpu_count() or 1) + 1 + jobs)
 
 
-def _starts(scene: Scene, q: Any, v: Any, parameters: Any) -> tuple[Array, Array]:
+def _starts(scene: Scene, q: object, v: object, parameters: object) -> tuple[Array, Array]:
     """Return the initial states of all runs; a missing state is the scene's initial state."""
     if parameters is not None and not isinstance(parameters, Mapping):
         raise InputError(f"rollout: parameters must be values by name; got {short_repr(parameters)}")
@@ -195,7 +195,7 @@ def _run(
     if len(q):
         compiled.check_functions(q[0], v[0], options.t0)
     on, v_on, open_starts = compiled.projection.nearest_of_each(q, v, options.t0, threads, numbers)
-    results: list[Any] = [None] * len(q)
+    results: list[object] = [None] * len(q)
     for i, failure in open_starts.items():
         results[i] = compiled.named(failure) if isinstance(failure, core.CoreFailure) else failure
     going = [i for i in range(len(q)) if i not in open_starts]

@@ -27,7 +27,7 @@ from .options import ONE_STEP, RunOptions
 Tick = Callable[[float], None]  # function of the time [s]
 
 # Smallest relative tolerance that SciPy's methods accept and reach.
-LEAST_RTOL = 1e-13
+MIN_RTOL = 1e-13
 # Absolute tolerance of work: excludes work from step size control.
 FREE = 1e100
 
@@ -71,7 +71,7 @@ class _Run:
         """Integrate to the next event, to the next break of a function of time, or to the end."""
         self._require_regular_start()
         y = self.core.y
-        tolerance = {"rtol": max(self.options.rtol, LEAST_RTOL), "atol": self.tolerance(y.size)}
+        tolerance = {"rtol": max(self.options.rtol, MIN_RTOL), "atol": self.tolerance(y.size)}
         stop = self.core.stop_before(t_end)
         solver = method(self.rate, self.core.t, y, stop, jac=self.jacobian, **tolerance)
         while solver.status == "running":
@@ -115,13 +115,13 @@ class _Run:
         )
 
 
-def _one_blas_thread() -> AbstractContextManager[Any]:
+def _one_blas_thread() -> AbstractContextManager[object]:
     """Return a context with one BLAS thread: small factorizations are much slower on several threads."""
     try:
         from threadpoolctl import threadpool_limits
     except ImportError:  # slower, with the same results
         return nullcontext()
-    limits: AbstractContextManager[Any] = threadpool_limits(limits=1, user_api="blas")
+    limits: AbstractContextManager[object] = threadpool_limits(limits=1, user_api="blas")
     return limits
 
 

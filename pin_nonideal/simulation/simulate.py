@@ -6,7 +6,6 @@ import os
 import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 from numpy.typing import ArrayLike
 
@@ -40,8 +39,8 @@ def simulate(
     max_steps: float | None = None,
     max_wall: float | None = None,
     record: str | Sequence[str] = (),
-    events: str | Callable[..., Any] | Sequence[Any] | None = None,
-    callback: Callable[..., Any] | None = None,
+    events: str | Callable[..., object] | Sequence[object] | None = None,
+    callback: Callable[..., object] | None = None,
     several: str = "error",
     strict: bool = False,
     progress: bool | None = None,
@@ -132,9 +131,9 @@ def simulate(
     moved = [] if own else states.configuration_notes(q, q0)
     followed = states.start_notes() if own else states.velocity_notes(v, v0)
     notes = moved + followed
-    for given, told in ((q, moved), (v, followed)):
-        if told and given is not None and not isinstance(given, Mapping):
-            warnings.warn(f"simulate: {told[0]}", RuntimeWarning, stacklevel=2)
+    for given, notes_of_start in ((q, moved), (v, followed)):
+        if notes_of_start and given is not None and not isinstance(given, Mapping):
+            warnings.warn(f"simulate: {notes_of_start[0]}", RuntimeWarning, stacklevel=2)
     program, delayed = compiled_scene(scene).program_of_runs(options.t0)
     saver = None
     if checkpoint is not None:

@@ -19,7 +19,7 @@ from .rows import copies, rows_at
 from .scales import VANISHING
 
 # Inertia that the metric gains if M is singular, relative to the largest inertia.
-LEAST_INERTIA = 1e-9
+MIN_INERTIA = 1e-9
 # Parts of a displacement at which rows are sampled. If a user function raises, the next part is tried.
 NEARER = (1.0, 0.1, 1e-2, 1e-3)
 
@@ -134,7 +134,7 @@ def metric(M: Array, unit: Array) -> Array:
     """
     if conditioning(M) > MIN_RCOND:
         return M
-    return M + np.diag(LEAST_INERTIA * (np.diag(M) * unit**2).max() / unit**2)
+    return M + np.diag(MIN_INERTIA * (np.diag(M) * unit**2).max() / unit**2)
 
 
 def mass_function(model: Model, runner: core.Runner) -> Callable[[Array], Array]:

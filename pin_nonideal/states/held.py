@@ -176,7 +176,7 @@ def require_rounding(
     )
 
 
-def told_coordinates(
+def coordinate_notes(
     model: Model, asked: Array, found: Array, held: NDArray[np.bool_], unit: Array
 ) -> list[str]:
     """Return notes on coordinates that follow held coordinates, and on held coordinates that moved.
@@ -284,7 +284,7 @@ def changed(model: Model, asked: Array, found: Array) -> list[str]:
     ]
 
 
-def told(model: Model, asked: Array, found: Array, held: NDArray[np.bool_]) -> list[str]:
+def held_notes(model: Model, asked: Array, found: Array, held: NDArray[np.bool_]) -> list[str]:
     """Return a note on velocities that follow held entries, or no note.
 
     Args:

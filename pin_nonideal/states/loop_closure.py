@@ -13,7 +13,7 @@ its largest change if one coordinate moves by its unit.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -30,7 +30,7 @@ CLOSED = 1e-9
 CLOSURE_TOLERANCE = 1e-8
 CLOSING_STEPS, RETRACTIONS, SLIDES, HALVINGS = 300, 15, 60, 25
 # Damping of the closing steps relative to the mean square of a row: initial value and bounds.
-DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-3, 1e-14, 1e10
+DAMPING, MIN_DAMPING, MAX_DAMPING = 1e-3, 1e-14, 1e10
 # Relative slope of the distance along the constraints at which a closure is stationary: rounding over gaps.
 STATIONARY = 1e-10
 # Rounding of a displacement, relative to a displacement of all coordinates by their units.
@@ -43,14 +43,14 @@ NEAR_CORNER, CORNER = 1e-2, 0.1
 # A second derivative below -SADDLE (1 without curvature) marks a saddle point, at which the gradient
 # vanishes. ESCAPE is the displacement off a saddle point [units].
 SADDLE, ESCAPE = 1e-5, 0.05
-LEAST_CURVATURE = 1e-2
+MIN_CURVATURE = 1e-2
 # Maximum number of open directions for second derivatives, each of which needs one gradient evaluation.
 MANY_FREEDOMS = 200
 # Maximum number of starts until a closure is found, and number of further starts if its displacement is
 # longer than FAR units (twice as many above VERY_FAR). With at most FEW_FREEDOMS coordinates, starts continue
-# up to MOST_STARTS until the nearest closure was found OFTEN times.
+# up to MAX_STARTS until the nearest closure was found OFTEN times.
 STARTS, FURTHER_STARTS, FAR, VERY_FAR = 24, 12, 0.05, 0.5
-MOST_STARTS, OFTEN, FEW_FREEDOMS = 60, 4, 12
+MAX_STARTS, OFTEN, FEW_FREEDOMS = 60, 4, 12
 SPREADS = (0.1, 0.3, 0.5, 1.0)  # spreads of starts, in turn, over max(1 unit, displacement of best closure)
 # Smallest reciprocal condition number of the mass matrix. Closures below it (gimbal lock) are a fallback.
 MIN_RCOND = 1e-10
@@ -151,7 +151,7 @@ class Search:
         open_iterate = self._place(self.q0)
         starts, further, often = STARTS, 0, 0
         generator = np.random.default_rng(0)  # a fixed seed makes the result deterministic
-        most = MOST_STARTS if len(self.unit) <= FEW_FREEDOMS else 0
+        most = MAX_STARTS if len(self.unit) <= FEW_FREEDOMS else 0
         k = 0
         while k < starts or (further and often < OFTEN and k < most):
             longest = 1.0 if best is None else max(1.0, self._longest(best.q))
@@ -229,7 +229,7 @@ class Search:
             raise np.linalg.LinAlgError("a move is not finite")
         return self._integrate(iterate.q, dq * (part / max(longest, 1.0)))
 
-    def _integrate(self, q: Array, dq: Any) -> Array:
+    def _integrate(self, q: Array, dq: object) -> Array:
         """Return q with its free coordinates moved by dq."""
         if self.free is not None:
             whole = np.zeros(self.model.nv)
@@ -257,12 +257,12 @@ class Search:
             x = -iterate.B.T @ np.linalg.solve(G + damping * scale * np.eye(len(G)), iterate.phi)
             trial = self._place(self._go(iterate, x))
             if np.linalg.norm(trial.phi) < np.linalg.norm(iterate.phi):
-                iterate, damping = trial, max(0.2 * damping, LEAST_DAMPING)
+                iterate, damping = trial, max(0.2 * damping, MIN_DAMPING)
                 if np.linalg.norm(x) < ROUNDING * ROUNDING * self.size:
                     break
             else:
                 damping *= 5.0
-                if damping > MOST_DAMPING:
+                if damping > MAX_DAMPING:
                     break
         return iterate
 
@@ -308,7 +308,7 @@ class Search:
                 trial = self._downhill(iterate, x, 0.0) or self._downhill(iterate, -x, 0.0)
             else:
                 parts = directions.T @ iterate.move
-                x = -directions @ (parts / np.maximum(np.abs(curvature), LEAST_CURVATURE))
+                x = -directions @ (parts / np.maximum(np.abs(curvature), MIN_CURVATURE))
                 trial = self._downhill(iterate, x, float(np.linalg.norm(slope)))
             if trial is None:
                 # Neither distance nor slope decreases, so the remaining slope may be rounding.

@@ -124,7 +124,7 @@ def named_velocity(model: Model, given: State, base: Array, what: str) -> Array:
     return v
 
 
-def named_joint_values(model: Model, given: Any, what: str, others: float = 0.0) -> Array:
+def named_joint_values(model: Model, given: object, what: str, others: float = 0.0) -> Array:
     """Values of the degrees of freedom from numbers or by joint name, (nv,): torques, gains, limits.
 
     A table (a mapping or a pandas Series) holds, by joint name, one number for all degrees of freedom of the
@@ -155,7 +155,7 @@ def named_joint_values(model: Model, given: Any, what: str, others: float = 0.0)
     return values
 
 
-def named_joint_samples(model: Model, given: Any, count: int, what: str) -> Array:
+def named_joint_samples(model: Model, given: object, count: int, what: str) -> Array:
     """Samples of the degrees of freedom from an array or by joint name, (nt, nv); zero for joints left out.
 
     Args:
@@ -186,7 +186,7 @@ def named_joint_samples(model: Model, given: Any, count: int, what: str) -> Arra
     return values
 
 
-def named_configuration_samples(model: Model, given: Any, base: Array, count: int, what: str) -> Array:
+def named_configuration_samples(model: Model, given: object, base: Array, count: int, what: str) -> Array:
     """Samples of a configuration from an array or by joint name, (nt, nq).
 
     Args:
@@ -284,7 +284,7 @@ def joint_named(model: Model, name: object, what: str) -> int:
     raise UnknownNameError(f'{what}: no joint "{name}"{nearest(str(name), known)}')
 
 
-def _values(model: Model, j: int, level: int, value: Any, now: Array, what: str) -> Array:
+def _values(model: Model, j: int, level: int, value: object, now: Array, what: str) -> Array:
     """Return the values of one joint, of its configuration (level 0) or its velocity (level 1).
 
     Args:
@@ -307,7 +307,7 @@ def _values(model: Model, j: int, level: int, value: Any, now: Array, what: str)
     return array(what, plain, (now.size,))
 
 
-def _pieced(kind: str, level: int, table: Mapping[Any, Any], now: Array, what: str) -> Array:
+def _pieced(kind: str, level: int, table: Mapping[object, Any], now: Array, what: str) -> Array:
     """Return the values of a joint from a table of its pieces."""
     pieces = next((both[level] for start, both in PIECES.items() if kind.startswith(start)), {})
     values = np.array(now)

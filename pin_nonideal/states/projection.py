@@ -20,12 +20,12 @@ from .held import (
     NOTHING_HELD,
     Held,
     changes,
+    coordinate_notes,
     holding,
     moves,
     moving,
     require_rounding,
     settled,
-    told_coordinates,
     with_entries,
 )
 from .loop_closure import CLOSURE_TOLERANCE, FAR, Closure
@@ -357,7 +357,7 @@ class Projection:
             held: mask of named coordinates, (nv,), or None.
         """
         if held is not None:
-            return told_coordinates(self.model, q, on, held, self.unit)
+            return coordinate_notes(self.model, q, on, held, self.unit)
         move = pin.difference(self.model, q, on)
         if not (np.abs(move) > LITTLE * self.unit).any():
             return []

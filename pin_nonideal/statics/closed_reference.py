@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
@@ -15,7 +13,7 @@ from pin_nonideal.states.held import Held, settled
 from pin_nonideal.states.reference_motion import TIME_ROUNDING, ReferenceMotion
 from pin_nonideal.states.rows import DEPENDENT, holonomic_rows, rows_at
 from pin_nonideal.states.scales import coordinate, slides
-from pin_nonideal.types import Array
+from pin_nonideal.types import Array, Model
 
 from .inverse_dynamics import inverse_dynamics
 from .residual import AtRest
@@ -188,7 +186,7 @@ class ClosedReference:
         return np.asarray(x)
 
 
-def without_drives(model: Any, q0: Array, spec: SceneSpec, who: str) -> Scene:
+def without_drives(model: Model, q0: Array, spec: SceneSpec, who: str) -> Scene:
     """Return a scene with the constraints, laws and forces of another, without contacts and actuation.
 
     Args:

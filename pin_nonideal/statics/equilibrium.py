@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 from pin_nonideal.errors import EquilibriumError, InputError, LoopClosureError
 from pin_nonideal.scene.scene import Scene
 from pin_nonideal.states.parsing import named_velocity
-from pin_nonideal.types import Array, State
+from pin_nonideal.types import Array, Model, State
 from pin_nonideal.validation import choice, count, number
 
 from .residual import AtRest, Balance, weight
@@ -28,7 +27,7 @@ CLOSE = 1e-9
 # A direction is neutral if its stiffness is below NEUTRAL times the force scale over a unit displacement, or
 # below CANCELED times the stiffnesses that cancel in it.
 NEUTRAL, CANCELED = 1e-7, 1e-10
-LEAST_RATE = 1e-12  # smallest divisor of neutral directions [1/s^2]
+MIN_RATE = 1e-12  # smallest divisor of neutral directions [1/s^2]
 # Tolerance of balanced forces relative to the force scale, and rounding of a stiffness relative to its size.
 BALANCED, ROUNDING = 1e-9, 1e-14
 
@@ -122,7 +121,7 @@ class _Search:
 
     def __init__(self, rest: AtRest, downhill: bool) -> None:
         self.rest, self.downhill = rest, downhill
-        self.model: Any = rest.scene.model
+        self.model: Model = rest.scene.model
         self.least = np.inf
         self.nearest = np.array(rest.scene.q0)
         self.unit = np.ones(rest.scene.model.nv)  # unit displacement of each coordinate
@@ -235,7 +234,7 @@ class _Search:
         neutral = np.abs(rates) <= least
         rounding = BALANCED * self.in_play(now, inertia) + ROUNDING * np.abs(stiffness).sum(axis=1)
         pushed = neutral & (np.abs(pull) > np.abs(shapes).T @ rounding)
-        steps = np.where(neutral & ~pushed, 0.0, pull / np.where(neutral, least + LEAST_RATE, np.abs(rates)))
+        steps = np.where(neutral & ~pushed, 0.0, pull / np.where(neutral, least + MIN_RATE, np.abs(rates)))
         away = now.free @ (shapes @ np.where(neutral, 0.0, steps))
         distance = float(np.abs(away / self.unit).max(initial=0.0))
         if not self.downhill:

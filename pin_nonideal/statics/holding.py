@@ -19,7 +19,7 @@ from .limit_cones import LimitCones
 from .residual import AtRest
 
 # Tolerance of the ends of a band relative to the largest force, and maximum number of iterations to an end.
-SETTLED, MOST_PASSES = 1e-12, 60
+SETTLED, MAX_PASSES = 1e-12, 60
 # Torque, relative to the largest force, beyond which friction counts as growing without bound.
 BEYOND = 1e9
 # Velocity at which slip of several directions is evaluated, relative to the unit motion of the joint.
@@ -80,12 +80,12 @@ def holding_torques(
     at_rest.open = open_rows
     return {
         name: _Joint(scene, at_rest, q, tau, dof).holding()
-        for name, dof in _rubbing_joints(scene, at_rest, q).items()
+        for name, dof in _friction_joints(scene, at_rest, q).items()
         if dofs is None or dof in dofs
     }
 
 
-def _rubbing_joints(scene: Scene, at_rest: AtRest, q: Array) -> dict[str, int]:
+def _friction_joints(scene: Scene, at_rest: AtRest, q: Array) -> dict[str, int]:
     """Return the degree of freedom of each joint with one freedom that a law of dry friction acts on.
 
     Friction of contacts and rolling bodies counts in the bands, but names no joint.
@@ -164,7 +164,7 @@ class _Joint:
         self.ends(own)  # sets the scale
         for start in (own, 0.0, self.scale, -self.scale):
             x = start
-            for _ in range(MOST_PASSES):
+            for _ in range(MAX_PASSES):
                 low, high, _ = self.ends(x)
                 if low <= x <= high:
                     return x
@@ -178,7 +178,7 @@ class _Joint:
         """Return an end x of the band, the end that the limits at x themselves give."""
         sign = (-1.0, 1.0)[side]
         within = inside
-        for k in range(MOST_PASSES):
+        for k in range(MAX_PASSES):
             x, limits = self.ends(within).at(side), self.ends(within).limits
             if not math.isfinite(x) or abs(x - within) <= SETTLED * (self.scale + abs(x)):
                 return x
@@ -202,7 +202,7 @@ class _Joint:
 
     def between(self, within: float, outside: float) -> float:
         """Return the end of the band between a torque that holds and one that does not, by bisection."""
-        for _ in range(2 * MOST_PASSES):
+        for _ in range(2 * MAX_PASSES):
             middle = 0.5 * (within + outside)
             low, high, _ = self.ends(middle)
             if low <= middle <= high:
@@ -308,7 +308,7 @@ def _root(power: Callable[[float], float], start: float, sign: float, scale: flo
     x = start - sign * at
     step = abs(at) if at else scale
     toward = -sign if at > 0.0 else sign
-    for _ in range(MOST_PASSES):
+    for _ in range(MAX_PASSES):
         there = power(x)
         if abs(there) <= SETTLED * (scale + abs(x)) * 0.01:
             return x

@@ -73,7 +73,7 @@ def inverse_dynamics(
     a: State,
     actuated: Sequence[str] | None = None,
     *,
-    bounds: tuple[Any, Any] | None = None,
+    bounds: tuple[object, object] | None = None,
     t: float = 0.0,
 ) -> InverseDynamics:
     """Compute the torques of least norm that give the scene the acceleration a.
@@ -139,7 +139,7 @@ def _driven(scene: Scene, actuated: Sequence[str] | None) -> list[int]:
     return [int(scene.model.idx_vs[j]) + k for j in joints for k in range(scene.model.nvs[j])]
 
 
-def _bounds(scene: Scene, bounds: Any, dofs: list[int]) -> tuple[Array, Array]:
+def _bounds(scene: Scene, bounds: object, dofs: list[int]) -> tuple[Array, Array]:
     """Least and largest torque of each actuated degree of freedom."""
     if not isinstance(bounds, (tuple, list)) or len(bounds) != 2:
         raise InputError(

@@ -17,11 +17,11 @@ from pin_nonideal.types import Array
 from .residual import AtRest, weight
 
 # Tolerance of cone violations relative to the largest force, and maximum number of rounds of cuts.
-CUT, MOST_CUTS = 1e-9, 60
+CUT, MAX_CUTS = 1e-9, 60
 # Number of initial cut directions of a disk.
 FIRST = 8
 # Tolerance of the margin, and friction factor above which no friction suffices.
-FOUND, MOST_FACTOR = 1e-9, 1e6
+FOUND, MAX_FACTOR = 1e-9, 1e6
 # Smallest force scale, relative to the weight; forces balance to CUT times the force scale.
 LIGHT = 1e-3
 PARTS = ("", "torsional", "rolling")  # suffixes of the names of a contact's friction elements
@@ -230,7 +230,7 @@ class LimitCones:
 
     def _within_cones(self, factor: float, sign: float = 0.0, most: float = 0.0) -> tuple[float, Array]:
         """Solve the programs of more and more cuts until the forces lie within all cones."""
-        for _ in range(MOST_CUTS):
+        for _ in range(MAX_CUTS):
             excess, x = self._program(factor, sign, most)
             if not len(x):
                 break
@@ -304,10 +304,10 @@ class LimitCones:
 
     def least_factor(self) -> float:
         """Return the least factor of all limits for which forces balance, by bisection, or infinity."""
-        low, high = 0.0, MOST_FACTOR / (1.0 + MOST_FACTOR)
+        low, high = 0.0, MAX_FACTOR / (1.0 + MAX_FACTOR)
         if self.solve(0.0)[0] <= CUT:
             return 0.0
-        if not self.solve(MOST_FACTOR)[0] <= CUT:
+        if not self.solve(MAX_FACTOR)[0] <= CUT:
             return np.inf
         while high - low > FOUND * (1.0 - high):
             middle = 0.5 * (low + high)

@@ -15,10 +15,10 @@ from pin_nonideal.types import Array, Model, State, Table
 from pin_nonideal.validation import number
 
 from .holding import HoldingTorque, holding_torques
-from .limit_cones import FOUND, MOST_FACTOR, LimitCones
+from .limit_cones import FOUND, MAX_FACTOR, LimitCones
 from .residual import AtRest
 
-MOST_NAMED = 4  # names in a reason
+MAX_NAMED = 4  # names in a reason
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +90,7 @@ def rest(scene: Scene, q: State | None = None, tau: State | None = None, *, t: f
     cones = LimitCones(scene, at_rest, at)
     factor = cones.least_factor()
     holding = partial(holding_torques, scene, at, drives, time, at_rest.open)
-    if factor > MOST_FACTOR:
+    if factor > MAX_FACTOR:
         reason = _unheld(scene, at_rest, at, cones)
         return Rest(False, -np.inf, {}, np.zeros(len(cones.A)), reason, holding)
     forces = cones.solve(factor)[1]
@@ -141,5 +141,5 @@ def _joint_of(model: Model, dof: int) -> str:
 
 
 def _quoted(names: list[str]) -> str:
-    shown = ", ".join(f'"{name}"' for name in names[:MOST_NAMED])
-    return shown + (", ..." if len(names) > MOST_NAMED else "")
+    shown = ", ".join(f'"{name}"' for name in names[:MAX_NAMED])
+    return shown + (", ..." if len(names) > MAX_NAMED else "")

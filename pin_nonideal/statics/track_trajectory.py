@@ -168,7 +168,7 @@ class TrackTrajectory(SceneDrive):
         return driven
 
 
-def _require_same_joints(who: str, q: Any, v: Any) -> None:
+def _require_same_joints(who: str, q: object, v: Any) -> None:
     """Check that v has the form of q, and names the same joints.
 
     Raises:
@@ -197,7 +197,7 @@ def _require_among(model: Model, named: Mask, allowed: Mask, what: str, where: s
             )
 
 
-def _named(model: Model, given: Any, who: str) -> Mask:
+def _named(model: Model, given: object, who: str) -> Mask:
     """Return the mask of the degrees of freedom of named joints, (nv,); an array names all joints."""
     table = by_name(given)
     mask = np.full(model.nv, table is None)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import warnings
 from collections.abc import Iterable
-from typing import Any
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from pin_nonideal.types import Table
 from pin_nonideal.validation import array, choice, count
 
 
-def sweep_grid(**axes: Iterable[Any]) -> list[Table]:
+def sweep_grid(**axes: Iterable[object]) -> list[Table]:
     """Return all combinations of the values of each parameter; the last parameter changes fastest.
 
     Args:
@@ -74,5 +73,5 @@ def sweep_samples(
     return [dict(zip(ranges, point.tolist(), strict=True)) for point in points]
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: object) -> object:
     return value.item() if isinstance(value, np.generic) else value

@@ -245,7 +245,7 @@ def _end_after_whole_line(stream: Any) -> None:
 
 
 def record_of(
-    k: int, parameters: Mapping[str, Any], run: Trajectory | None, error: str | None, more: Table
+    k: int, parameters: Mapping[str, object], run: Trajectory | None, error: str | None, more: Table
 ) -> Table:
     """Return the index entry of a run.
 
@@ -269,7 +269,9 @@ def record_of(
     return record | more
 
 
-def digest_of(make: Any, parameters: Sequence[Mapping[str, Any]], duration: float, options: Table) -> str:
+def digest_of(
+    make: object, parameters: Sequence[Mapping[str, object]], duration: float, options: Table
+) -> str:
     """Return the digest of the inputs of a sweep that have a reproducible representation.
 
     Args:
@@ -282,7 +284,7 @@ def digest_of(make: Any, parameters: Sequence[Mapping[str, Any]], duration: floa
     return hashlib.sha256(json.dumps(content, default=_canonical).encode()).hexdigest()
 
 
-def _canonical(value: Any) -> Any:
+def _canonical(value: object) -> object:
     """Return a representation that is equal in all processes, for a value that JSON cannot encode."""
     if isinstance(value, partial):
         return [_canonical(value.func), value.args, value.keywords]

@@ -44,7 +44,7 @@ UNLIKE = ("scene", "duration", "progress", "checkpoint_interval")
 
 def sweep(
     make: Callable[..., Scene],
-    parameters: Sequence[Mapping[str, Any]],
+    parameters: Sequence[Mapping[str, object]],
     duration: float,
     *,
     jobs: int | None = None,
@@ -52,7 +52,7 @@ def sweep(
     failures: str = "raise",
     measure: Callable[[Trajectory], Mapping[str, float]] | None = None,
     progress: bool | None = None,
-    **options: Any,
+    **options: object,
 ) -> list[Any] | Sweep:
     """Simulate `make(**p)` for each p of `parameters`, in parallel.
 
@@ -139,7 +139,7 @@ def _check_options(duration: float, options: Table) -> None:
 
 
 def _results(
-    work: _Work, runs: list[Any], jobs: int | None, progress: bool | None
+    work: _Work, runs: list[object], jobs: int | None, progress: bool | None
 ) -> Iterator[list[tuple[int, Any]]]:
     """Yield the results of joblib's workers by task, in order of completion."""
     from joblib import Parallel, delayed
@@ -189,19 +189,19 @@ class _Work:
         self.make, self.duration, self.options = make, duration, options
         self.folder, self.keep, self.measure = folder, keep, measure
 
-    def __call__(self, runs: list[tuple[int, Table]]) -> list[tuple[int, Any]]:
+    def __call__(self, runs: list[tuple[int, Table]]) -> list[tuple[int, object]]:
         """Return the number of each run with its trajectory, its record in the store, or its error."""
         if self.folder is None:
             return [(k, self._run_in_memory(k, entry)) for k, entry in runs]
         with Pack(self.folder, runs[0][0]) as pack:
             return [(k, self._run_in_store(k, entry, pack)) for k, entry in runs]
 
-    def _run_in_memory(self, k: int, entry: Table) -> Any:
+    def _run_in_memory(self, k: int, entry: Table) -> object:
         """Return the trajectory of a run without its scene, or the error that stopped the run."""
         run, stopped = self._simulate(k, entry)
         return stopped or replace(run, scene=None)
 
-    def _run_in_store(self, k: int, entry: Table, pack: Pack) -> Any:
+    def _run_in_store(self, k: int, entry: Table, pack: Pack) -> object:
         """Return the record of a run in the store, or its error if an error stops the sweep."""
         run, stopped = self._simulate(k, entry)
         if stopped is not None and not self.keep:

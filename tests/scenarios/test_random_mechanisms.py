@@ -28,14 +28,14 @@ STILL = 1e-11
 # The ledger's integrals share the step control's error: its rtol of 1e-8 over the steps of a run.
 KEPT = 1e-6
 ROUNDING = 1e-13
-MOST_STEPS = 200_000
+MAX_STEPS = 200_000
 
 
 def check(seed):
     print("seed", seed)
     m = mechanism(seed)
     run = pn.simulate(m.scene, DURATION, q=m.q, v=m.v, record=("a", "forces", "energy", "power"))
-    assert run.stats.steps < MOST_STEPS
+    assert run.stats.steps < MAX_STEPS
     for x in (run.q, run.v, run.a, run.lam, run.F_ideal, run.F_nonideal, *run.energy.values()):
         assert np.isfinite(x).all()
     assert_ledger_closes(m, run)

@@ -16,7 +16,7 @@ from oracles.friction_conditions import Conditions
 
 from ..support.random_places import places
 from ..support.seeds import seeds
-from .test_random_mechanisms import MOST_STEPS, assert_conditions, assert_ledger_closes
+from .test_random_mechanisms import MAX_STEPS, assert_conditions, assert_ledger_closes
 
 DURATION = 0.3  # s: several events each
 DEEP = int(os.environ.get("PIN_NONIDEAL_MECHANISMS", "500"))
@@ -26,7 +26,7 @@ QUICK = 32
 def check(seed):
     m = places(seed)
     run = pn.simulate(m.scene, DURATION, q=m.q, v=m.v, record=("a", "forces", "energy", "power"))
-    assert run.stats.steps < MOST_STEPS
+    assert run.stats.steps < MAX_STEPS
     assert_ledger_closes(m, run, rounding=1e-12)  # teeth stick by a row, to its rounding
     conditions = Conditions(m.scene, m.slips, m.places)
     at_events = np.flatnonzero(np.isin(run.t, [event.time for event in run.events]))[:40]

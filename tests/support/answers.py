@@ -28,7 +28,7 @@ OF_SEARCHES = 1e-6
 OF_FIRST_ORDER = 3e-2
 # Reference values by kind, such as gravity times 1 kg. Values below this relative size are rounding.
 FLOORS = {"q": 0.1, "v": 0.1, "a": 10.0, "force": 1.0, "t": 0.1, "energy": 1.0, "number": 1.0, "rates": 1.0}
-LEAST_LOAD = 1e-3  # N m
+MIN_LOAD = 1e-3  # N m
 WALL = 10.0  # wall time of one run [s]
 
 
@@ -179,7 +179,7 @@ def _(case: Case) -> Answer:
         if joint.nv != 1 or len(values) > 6:
             continue
         found = pn.inverse_dynamics(scene, q, still, still, actuated=[name], t=case.t0)
-        size = max(float(np.abs(found.tau).max()), LEAST_LOAD * case.units.energy)
+        size = max(float(np.abs(found.tau).max()), MIN_LOAD * case.units.energy)
         if found.left <= 1e-7 * size:
             values[f"tau of {name}"] = ("force", found.tau)
         else:
@@ -190,7 +190,7 @@ def _(case: Case) -> Answer:
 # --- Runs -----------------------------------------------------------------------------------------------
 
 # Events that are compared, and the smallest impact: smaller rebounds are summed up.
-EVENTS, LEAST_STRIKE = ("stick", "slip", "reverse", "impact", "touch_down", "lift_off"), 1e-3
+EVENTS, MIN_STRIKE = ("stick", "slip", "reverse", "impact", "touch_down", "lift_off"), 1e-3
 RECORD = ("a", "forces", "energy")
 
 
@@ -240,7 +240,7 @@ def of_run(case: Case, method: str, **more: Any) -> Answer:
         if e.kind in EVENTS and (e.kind != "reverse" or sizes.get(e.element) == 1)
     ]
     strongest = max((np.abs(e[3]).max() for e in events if e[3] is not None), default=0.0)
-    events = [e for e in events if e[3] is None or np.abs(e[3]).max() > LEAST_STRIKE * strongest]
+    events = [e for e in events if e[3] is None or np.abs(e[3]).max() > MIN_STRIKE * strongest]
     values["events"] = ("events", events)
     if all(run.energy for run in runs):
         columns = [c for c in runs[0].energy if c not in ("kinetic", "potential", "total", "balance")]

@@ -44,7 +44,7 @@ def check_two_frames(c: Any, who: str) -> None:
         raise InputError(f'{who}: frame1 and frame2 must differ; both are "{c.frame1}"')
 
 
-def check_vectors(c: Any, who: str, *keys: str) -> None:
+def check_vectors(c: object, who: str, *keys: str) -> None:
     """Check fields of three numbers each.
 
     Args:

@@ -118,7 +118,7 @@ def _load_lazily(robots_loader: Any, name: str) -> tuple[RobotFile, Path]:
     return RobotFile(model, visual, collision, q0=np.array(q0)), Path(file)
 
 
-def _example_shapes(model: Model, file: str, packages: str, srdf: str | None) -> tuple[Any, Any]:
+def _example_shapes(model: Model, file: str, packages: str, srdf: str | None) -> tuple[object, object]:
     """Return visual and collision shapes of a robot of example-robot-data, with the pairs of its SRDF."""
     import coal
 

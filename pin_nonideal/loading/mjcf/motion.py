@@ -30,7 +30,7 @@ class Motion:
         return Motion, (self.model,)
 
     @property
-    def data(self) -> Any:
+    def data(self) -> pin.Data:
         """Return the pinocchio.Data of the current thread."""
         if not hasattr(self._threads, "data"):
             self._threads.data = self.model.createData()
@@ -44,7 +44,7 @@ class Motion:
         """Return the world placement of a placement on a joint."""
         return self.data.oMi[joint] * local
 
-    def velocity(self, joint: int, local: Placement) -> Any:
+    def velocity(self, joint: int, local: Placement) -> pin.Motion:
         """Return the velocity of a placement on a joint, a pinocchio.Motion in its own axes."""
         return local.actInv(self.data.v[joint])
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +13,7 @@ from pin_nonideal.types import Model
 
 
 def dissipation(
-    model: Model, taken: Sequence[Any], couplings: Sequence[Any], notes: list[str]
+    model: Model, taken: Sequence[object], couplings: Sequence[object], notes: list[str]
 ) -> list[JointFriction]:
     """Return the joint friction of the robot's file as laws.
 

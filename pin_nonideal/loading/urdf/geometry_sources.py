@@ -42,10 +42,10 @@ class FileCache:
     """Cache of data from files by their content, without the least recently used entries."""
 
     def __init__(self) -> None:
-        self._found: OrderedDict[Hashable, Any] = OrderedDict()
+        self._found: OrderedDict[Hashable, object] = OrderedDict()
         self._lock = Lock()
 
-    def __call__(self, content: Hashable, read: Callable[[], Any]) -> Any:
+    def __call__(self, content: Hashable, read: Callable[[], object]) -> Any:
         """Return the cached data of a content; copy it before changing it.
 
         Args:

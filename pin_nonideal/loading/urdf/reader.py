@@ -276,7 +276,9 @@ def _mimics(root: ElementTree.Element, path: Path) -> list[Constraint]:
     return result
 
 
-def _geometry(model: Model, root: ElementTree.Element, path: Path, kind: str, notes: list[str]) -> Any:
+def _geometry(
+    model: Model, root: ElementTree.Element, path: Path, kind: str, notes: list[str]
+) -> GeometryModel:
     """Return the geometry of one kind, without unreadable meshes; each such mesh gives a note."""
     geometry_type = pin.GeometryType.VISUAL if kind == "visual" else pin.GeometryType.COLLISION
     try:

@@ -26,10 +26,10 @@ from pin_nonideal.validation import array
 
 from .robot import check_keys
 
-Start = Sequence[float] | NDArray[np.float64] | Mapping[str, Any] | str | None
+Start = Sequence[float] | NDArray[np.float64] | Mapping[str, object] | str | None
 
 
-def joint_index(model: Model, name: Any, where: str) -> int:
+def joint_index(model: Model, name: object, where: str) -> int:
     """Return the index of a joint.
 
     Args:
@@ -45,7 +45,7 @@ def joint_index(model: Model, name: Any, where: str) -> int:
     return int(model.getJointId(name))
 
 
-def vector(value: Any, size: int, where: str) -> list[float]:
+def vector(value: object, size: int, where: str) -> list[float]:
     """Return a list of finite numbers.
 
     Args:
@@ -63,7 +63,7 @@ def vector(value: Any, size: int, where: str) -> list[float]:
 
 
 def initial_state(
-    robot: RobotFile, initial: Any, where: str, notes: list[str]
+    robot: RobotFile, initial: object, where: str, notes: list[str]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return initial q and v: the file's state with the changes of the table.
 
@@ -104,7 +104,7 @@ def initial_state(
         raise LoadingError(str(error)) from None
 
 
-def _file_state(model: Model, given: Any, base: NDArray[np.float64], where: str, parse: Any) -> Any:
+def _file_state(model: Model, given: object, base: NDArray[np.float64], where: str, parse: Any) -> Any:
     """Return a state of a file: a table by name, a list, or the base state."""
     if isinstance(given, list) and parse is named_configuration:
         return with_unit_lengths(model, np.array(array(where, given, (model.nq,))), where)
@@ -159,7 +159,7 @@ def held_entries(robot: RobotFile, table: Mapping[str, Any], start: Start, speed
     return Held(named_coordinates(model, named(start, "q")), named_entries(model, speeds))
 
 
-def _moves(model: Model, name: Any) -> bool:
+def _moves(model: Model, name: object) -> bool:
     try:
         joint_named(model, name, "initial")
     except UnknownNameError:
@@ -167,7 +167,7 @@ def _moves(model: Model, name: Any) -> bool:
     return True
 
 
-def _requested_configuration(model: Model, start: Any, q0: NDArray[np.float64]) -> NDArray[np.float64]:
+def _requested_configuration(model: Model, start: object, q0: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return a configuration from a name, a table, or numbers in the order of the model."""
     if isinstance(start, (str, Mapping)):
         return named_configuration(model, start, q0, "load: q0")

@@ -17,7 +17,7 @@ from .initial_state import joint_index
 from .robot import ACTUATION, build, one_entry
 
 
-def actuation_of(model: Model, entry: Any, motors: Sequence[str], where: str) -> Any:
+def actuation_of(model: Model, entry: object, motors: Sequence[str], where: str) -> object:
     """Return the actuation of a table: `torques` by joint name, HoldPosition or Table, or a list of drives.
 
     Drives of a list keep their values by joint name, since they command the joints that they name.
@@ -36,7 +36,7 @@ def actuation_of(model: Model, entry: Any, motors: Sequence[str], where: str) ->
     return None if entry is None else _drive(model, entry, motors, where, False)
 
 
-def _drive(model: Model, entry: Any, motors: Sequence[str], where: str, listed: bool) -> Any:
+def _drive(model: Model, entry: object, motors: Sequence[str], where: str, listed: bool) -> object:
     """One drive; those of a list keep their values by joint name."""
     kind, values = one_entry(entry, where)
     if kind == "torques":
@@ -58,7 +58,7 @@ def _drive(model: Model, entry: Any, motors: Sequence[str], where: str, listed: 
     return build(ACTUATION[kind], values, where)
 
 
-def _gain(model: Model, gain: Any, motors: Sequence[str], where: str, listed: bool) -> Any:
+def _gain(model: Model, gain: object, motors: Sequence[str], where: str, listed: bool) -> object:
     """Return a gain by joint name, or one number for all actuated joints (all joints if none is named)."""
     if motors and not isinstance(gain, (dict, list)):
         gain = dict.fromkeys(motors, gain)
@@ -68,7 +68,7 @@ def _gain(model: Model, gain: Any, motors: Sequence[str], where: str, listed: bo
     return named if listed else _by_joint(model, named)
 
 
-def _checked(model: Model, table: Mapping[Any, Any], where: str, *, signed: bool) -> dict[str, float]:
+def _checked(model: Model, table: Mapping[Any, object], where: str, *, signed: bool) -> dict[str, float]:
     """Return numbers by joint name.
 
     Raises:

@@ -56,7 +56,7 @@ CONTACTS = {
 }
 FORCES = {c.__name__: c for c in (forces.SpringDamper, forces.JointSpring, forces.Wrench)}
 ACTUATION = {c.__name__: c for c in (actuation.HoldPosition, actuation.Table)}
-FUNCTIONS: dict[str, Callable[..., Any]] = {
+FUNCTIONS: dict[str, Callable[..., object]] = {
     "constant": timefunctions.Constant,
     "sinusoid": timefunctions.Sinusoid,
     "polynomial": timefunctions.Polynomial,
@@ -81,7 +81,7 @@ def read_yaml(path: Path) -> Table:
     return table
 
 
-def _check_numbers(value: Any, where: str) -> None:
+def _check_numbers(value: object, where: str) -> None:
     """Check that no list of numbers contains true or false, which YAML also writes as yes and no."""
     parts = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
     for key, part in parts:
@@ -108,7 +108,7 @@ def check_keys(table: Mapping[object, object], known: Iterable[str], where: str)
             raise LoadingError(f'{where}: unknown key "{key}"{nearest(str(key), known)}')
 
 
-def build(kind: type, values: Any, where: str) -> Any:
+def build(kind: type, values: object, where: str) -> Any:
     """Return one description from a table of its arguments.
 
     Args:
@@ -150,7 +150,7 @@ def time_function(table: Table, where: str) -> TimeFunction:
     return build(FUNCTIONS[name], values, where)  # type: ignore[arg-type,no-any-return]
 
 
-def one_entry(table: Any, where: str) -> tuple[str, Any]:
+def one_entry(table: object, where: str) -> tuple[str, object]:
     """Return the only key of a table, and its value.
 
     Raises:
@@ -165,7 +165,7 @@ def one_entry(table: Any, where: str) -> tuple[str, Any]:
     return str(key), value
 
 
-def descriptions(entries: Any, kinds: Mapping[str, type], where: str) -> list[Any]:
+def descriptions(entries: object, kinds: Mapping[str, type], where: str) -> list[object]:
     """Return a list of descriptions from a list of one-key tables `{Kind: {argument: value}}`.
 
     Raises:

@@ -10,7 +10,7 @@ from pin_nonideal.errors import LoadingError
 from pin_nonideal.loading.urdf.xml import read_text
 
 
-def plain_yaml(path: Path) -> Any:
+def plain_yaml(path: Path) -> object:
     """Return the content of a YAML file: tables, lists, strings and numbers.
 
     Args:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 from pin_nonideal.errors import InputError, nearest, short_repr
+from pin_nonideal.types import Table
 from pin_nonideal.validation import choice
 
 from .style import CURVES
@@ -22,8 +22,8 @@ MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 # Dashes of compared runs.
 RUN_DASHES = ("-", (0, (4, 1.5)), (0, (1, 1.2)), (0, (6, 1.5, 1, 1.5)))
 
-SCREEN: dict[str, Any] = {"font.size": 9.0, "legend.fontsize": 8.0}
-PAPER: dict[str, Any] = {
+SCREEN: Table = {"font.size": 9.0, "legend.fontsize": 8.0}
+PAPER: Table = {
     "font.size": 8.0,
     "axes.labelsize": 8.0,
     "xtick.labelsize": 7.0,
@@ -38,7 +38,7 @@ PAPER: dict[str, Any] = {
 }
 
 
-def _checked(style: Mapping[str, Any]) -> dict[str, Any]:
+def _checked(style: Mapping[str, object]) -> Table:
     """Return settings that matplotlib knows.
 
     Raises:
@@ -59,7 +59,7 @@ def _checked(style: Mapping[str, Any]) -> dict[str, Any]:
 class Style:
     """Settings of one figure."""
 
-    def __init__(self, columns: int | None, style: str | Mapping[str, Any] | None) -> None:
+    def __init__(self, columns: int | None, style: str | Mapping[str, object] | None) -> None:
         choice("plot: columns", columns, (None, 1, 2))
         if not (style is None or isinstance(style, (str, Mapping))):
             raise InputError(
@@ -74,7 +74,7 @@ class Style:
         self.width = WIDTHS[columns]
         self.height = RATIOS[columns] * self.width
 
-    def legend(self) -> dict[str, Any]:
+    def legend(self) -> Table:
         """Return the position of legends: beside a plot, in print above it."""
         if self.print:
             place = {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0), "ncols": 2 if self.width < 4.0 else 5}
@@ -87,7 +87,7 @@ class Style:
             }
         return {"loc": "upper left", "bbox_to_anchor": (1.0, 1.02), "frameon": False}
 
-    def line(self, number: int, samples: int, run: int = 0, runs: int = 1) -> dict[str, Any]:
+    def line(self, number: int, samples: int, run: int = 0, runs: int = 1) -> Table:
         """Return the line style of one curve of one run.
 
         Args:
@@ -96,7 +96,7 @@ class Style:
             run: number of the run.
             runs: number of compared runs.
         """
-        look: dict[str, Any] = {"color": CURVES[number % len(CURVES)]}
+        look: Table = {"color": CURVES[number % len(CURVES)]}
         look["linewidth"] = 1.0 if self.print else 1.3
         if runs > 1:
             look["linestyle"] = RUN_DASHES[run % len(RUN_DASHES)]

@@ -1,0 +1,149 @@
+"""Torques of drives in the form of the core, and their sums."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from pin_nonideal.errors import InputError
+from pin_nonideal.states.joint_layout import joint_places
+from pin_nonideal.types import Array, Model
+from pin_nonideal.validation import by_name, label
+
+
+class Constant(NamedTuple):
+    """Constant torques tau, (nv,)."""
+
+    tau: Array
+
+
+class Timed(NamedTuple):
+    """Torques `values`, (nt, nv), at `times` [s], (nt,), linear in between. Steps end at every time."""
+
+    times: Array
+    values: Array
+
+
+class Spring(NamedTuple):
+    """Torques kp (q - q_now) - kd v, with gains (nv,) and a configuration q, (nq,)."""
+
+    kp: Array
+    kd: Array
+    q: Array
+
+
+class Called(NamedTuple):
+    """Torques of a function (t, q, v) -> tau, held between samples of `period` [s] if it is not None.
+
+    Steps end at the times `breaks` [s], (n,), where torques that are not held may jump.
+    """
+
+    function: Callable[..., Any]
+    period: float | None
+    breaks: Array = np.zeros(0)
+
+
+Part = Constant | Timed | Spring | Called
+
+
+def kind_of_drive(drive: object) -> str:
+    """Return a label of a drive for messages.
+
+    Args:
+        drive: a drive, or constant torques.
+    """
+    if isinstance(drive, (list, tuple, np.ndarray)) or by_name(drive) is not None:
+        return "constant torques"
+    return label(drive)
+
+
+def sum_of_torques(parts: Sequence[Part], drives: Sequence[object], model: Model) -> Part:
+    """Return the sum of torques that act on separate joints.
+
+    Args:
+        parts: torques of each drive.
+        drives: the drives, for messages.
+        model: pinocchio.Model.
+
+    Raises:
+        InputError: sampled torques cannot be added to torques that change between their samples.
+    """
+    if all(isinstance(part, Constant) for part in parts):
+        return Constant(np.sum([part.tau for part in parts], axis=0))  # type: ignore[union-attr]
+    if all(isinstance(part, (Constant, Timed)) for part in parts):
+        return _sum_of_tables(parts)
+    springs = [part for part in parts if isinstance(part, Spring)]
+    if len(springs) == len(parts):
+        return _sum_of_springs(springs, model)
+    functions = [_function_of(part, model) for part in parts]
+
+    def total(t: float, q: Array, v: Array) -> Array:
+        tau = np.zeros(model.nv)
+        for function in functions:
+            tau += function(t, q, v)
+        return tau
+
+    periods = {part.period for part in parts if isinstance(part, Called)} - {None}
+    if not periods:
+        times = [part.times for part in parts if isinstance(part, Timed)]
+        times += [part.breaks for part in parts if isinstance(part, Called)]
+        return Called(total, None, np.unique(np.concatenate([np.zeros(0), *times])))
+    steady = [isinstance(part, Constant) or getattr(part, "period", None) is not None for part in parts]
+    if len(periods) > 1 or not all(steady):
+        sampled = next(k for k, part in enumerate(parts) if getattr(part, "period", None) is not None)
+        other = steady.index(False) if not all(steady) else None
+        got = "several periods" if other is None else kind_of_drive(drives[other])
+        raise InputError(
+            f"actuation: torques that {kind_of_drive(drives[sampled])} holds between samples add to "
+            f"constant torques and to torques of the same period only; got {got}; give all drives one "
+            "period, or compute their sum in one function"
+        )
+    return Called(total, periods.pop())
+
+
+def _sum_of_tables(parts: Sequence[Part]) -> Timed:
+    """Return the sum of tables and constant torques: a table with all times."""
+    tables = [part for part in parts if isinstance(part, Timed)]
+    times = np.unique(np.concatenate([table.times for table in tables]))
+    values = np.zeros((times.size, tables[0].values.shape[1]))
+    for part in parts:
+        if isinstance(part, Timed):
+            values += np.array([_interpolated(part, float(t)) for t in times])
+        elif isinstance(part, Constant):
+            values += part.tau
+    return Timed(times, values)
+
+
+def _interpolated(table: Timed, t: float) -> Array:
+    """Return the torques of a table at a time, as the core computes them, (nv,)."""
+    times, values = table
+    if t <= times[0] or t >= times[-1]:
+        return np.asarray(values[0] if t <= times[0] else values[-1])
+    k = int(np.searchsorted(times, t, side="right")) - 1
+    s = (t - times[k]) / (times[k + 1] - times[k])
+    return np.asarray((1.0 - s) * values[k] + s * values[k + 1])
+
+
+def _sum_of_springs(springs: Sequence[Spring], model: Model) -> Spring:
+    """Return one spring with the gains of all and the configuration that each holds."""
+    q = springs[0].q.copy()
+    for spring in springs[1:]:
+        for place in joint_places(model):
+            if spring.kp[place.v_first : place.v_first + place.nv].any():
+                own = slice(place.q_first, place.q_first + place.nq)
+                q[own] = spring.q[own]
+    return Spring(np.sum([s.kp for s in springs], axis=0), np.sum([s.kd for s in springs], axis=0), q)
+
+
+def _function_of(part: Part, model: Model) -> Callable[..., object]:
+    """Return the torques of a part as a function (t, q, v) -> tau."""
+    if isinstance(part, Called):
+        return part.function
+    if isinstance(part, Timed):
+        return lambda t, q, v: _interpolated(part, t)
+    if isinstance(part, Constant):
+        return lambda t, q, v: part.tau
+    return lambda t, q, v: part.kp * pin.difference(model, q, part.q) - part.kd * v
