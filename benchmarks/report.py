@@ -82,6 +82,9 @@ contacts as stiff as their step allows, of the ball with the damping of its rest
 QUADRUPED = """One step of 1 ms of Solo12 as it stands on its feet, held by its motors; Pinocchio's solver in
 the time stepping of its examples, at its default tolerance.
 """
+BODIES = """Boxes and balls at steps of 1 ms, `moreau` beside MuJoCo (Newton's solver, elliptic cones): time of a
+step with the start of the run, largest motion of a body (stacks and walls must not move), largest relative
+error of the laws of contact in a step, and time to make the scene."""
 IMPACTS = """Cost of an impact: a box lands flat, so many contacts strike at once; beyond three they share
 it. And the time of runs of a Panda in the air with contacts that stay open, over the time without them.
 """
@@ -282,6 +285,34 @@ def contacts(results: dict[str, Any]) -> str:
     return "\n".join(parts)
 
 
+def bodies(results: list[dict[str, Any]]) -> str:
+    """Return the section on many bodies in contact."""
+    rows = [
+        (
+            capital(row["case"]),
+            str(row["contacts"]),
+            scaled(row["seconds"] / row["steps"]),
+            f"{row['ratio']:.2f}" if "ratio" in row else "",
+            f"{row['moved']:.1e}",
+            f"{row['mujoco_moved']:.1e}" if "mujoco_moved" in row else "",
+            f"{row['residual']:.0e}",
+            scaled(row["made"]),
+        )
+        for row in results
+    ]
+    head = (
+        "scene",
+        "contacts",
+        "a step",
+        "over MuJoCo",
+        "moved [m]",
+        "MuJoCo moved [m]",
+        "error of laws",
+        "made",
+    )
+    return "\n\n".join(["## Many bodies in contact", BODIES, table(head, rows)])
+
+
 def footprint(results: list[dict[str, Any]]) -> str:
     rows = [(r["tool"], scaled(r["import_seconds"]), f"{r['import_bytes'] / 2**20:.0f} MiB") for r in results]
     return "## Import\n\n" + table(("package, with all it imports", "processor time", "memory"), rows)
@@ -289,7 +320,7 @@ def footprint(results: list[dict[str, Any]]) -> str:
 
 SECTIONS: dict[str, Callable[[Any], str]] = {
     part.__name__: part
-    for part in (accuracy, evaluation, scaling, growth, contacts, features, batches, long, footprint)
+    for part in (accuracy, evaluation, scaling, growth, contacts, bodies, features, batches, long, footprint)
 }
 
 
