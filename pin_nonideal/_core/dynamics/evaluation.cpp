@@ -21,8 +21,8 @@ constexpr double balance_rounding = 1e-14;
 // Rounding of a sum, relative to the sum of the magnitudes of its terms.
 constexpr double sum_rounding = 1e-13;
 
-// Evaluations between two looks at signals and wall time, which take a millisecond or less each.
-constexpr long evaluations_a_watch = 256;
+// Evaluations between two looks at signals and wall time. Those of large scenes take milliseconds.
+constexpr long evaluations_a_watch = 16;
 
 static void factor_mass(const Program& p, Workspace& w, double t) {
     const int dof = factorize(p.mechanism, w.now.terms);
