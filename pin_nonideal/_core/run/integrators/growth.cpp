@@ -22,7 +22,7 @@ constexpr double longer = 5.0;
 // Maximum growth in one fixed step that counts. Faster growth comes from the method: the step is too long, and the
 // motion overflows.
 constexpr double growth_in_step = 0.1;
-// Speed [rad/s or m/s] that no mechanism has. A run that reaches it has failed, whatever the cause.
+// Speed [rad/s or m/s] that no mechanism has. The run ends before its motion overflows.
 constexpr double impossible_speed = 1e12;
 
 }  // namespace
@@ -67,7 +67,10 @@ void GrowthGuard::judge() {
     const bool impossible = progress_.growth_speeds.back() > impossible_speed && last >= half;
     if (!impossible && !is_exponential() && !is_costly()) return;
     const double rate = growth(last);
-    if (!impossible && !options_.method.adaptive() && rate * options_.dt > growth_in_step) return;
+    if (!options_.method.adaptive() && rate * options_.dt > growth_in_step) {
+        if (impossible) throw Failure(Failure::Kind::not_finite, progress_.t);
+        return;
+    }
     int dof = 0;
     progress_.y.segment(system_.nq, system_.nv).cwiseAbs().maxCoeff(&dof);
     throw Failure(Failure::Kind::growing, progress_.t, {dof, largest_source()}, rate);

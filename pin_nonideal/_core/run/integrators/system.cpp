@@ -133,8 +133,11 @@ void System::evaluate_step_end(double t, const VecX& y, VecX& dy, bool goes_thro
     read(y);
     read_law_states(y);
     w.now.no_motion = false;
-    const bool chosen = begin_rows(p, w, t, q, v);
-    go_through(t, goes_through, [&] { continue_step(p, w, t, v, chosen); });
+    begin_rows(p, w, t, q, v);
+    go_through(t, goes_through, [&] {  // closed contacts that others hold apart may contradict each other
+        assemble_forces(p, w, t, v);
+        solve_dynamics(p, w, t, v);
+    });
     write_rate(t, dy, !goes_through);
 }
 
