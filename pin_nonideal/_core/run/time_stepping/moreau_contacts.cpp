@@ -417,12 +417,11 @@ bool MoreauContacts::solve_laws() {
     bool solved = error <= most_miss;
     const bool starts = v0_.cwiseAbs().maxCoeff() <= rest_speed;
     if (solved && !(starts && moves())) return true;
-    if (!solved && error <= most_relaxed) {
-        relax();
-        return true;
-    }
     respond();
-    if (!solved) f_.head(n) = guess_;
+    if (!solved) {
+        relaxed_f_ = f_.head(n);
+        f_.head(n) = guess_;
+    }
     const auto W = W_.topLeftCorner(n, n);
     f_.head(n) -= middle_.head(n);
     w1_.head(n) = w0_.head(n);
@@ -430,6 +429,11 @@ bool MoreauContacts::solve_laws() {
     if (!solved) solved = solver_.solve(W, w1_.head(n), cones_, true, f_.head(n), true) == ConeStatus::solved;
     if (starts) solved = keep_rest(solved) || solved;
     f_.head(n) += middle_.head(n);
+    if (!solved && error <= most_relaxed) {
+        f_.head(n) = relaxed_f_;
+        relax();
+        return true;
+    }
     return solved;
 }
 

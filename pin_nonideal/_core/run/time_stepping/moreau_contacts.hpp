@@ -103,7 +103,7 @@ private:
     bool scaled_ = true;   // the response is a_s = R^T a
     bool presses_ = true;  // percussions of the last step may be nonzero
     VecX q_mid_, q_looked_, v0_, v1_, a_free_, lam_free_, w0_, w1_, f_, power_;
-    VecX offset_, middle_, free_response_, guess_;
+    VecX offset_, middle_, free_response_, guess_, relaxed_f_;
     SeparateTrees trees_;
     ContactProjection projection_;
     bool separate_ = false, responded_ = false;  // solved tree by tree, responses of all rows are known
