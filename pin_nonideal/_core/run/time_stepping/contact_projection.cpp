@@ -77,6 +77,13 @@ bool ContactProjection::close_gaps(const Program& p, Workspace& w, double t, Vec
     return moves;
 }
 
+// Check if a closed contact is left open or penetrates.
+bool ContactProjection::is_open(const Program& p, const Workspace& w) const {
+    const double allowed = open_gap * scene_size(p, w);
+    return std::any_of(w.now.touching.begin(), w.now.touching.end(),
+                       [&](int i) { return !is_bare(p, i) && std::abs(gap_width(p, w, i)) > allowed; });
+}
+
 // Open closed contacts whose gap other contacts keep open. Return true if there are any.
 bool ContactProjection::open_held_apart(const Program& p, Workspace& w) {
     const double allowed = open_gap * scene_size(p, w);
@@ -130,14 +137,15 @@ bool ContactProjection::project(const Program& p, Workspace& w, double t, VecX& 
         return kinetic_energy(p.mechanism, w.now.terms, v) + potential_energy(p.mechanism, w.now.terms);
     };
     const double before = energy ? total() : 0.0;
-    bool moves = close_gaps(p, w, t, q, v), opens = false;
-    for (int k = 0; k < most_choices && open_held_apart(p, w); ++k) {
-        opens = true;
-        if (!pose(p, w, false)) break;
+    bool moves = close_gaps(p, w, t, q, v), posed = true;
+    for (int k = 0; k < most_choices && is_open(p, w); ++k) {
+        if (k > 0 && !open_held_apart(p, w)) break;
+        posed = false;
+        if (!pose(p, w, false)) break;  // sticking elements slide by as little as the gaps ask for
         moves |= close_gaps(p, w, t, q, v);
     }
     if (moves) place_rows(p, w, t, v);
-    if (opens) pose(p, w, true);
+    if (!posed) pose(p, w, true);
     else if (moves) blocks_.fill(p, w, rows_, elements_, least_.problem);
     meet_rates(p, w, v);
     rest(p, w, v);
