@@ -58,6 +58,7 @@ def test_worked_examples_are_short_and_checked() -> None:
 def test_the_gallery_shows_every_robot() -> None:
     shown = set(re.findall(r"stills/(\w+)\.jpg", text("reference/gallery.md")))
     assert {name for name, _ in pn.robots()} <= shown
+    assert {path.stem for path in (DOCS / "reference" / "stills").glob("*.jpg")} == shown
 
 
 def test_the_site_is_built_without_a_warning(tmp_path: Path) -> None:
