@@ -67,13 +67,14 @@ def reach(solid, place, direction):
 
 
 @pytest.mark.parametrize("rounding", [None, ROUNDING])
+@pytest.mark.parametrize("count", [300, pytest.param(1000, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("kinds", PAIRS)
-def test_gaps_with_a_proof(kinds, rounding):
-    """At 1,000 random placements, separating planes at the distance of the gap prove it; Coal agrees."""
+def test_gaps_with_a_proof(kinds, rounding, count):
+    """At random placements, separating planes at the distance of the gap prove it; Coal agrees."""
     scene, _ = pair(*kinds, rounding=rounding)
     runner, compared = scene._compiled.program.runner(), 0
     chosen = [(i, c) for i, c in enumerate(scene.contacts) if isinstance(c, pn.RevolvedContact)]
-    for q in placements(np.random.default_rng(1), 1000):
+    for q in placements(np.random.default_rng(1), count):
         A, _, gaps, _ = runner.rows(q, np.zeros(6), 0.0)
         for i, c in chosen:
             *shapes, radius = as_coal(c, q)
@@ -88,7 +89,7 @@ def test_gaps_with_a_proof(kinds, rounding):
             assert gaps[i] + radius == pytest.approx(between, abs=PROVED)
             assert between == pytest.approx(exact, abs=COAL)
             compared += 1
-    assert compared > 800 * len(chosen)
+    assert compared > 0.8 * count * len(chosen)
 
 
 def as_coal(c, q):

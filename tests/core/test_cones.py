@@ -93,7 +93,7 @@ def test_driven_problems_are_solved_or_refused(count):
 
 
 @pytest.mark.parametrize(
-    "count", [30, pytest.param(150, marks=pytest.mark.slow), pytest.param(5000, marks=pytest.mark.stress)]
+    "count", [15, pytest.param(150, marks=pytest.mark.slow), pytest.param(5000, marks=pytest.mark.stress)]
 )
 @pytest.mark.parametrize("driven", [False, True])
 def test_planar_problems_against_enumeration(count, driven):

@@ -207,7 +207,7 @@ def test_sampled_control_is_held_and_sampled_on_its_grid():
 @pytest.mark.parametrize("kind", TREES)
 def test_projection_keeps_every_kind_at_rounding(kind, rtol):
     make, q, v = constrained(kind, 1)
-    run = pn.simulate(make(), 0.5, q, v, rtol=rtol, output_dt=0.03)
+    run = pn.simulate(make(), 0.25, q, v, rtol=rtol, output_dt=0.03)
     assert run.violation.max() < 1e-12
     assert run.violation_rate.max() < 1e-11
 

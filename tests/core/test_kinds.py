@@ -110,7 +110,9 @@ def test_a_kind_that_forgets_a_member_does_not_compile() -> None:
         assert f"needs `{member}" in result.stderr
 
 
+@pytest.mark.slow
 def test_formulas_in_dual_numbers_are_derivatives_of_each_other(tmp_path: Path) -> None:
+    """The exact form of `test_constraint_rows.py`, which compares each kind with differences by default."""
     program = tmp_path / "dual_kinds"
     built = compiled("dual_kinds.cpp", "-O0", "-o", str(program))
     assert built.returncode == 0, built.stderr

@@ -23,6 +23,8 @@ NEAR, SCIPY_NEAR = 1e3 * RTOL, 1e-4
 FLOOR, RATIOS = 1e-8, {"rk4": 8.0, "semi_implicit_euler": 1.6, "moreau": 2.5}
 # Families of driven loops: every second one, the others with -m slow.
 DRIVEN = [*FAMILIES[::2], *(pytest.param(family, marks=pytest.mark.slow) for family in FAMILIES[1::2])]
+# Families whose rows in Python are taken times a factor: the first one, the others with -m slow.
+SCALED = [FAMILIES[0], *(pytest.param(family, marks=pytest.mark.slow) for family in FAMILIES[1:])]
 # Least rate of the driven hinge along the unit vector of all rates.
 TURNS = 0.2
 
@@ -118,16 +120,14 @@ CLOSINGS: dict[str, Callable[[HingeLoop, pin.Model], list[pn.Constraint]]] = {
     "points": by_points,
     "weld": by_weld,
     "user's rows": by_user,
-    "user's rows times 1000": lambda loop, model: by_user(loop, model, 1e3),
-    "user's rows times 0.001": lambda loop, model: by_user(loop, model, 1e-3),
 }
 
 
-def closed(case: Case, closing: str = "hinge", length: float = 1.0) -> pn.Scene:
-    """The scene of a loop, in another unit of length."""
+def closed(case: Case, closing: str = "hinge", length: float = 1.0, factor: float = 1.0) -> pn.Scene:
+    """The scene of a loop, in another unit of length, with rows of the user times a factor."""
     loop = case.loop if length == 1.0 else case.loop.scaled(length)
     model = loop.model()
-    constraints = CLOSINGS[closing](loop, model)
+    constraints = by_user(loop, model, factor) if factor != 1.0 else CLOSINGS[closing](loop, model)
     laws = []
     if case.damping > 0.0:
         resist = case.damping * length**2
@@ -150,6 +150,16 @@ def test_overconstrained_loops_move_by_their_one_freedom(family: Callable[..., A
         dt = 2e-4 if method == "semi_implicit_euler" else 1e-3
         once, halved = (case.missed(closed(case), method=method, dt=step) for step in (dt, 0.5 * dt))
         assert halved < max(once / ratio, FLOOR), method
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e-3])
+@pytest.mark.parametrize("seed", seeds(range(300), count=1))
+@pytest.mark.parametrize("family", SCALED, ids=lambda family: family.__name__)
+def test_a_factor_of_the_users_rows_changes_nothing(
+    family: Callable[..., Any], seed: int, factor: float
+) -> None:
+    case = Case(family, seed, damping=0.02 * (seed % 2))
+    assert case.missed(closed(case, factor=factor), rtol=RTOL) < NEAR
 
 
 @pytest.mark.slow
