@@ -143,7 +143,8 @@ class Table:
     Args:
         times: increasing times [s], shape (nt,) with nt >= 1.
         values: torques [N m or N], shape (nt, nv), or by joint name, shape (nt,) or (nt, n) for a joint of n
-            degrees of freedom: a dict or a pandas DataFrame. Missing joints have no torque.
+            degrees of freedom: a dict, a pandas DataFrame or a structured array. Missing joints have no
+            torque.
         interpolation: "linear" or "hold".
         name: used in messages and results.
     """

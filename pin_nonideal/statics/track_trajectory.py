@@ -63,8 +63,8 @@ class TrackTrajectory(SceneDrive):
     Args:
         times: increasing times [s], shape (nt,) with nt >= 1.
         q: reference configurations, shape (nt, nq) in Pinocchio's order, or by joint name, shape (nt,) or
-            (nt, n) for the n values of a joint: a dict or a pandas DataFrame. An angle [rad] may replace the
-            (cos, sin) of a joint. Joints that a table leaves out are not driven.
+            (nt, n) for the n values of a joint: a dict, a pandas DataFrame or a structured array. An angle
+            [rad] may replace the (cos, sin) of a joint. Joints that a table leaves out are not driven.
         v: reference velocities, shape (nt, nv), or by joint name for the same joints as q. None for the rates
             of a cubic spline through the samples.
         kp: stiffness [N m/rad or N/m], not negative: a number for joints with one degree of freedom, an array

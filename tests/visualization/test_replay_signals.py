@@ -159,3 +159,12 @@ def test_bands_hold_a_mode_from_its_sample_to_the_next_change() -> None:
     bands = mode_bands(t, np.array([[0, 1], [0, 1], [-1, 1], [1, 1]], dtype=np.int8))
     assert bands[0] == [(0.0, 2.0, 0), (2.0, 3.0, -1), (3.0, 3.0, 1)]
     assert bands[1] == [(0.0, 3.0, 1)]
+
+
+def test_joints_without_a_torque_are_left_out_of_the_plot_of_torques() -> None:
+    run = pn.simulate(pn.load("four_bar"), 0.01, record=("forces",), progress=False)
+    (plot,) = plots_of(run, ["tau"])
+    assert list(plot.curves) == ["crank_joint"]
+    assert plot.note == "zero in 2 other joints"
+    still = pn.simulate(pn.load("rough_four_bar"), 0.01, record=("tau",), progress=False)
+    assert len(plots_of(still, ["tau"])[0].curves) == 3

@@ -199,13 +199,20 @@ def _plot(run: Trajectory, name: str) -> list[Plot]:
 
 
 def _in_joints(title: str, model: pin.Model, t: Array, tau: Array) -> list[Plot]:
-    """Return plots of torques and forces in joints of one degree of freedom."""
+    """Return plots of torques and forces in joints of one degree of freedom.
+
+    Joints without any torque or force are left out, unless all joints are.
+    """
     found = []
     for joint in range(1, model.njoints):
         if model.joints[joint].nv == 1:
             name, unit = str(model.names[joint]), "N m" if joint_axis(model, joint)[1] else "N"
             found.append(Coordinate(name, name, unit, tau[:, model.joints[joint].idx_v]))
-    return _by_unit(title, t, found)
+    acting = [c for c in found if np.any(c.values)] or found
+    idle = len(found) - len(acting)
+    note = f"zero in {idle} other joint{'s' if idle > 1 else ''}" if idle else ""
+    plots = _by_unit(title, t, acting)
+    return [replace(plot, note=", ".join(filter(None, [plot.note, note]))) for plot in plots]
 
 
 def _given(run: Trajectory, title: str, curves: Mapping[str, Array]) -> Plot:

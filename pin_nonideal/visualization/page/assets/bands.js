@@ -5,11 +5,19 @@ const BAND = 13; // height of a band with its gap [pixels]
 // Where the bar of a mode begins below the top of its band, and how tall it is: slip + is above, slip - below, stick between them.
 const SHAPES = { 1: [0, 0.5], [-1]: [0.5, 0.5], 0: [0.3, 0.4], 2: [0.45, 0.1], 3: [0, 1] };
 
+/** Text without its middle, if it is wider than the room [pixels]. */
+function shortened(c, text, room) {
+  let short = text;
+  for (let kept = text.length - 1; kept > 3 && c.measureText(short).width > room; kept--)
+    short = `${text.slice(0, Math.ceil(kept / 2))}…${text.slice(text.length - Math.floor(kept / 2))}`;
+  return short;
+}
+
 class Bands {
   constructor(run, span, canvas, tip, seek, hover) {
     Object.assign(this, { bands: run.modes, looks: run.looks, end: run.times[run.times.length - 1], canvas, tip });
     canvas.parentElement.hidden = !this.bands.length;
-    canvas.style.height = `${this.bands.length * BAND + 2}px`;
+    canvas.style.height = `${this.bands.length * BAND}px`;
     this.axis = new TimeAxis(span, canvas, seek, (t, event) => {
       hover(t);
       this.showTip(t === null ? "" : this.textAt(t, event.offsetY), event);
@@ -39,6 +47,7 @@ class Bands {
     c.font = `11px ${getComputedStyle(document.documentElement).fontFamily}`;
     const room = Math.min(0.3 * innerWidth, 220);
     for (const band of this.bands) band.label = c.measureText(band.name).width > room ? band.name.replace(/^\w+\((.*)\)$/, "$1") : band.name;
+    for (const band of this.bands) band.label = shortened(c, band.label, room);
     return Math.min(Math.max(...this.bands.map((band) => c.measureText(band.label).width)), room) + 14;
   }
 

@@ -29,7 +29,8 @@ function lastBelow(values, x) {
 function bracket(values, x) {
   const k = Math.min(lastBelow(values, x), Math.max(values.length - 2, 0));
   const next = Math.min(k + 1, values.length - 1), length = values[next] - values[k];
-  return { k, next, part: length > 0 ? Math.min(Math.max((x - values[k]) / length, 0), 1) : 0 };
+  const part = length > 0 ? (x - values[k]) / length : 0; // beside an end by rounding is at the end
+  return { k, next, part: part < 1e-9 ? 0 : part > 1 - 1e-9 ? 1 : part };
 }
 
 /** Three numbers between two frames, from an array with values for each frame, or with one value. */

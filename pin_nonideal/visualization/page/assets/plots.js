@@ -16,6 +16,9 @@ function fitText(box, text) {
     box.textContent = `${text.slice(0, Math.ceil(kept / 2))}…${text.slice(text.length - Math.floor(kept / 2))}`;
 }
 
+/** Margin of an axis around curves that are flat; zero has an axis from -1 to 1. */
+function flatMargin(low, high) { return low === 0 && high === 0 ? 1 : 0.5 * Math.max(Math.abs(high), 1e-3); }
+
 /** CSS background of a dashed line, or of a solid line without dashes. */
 function stroke(dash, color) {
   let at = 0;
@@ -129,7 +132,7 @@ class Plot {
     if (!(high >= low)) [low, high] = [0, 1];
     // A range at the level of rounding is shown as flat.
     const least = Math.max(1e-9 * Math.max(Math.abs(low), Math.abs(high)), 1e-12);
-    const margin = high - low > least ? 0.07 * (high - low) : 0.5 * Math.max(Math.abs(high), 1e-3);
+    const margin = high - low > least ? 0.07 * (high - low) : flatMargin(low, high);
     return Object.assign(this, { low: low - margin, high: high + margin });
   }
 

@@ -23,7 +23,7 @@ class Relation extends Plot {
     });
   }
 
-  about() { return `${this.unit} over ${this.over}`; }
+  about() { return `${this.unit} over ${this.over}${this.bounds.length ? ", dots: the limit" : ""}`; }
 
   /** The title names a single curve. */
   addToLegend(curve) {
@@ -40,7 +40,7 @@ class Relation extends Plot {
       let low = Infinity, high = -Infinity;
       for (const values of parts) for (const value of values) if (Number.isFinite(value)) { low = Math.min(low, value); high = Math.max(high, value); }
       if (!(high >= low)) [low, high] = [0, 1];
-      const margin = high - low > 1e-9 * Math.max(Math.abs(low), Math.abs(high)) ? 0.07 * (high - low) : 0.5 * Math.max(Math.abs(high), 1e-3);
+      const margin = high - low > 1e-9 * Math.max(Math.abs(low), Math.abs(high)) ? 0.07 * (high - low) : flatMargin(low, high);
       return [low - margin, high + margin];
     };
     const shown = this.curves.filter((curve) => curve.shown), bounds = this.shownBounds();

@@ -22,7 +22,8 @@ class ForceTable {
       const key = `${arrow.name} ${arrow.unit}`;
       if (!rows.has(key)) {
         const row = body.insertRow();
-        row.insertCell().textContent = arrow.name;
+        const name = row.insertCell();
+        name.textContent = name.title = arrow.name;
         for (const _ of kinds) row.insertCell();
         rows.set(key, row);
       }
