@@ -92,8 +92,8 @@ def sum_of_torques(parts: Sequence[Part], drives: Sequence[object], model: Model
         got = "several periods" if other is None else kind_of_drive(drives[other])
         raise InputError(
             f"actuation: torques that {kind_of_drive(drives[sampled])} holds between samples add to "
-            f"constant torques and to torques of the same period only; got {got}; give all drives one period, "
-            "or compute their sum in one function"
+            f"constant torques and to torques of the same period only; got {got}; give all drives one "
+            "period, or compute their sum in one function"
         )
     return Called(total, periods.pop())
 
