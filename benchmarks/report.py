@@ -46,7 +46,7 @@ One evaluation of N four-bar windows side by side, each crank a branch of its ow
 """
 GROWTH = """## How cost grows
 
-Deep chains and rings, mechanisms side by side, a humanoid that rubs in all joints, feet that slip, and very
+Deep chains and rings, mechanisms side by side, a humanoid with joint friction, slipping feet, and very
 short runs. Errors of accelerations are relative to the largest one, beside the articulated-body recursion in
 long double; errors of motions are those of a coordinate at the end, beside our run at 1e-13. Exponents are
 those of our cost between the largest size and one of an eighth or so. The C++ loop is Boost.odeint's
@@ -58,9 +58,9 @@ FEATURES = """## Cost of each feature
 
 Features added one at a time to the five-bar; a step is one of rk4, with its four evaluations.
 """
-EVENTS = """Cost of an event: chains of links of 1 m and 1 kg whose hinges rub with 5 N m, released level,
-over 1 s by dop853 at its default tolerance. An event costs what the run takes beyond as many steps of the
-same chain with viscous hinges, which has none; several hinges may stick or slip at one instant.
+EVENTS = """Cost of an event: chains of links of 1 m and 1 kg with dry friction of 5 N m in the hinges, over
+1 s by dop853 at its default tolerance from a level start. The cost is the additional time over as many steps
+of the same chain with viscous hinges, without events. Several hinges may stick or slip at one instant.
 """
 BATCHES = """## Batches
 
@@ -122,7 +122,7 @@ def conditions(records: Records) -> str:
 
 def key_section(records: Records) -> str:
     rows = [(f.title, f.shown, f.bound, "yes" if f.met else "**no**") for f in key_figures(records)]
-    return "## Key figures\n\n" + table(("what", "measured", "goal", "met"), rows)
+    return "## Key figures\n\n" + table(("quantity", "measured", "goal", "met"), rows)
 
 
 def capital(title: str) -> str:
@@ -136,7 +136,7 @@ def evaluation(results: list[dict[str, Any]]) -> str:
         cells = [scaled(r["seconds"][name]) if name in r["seconds"] else "" for name in names]
         over = [f"{r[key]:.2f}" if key in r else "" for key in ("ratio", "ratio_mujoco")]
         rows.append((f"{capital(r['title'])} (nv {r['nv']}, {r['rows']} rows)", *cells, *over))
-    head = ("robot", *names, "ours over Pinocchio's best", "ours over MuJoCo's")
+    head = ("robot", *names, "ours / Pinocchio's best", "ours / MuJoCo's")
     return f"{EVALUATION}\n{table(head, rows)}"
 
 

@@ -22,7 +22,7 @@ from pin_nonideal.description.scene_spec import SceneSpec
 from pin_nonideal.description.time_functions import Constant, Polynomial, Sinusoid, Spline
 from pin_nonideal.errors import InconsistentConstraintsError, InputError, LoopClosureError, UserFunctionError
 from pin_nonideal.states.loop_closure import CLOSURE_TOLERANCE
-from pin_nonideal.states.rows import copies, row_lengths, row_slices, rows_at
+from pin_nonideal.states.rows import duplicate_rows, row_lengths, row_slices, rows_at
 from pin_nonideal.types import Array, Model
 from pin_nonideal.validation import array
 
@@ -173,7 +173,7 @@ def zero_rows(
         gap = 0.0 if opens[row] else gaps[row]
         _check_vanishing(*owners[row], np.abs(right[row]).max(), np.abs(right).max(), gap, tolerance)
         dropped.append((*owners[row], "vanishes"))
-    pairs = copies(np.hstack([wide, right]), ~vanishing & ~fixed & ~opens, wide.shape[1])
+    pairs = duplicate_rows(np.hstack([wide, right]), ~vanishing & ~fixed & ~opens, wide.shape[1])
     dropped += [(*owners[row], f'copy of a row of "{owners[first][0]}"') for row, first, _ in pairs]
     rows = {owner: row for row, owner in enumerate(owners)}
     return sorted(dropped, key=lambda entry: rows[entry[:2]]), pairs

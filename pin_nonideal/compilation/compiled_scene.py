@@ -94,13 +94,13 @@ class CompiledScene:
             stand_in = core.Builder(model, core.Provider[spec.terms])
             lower(plain, stand_in, resolver)
             sampled = stand_in.finish()
-        self.dropped, copies = zero_rows(model, q0, self.program, sampled, spec.assembly_tolerance)
+        self.dropped, duplicate_rows = zero_rows(model, q0, self.program, sampled, spec.assembly_tolerance)
         if self.dropped:
             idle = {(name, row) for name, row, _ in self.dropped}
             for block, c in enumerate(self.program.constraints):
                 kept = [row for row in range(c.count) if (c.name, row) not in idle]
                 builder.keep_rows(block, kept)
-            for row, first, factor in copies:
+            for row, first, factor in duplicate_rows:
                 builder.add_copy(row, first, factor)
             self.program = builder.finish()
         idle_names = {name for name, _, _ in self.dropped}

@@ -15,7 +15,7 @@ from pin_nonideal.types import Array, Model
 
 from .contact_closure import UnilateralClosure
 from .loop_closure import MIN_RCOND, Closure, Rows, Search, conditioning
-from .rows import copies, rows_at
+from .rows import duplicate_rows, rows_at
 from .scales import VANISHING
 
 # Inertia that the metric gains if M is singular, relative to the largest inertia.
@@ -107,7 +107,7 @@ class ClosureSearch:
         reach = np.abs(weighted).max(axis=1, initial=0.0)
         used = wanted & (reach > VANISHING * reach.max(initial=0.0))
         wide = np.hstack([weighted, np.column_stack([phi for _, _, phi, _ in samples])])
-        used[[row for row, _, _ in copies(wide, used, weighted.shape[1])]] = False
+        used[[row for row, _, _ in duplicate_rows(wide, used, weighted.shape[1])]] = False
         scale = 1.0 / reach[used]
 
         def rows(q: Array) -> tuple[Array, Array]:

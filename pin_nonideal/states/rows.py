@@ -110,7 +110,9 @@ SAME_ROW = 1e-11
 SUM_ROUNDING = 1e-9
 
 
-def copies(wide: Array, candidates: NDArray[np.bool_], direction: int) -> list[tuple[int, int, float]]:
+def duplicate_rows(
+    wide: Array, candidates: NDArray[np.bool_], direction: int
+) -> list[tuple[int, int, float]]:
     """Return the rows that are multiples of earlier rows, as (row, first, factor): row = factor first.
 
     Args:

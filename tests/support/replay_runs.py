@@ -17,7 +17,7 @@ from pin_nonideal.description.constraints import PointAnchor
 from pin_nonideal.states.joint_layout import joint_places
 from pin_nonideal.trajectory.by_name import joint_record, law_record
 from pin_nonideal.trajectory.columns import columns
-from pin_nonideal.trajectory.trajectory import Stats
+from pin_nonideal.trajectory.records import Stats
 
 STEP = 1e-6  # step of central differences for rates, with an error near 1e-9
 
