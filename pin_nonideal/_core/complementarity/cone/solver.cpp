@@ -44,6 +44,7 @@ ConeStatus ConeComplementarity::solve(const Eigen::Ref<const MatX>& W, const Eig
     else x.setZero();
     least_miss_ = HUGE_VAL;
     bool found = search(x, warm);
+    if (!found && brief_) return ConeStatus::failed;
     ConeStatus status = found ? ConeStatus::solved : find_certificate(problem_, certificate_);
     if (status == ConeStatus::jammed) found = grow_friction(x);  // a solution may still exist
     if (status == ConeStatus::failed) found = grow_friction(x) || scatter(x) || take_nearest(x);
@@ -126,7 +127,8 @@ bool ConeComplementarity::search(Eigen::Ref<VecX> f, bool warm) {
         if (polish(f, first_steps)) return true;
     }
     path_.follow(problem_, f, ConePath::Slip::follows);
-    return polish(f, more_steps) || approach(f) || take_turns(f) || relax(f);
+    if (polish(f, more_steps)) return true;
+    return !brief_ && (approach(f) || take_turns(f) || relax(f));
 }
 
 // Proximal point algorithm (Rockafellar, SIAM J. Control Optim. 14, 1976). Each element yields in proportion to the

@@ -48,6 +48,9 @@ public:
     // does not depend on the order of the elements.
     void share_alike(bool on) { shares_alike_ = on; }
 
+    // Limit the search to Newton's method from the guess, from zero and from the end of the central path.
+    void search_briefly(bool on) { brief_ = on; }
+
     double error() const { return error_; }             // relative error of the equations
     bool unique_shares() const { return unique_shares_; }  // W is shown to determine all of f
     const VecX& certificate() const { return certificate_; }
@@ -74,7 +77,7 @@ private:
     Buffer even_, x_, f_, w_, nearest_;
     VecX certificate_;
     double error_ = 0.0, least_miss_ = 0.0, most_miss_ = 0.0;
-    bool unique_shares_ = false, shares_alike_ = false;
+    bool unique_shares_ = false, shares_alike_ = false, brief_ = false;
 };
 
 }  // namespace pn

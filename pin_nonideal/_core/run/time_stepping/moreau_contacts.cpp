@@ -426,6 +426,7 @@ bool MoreauContacts::solve_laws() {
     f_.head(n) -= middle_.head(n);
     w1_.head(n) = w0_.head(n);
     w1_.head(n).noalias() += W * middle_.head(n);
+    solver_.search_briefly(error <= most_relaxed);
     if (!solved) solved = solver_.solve(W, w1_.head(n), cones_, true, f_.head(n), true) == ConeStatus::solved;
     if (starts) solved = keep_rest(solved) || solved;
     f_.head(n) += middle_.head(n);
