@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal.cli.main import EXIT_ERROR, EXIT_INTERRUPTED, main
+from pin_nonideal.cli.main import EXIT_BROKEN_PIPE, EXIT_ERROR, EXIT_INTERRUPTED, main
 from pin_nonideal.cli.run import parameters
 
 # Short motion: other tests check the motion itself.
@@ -228,6 +228,26 @@ class TestInterrupt:
         assert error_line(capsys) == "pin-nonideal: interrupted"
 
 
+class TestOutputThatCannotBeWritten:
+    """The same in other processes: `tests/loading/test_files.py`."""
+
+    def test_a_reader_that_closed_the_pipe_ends_the_command(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        reader, writer = os.pipe()
+        os.close(reader)
+        with os.fdopen(writer, "w") as closed:
+            monkeypatch.setattr(sys, "stdout", closed)
+            assert main(["list"]) == EXIT_BROKEN_PIPE
+
+    @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+    def test_a_full_disk_is_an_error(
+        self, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        with open("/dev/full", "w") as full:
+            monkeypatch.setattr(sys, "stdout", full)
+            assert main(["list"]) == EXIT_ERROR
+        assert error_line(capsys) == "pin-nonideal: error: cannot print: No space left on device"
+
+
 class TestListInfoBench:
     def test_list_names_the_robots_and_the_examples(self, capsys: pytest.CaptureFixture[str]) -> None:
         assert main(["list"]) == 0
@@ -274,6 +294,21 @@ class TestListInfoBench:
         monkeypatch.setattr(sys, "argv", list(sys.argv))
         assert main(["bench", "four_bar", "--quick"]) == 0
         assert capsys.readouterr().out == "__main__ ['four_bar', '--quick']\n"
+
+    def test_bench_and_examples_need_their_folders(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        monkeypatch.chdir(tmp_path)
+        for name in ("main", "examples"):
+            installed = str(tmp_path / "pin_nonideal" / "cli" / f"{name}.py")
+            monkeypatch.setattr(sys.modules[f"pin_nonideal.cli.{name}"], "__file__", installed)
+        assert main(["bench", "four_bar"]) == EXIT_ERROR
+        assert error_line(capsys) == (
+            "pin-nonideal: error: bench needs the folder benchmarks of a checkout; run it there: "
+            "git clone, cd, pin-nonideal bench"
+        )
+        assert main(["list"]) == 0
+        assert capsys.readouterr().out.endswith("examples: pin-nonideal example NAME\n")
 
     def test_the_command_is_installed(self) -> None:
         command = shutil.which("pin-nonideal", path=str(Path(sys.executable).parent))
