@@ -149,11 +149,16 @@ def heavy_on_light(ratio: float) -> ContactScene:
 
 
 def dominoes(count: int) -> ContactScene:
-    """Return a row of dominoes, of which the first falls on the others."""
-    size, apart = (0.03, 0.1, 0.2), 0.08
-    push = (0.3, 0.0, 0.0, 0.0, 3.0, 0.0)
+    """Return a row of dominoes of two widths, of which the first falls on the others."""
+    thick, high, apart, spin = 0.03, 0.2, 0.08, 3.0
+    push = (0.5 * high * spin, 0.0, 0.5 * thick * spin, 0.0, spin, 0.0)  # about the front edge
     bodies = [
-        Body(size, (apart * k, 0.0, 0.5 * size[2]), v0=push if k == 0 else (0.0,) * 6) for k in range(count)
+        Body(
+            (thick, 0.1 - 0.01 * (k % 2), high),
+            (apart * k, 0.0, 0.5 * high),
+            v0=push if k == 0 else (0.0,) * 6,
+        )
+        for k in range(count)
     ]
     pairs = [(k + 1, k) for k in range(count - 1)]
     return ContactScene(f"{count} dominoes", bodies, mu=0.4, pairs=pairs, duration=1.5)

@@ -82,9 +82,9 @@ contacts as stiff as their step allows, of the ball with the damping of its rest
 QUADRUPED = """One step of 1 ms of Solo12 as it stands on its feet, held by its motors; Pinocchio's solver in
 the time stepping of its examples, at its default tolerance.
 """
-BODIES = """Boxes and balls at steps of 1 ms, `moreau` beside MuJoCo (Newton, elliptic cones): time of a step with
-the start of the run, largest motion of a body (stacks and walls must not move), largest relative error of the
-laws of contact in a step, and time to make the scene."""
+BODIES = """Boxes and balls, steps of 1 ms, `moreau` beside MuJoCo (Newton, elliptic cones): time of a step
+with the start of the run, largest motion of a body (stacks and walls must not move), largest relative error
+of the laws of contact in a step, and time to make the scene."""
 IMPACTS = """Cost of an impact: a box lands flat, so many contacts strike at once; beyond three they share
 it. And the time of runs of a Panda in the air with contacts that stay open, over the time without them.
 """
