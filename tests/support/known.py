@@ -60,12 +60,6 @@ KNOWN: list[Known] = [
         functions="simulate .*|stepper|poses of a replay",
     ),
     Known(
-        "time stepping judges the rank of overconstrained loops in the middle of a step, off the constraints",
-        ("Bennett 0", "moved mount", "simulate moreau"),
-        scenes="(Bennett|side rods|driven Cardan|free Cardan) .*",
-        functions="simulate moreau",
-    ),
-    Known(
         "time stepping of a contact that resists turning strikes otherwise where there are loops",
         ("touching PointContact", "an idle row", "simulate moreau"),
         scenes="touching .*",

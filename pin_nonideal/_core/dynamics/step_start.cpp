@@ -161,14 +161,13 @@ bool begin_rows(const Program& p, Workspace& w, double t, const VecX& q, const V
     return configure_step(p, w);
 }
 
-bool begin_rows_inside(const Program& p, Workspace& w, double t0, const VecX& q0, double t, const VecX& q, const VecX& v,
-                       bool redundant) {
-    if (!redundant) return begin_rows(p, w, t, q, v);
+void begin_rows_inside(const Program& p, Workspace& w, double t0, const VecX& q0, double t, const VecX& q, const VecX& v) {
+    configure(p, w, t, q, v);
+    if (!w.now.rows.orthogonal) return;
     begin_rows(p, w, t0, q0, v);
     const auto rank = std::count(w.now.rows.active.begin(), w.now.rows.active.end(), char(1));
     configure(p, w, t, q, v);
     if (w.now.rows.orthogonal) choose_rows_anew(p, w, static_cast<int>(rank));
-    return true;
 }
 
 void project_into_modes(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {

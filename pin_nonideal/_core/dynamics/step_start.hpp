@@ -11,10 +11,9 @@ void begin_step(const Program& p, Workspace& w, double t, const VecX& q, const V
 void continue_step(const Program& p, Workspace& w, double t, const VecX& v, bool chosen = false);
 // Configure and choose the independent rows, without forces. Return true if it chose rows.
 bool begin_rows(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
-// Do the same inside a step, which leaves the constraints. Rows that depend on others seem independent there. If rows are
-// `redundant`, the independent ones are chosen at the step's start (t0, q0).
-bool begin_rows_inside(const Program& p, Workspace& w, double t0, const VecX& q0, double t, const VecX& q, const VecX& v,
-                       bool redundant);
+// Configure inside a step, which leaves the constraints. Rows that depend on others seem independent there: if the
+// Cholesky factor cannot tell, the independent rows are chosen at the step's start (t0, q0).
+void begin_rows_inside(const Program& p, Workspace& w, double t0, const VecX& q0, double t, const VecX& q, const VecX& v);
 // Choose the independent rows in a configured workspace. Return true if it chose rows.
 bool configure_step(const Program& p, Workspace& w);
 // Choose the rows in a configured workspace, project v onto A v + phi_t = 0, and evaluate. Return true if v changed.

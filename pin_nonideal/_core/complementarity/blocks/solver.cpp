@@ -6,7 +6,7 @@ namespace pn {
 
 namespace {
 
-constexpr double accepted = 1e-10;         // error of a solution
+constexpr double accepted = 1e-9;          // error of a solution. Newton stops at rounding, far below in most problems
 constexpr double close = 1e-6;             // error on the path of compliances
 constexpr double first_compliance = 1.0, least_compliance = 1e-7;  // relative to an element's own response
 constexpr double first_factor = 0.1, last_factor = 0.95;           // ratio of successive compliances

@@ -22,7 +22,7 @@ constexpr double longer = 5.0;
 // Maximum growth in one fixed step that counts. Faster growth comes from the method: the step is too long, and the
 // motion overflows.
 constexpr double growth_in_step = 0.1;
-// Speed [rad/s or m/s] that no mechanism has. The run ends before its motion overflows.
+// Speed [rad/s or m/s] that no mechanism has. A run of fixed steps ends there, before its motion overflows.
 constexpr double impossible_speed = 1e12;
 
 }  // namespace
@@ -64,7 +64,8 @@ bool GrowthGuard::is_costly() const {
 
 void GrowthGuard::judge() {
     const size_t last = progress_.growth_speeds.size() - 1;
-    const bool impossible = progress_.growth_speeds.back() > impossible_speed && last >= half;
+    const bool impossible =
+        !options_.method.adaptive() && progress_.growth_speeds.back() > impossible_speed && last >= half;
     if (!impossible && !is_exponential() && !is_costly()) return;
     const double rate = growth(last);
     if (!options_.method.adaptive() && rate * options_.dt > growth_in_step) {

@@ -43,11 +43,12 @@ TimeStepping::TimeStepping(System& system, Progress& progress, GapWatch& watch, 
 // are one end, the last of them.
 double TimeStepping::end_of_step(double size, double stop, double t_end) const {
     double end = now_.t + size;
+    bool met = false;
     const double rounding = least_part * size;
     const auto meet = [&](double time) {
-        if (!(time > now_.t + rounding)) return;
-        if (time < end - rounding) end = time;
-        else if (time < end + rounding) end = std::max(end, time);
+        if (!(time > now_.t + rounding) || !(time < end + rounding)) return;
+        end = met && time > end - rounding ? std::max(end, time) : time;
+        met = true;
     };
     meet(torques_.next_stop(now_.t + rounding, t_end));
     if (options_.output_dt > 0.0) meet(output_.next());

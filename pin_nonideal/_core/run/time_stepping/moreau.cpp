@@ -47,7 +47,6 @@ void Moreau::step(double t, double h, VecX& y, double& moved_energy) {
     move_ = 0.5 * h * v0_;
     retract(m, y.data(), move_.data(), q_mid_.data());
     const double middle = t + 0.5 * h;
-    redundant_ = w.now.rows.redundant;
     t0_ = t;
     q0_ = y.head(system_.nq);
     set_modes(p, w, unloaded_);
@@ -72,7 +71,7 @@ void Moreau::step(double t, double h, VecX& y, double& moved_energy) {
 // Solve the step with the forces at the mean velocity found so far. `anew`: the rows have changed.
 void Moreau::sweep(double t, JointDrives::Step& drives, bool anew) {
     drives.move(mean_.start(), mean_.value());
-    if (anew) begin_rows_inside(p, w, t0_, q0_, t, q_mid_, mean_.value(), redundant_);
+    if (anew) begin_rows_inside(p, w, t0_, q0_, t, q_mid_, mean_.value());
     solve_without_friction(t);
     if (anew) respond();
     pose_problem();

@@ -44,7 +44,6 @@ private:
     std::vector<Mode> modes_, unloaded_;
     double h_ = 0.0, t0_ = 0.0;  // length and start of the step
     VecX q0_;
-    bool redundant_ = false;     // rows depend on others there
     MeanVelocity mean_;
     JointDrives drives_;
     FreeFlight flight_;

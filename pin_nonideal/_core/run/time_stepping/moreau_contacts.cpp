@@ -99,7 +99,6 @@ void MoreauContacts::step(double t, double h, VecX& y, double& moved_energy, dou
         q_looked_ = y.head(system_.nq);
         watch_.begin_time_steps(width_rounding * scene_size(p, w));
     }
-    redundant_ = p.first_gap > 0 && w.now.rows.redundant;
     t0_ = t;
     q0_ = y.head(system_.nq);
     select(open_, unloaded_, true);
@@ -138,7 +137,7 @@ bool MoreauContacts::project(double t, VecX& y, double& moved_energy) {
 // Solve the step with the forces at the mean velocity found so far.
 void MoreauContacts::sweep(double t, JointDrives::Step& drives, bool first) {
     drives.move(mean_.start(), mean_.value());
-    if (first || p.has_user_rows) begin_rows_inside(p, w, t0_, q0_, t, q_mid_, mean_.value(), redundant_);
+    if (first || p.has_user_rows) begin_rows_inside(p, w, t0_, q0_, t, q_mid_, mean_.value());
     solve_free(t);
     if (first) {
         find_touching(t);

@@ -88,7 +88,6 @@ private:
     double h_ = 0.0, last_change_ = 0.0;  // step, and last change of the limits between passes
     double t0_ = 0.0;         // start of the step
     VecX q0_;
-    bool redundant_ = false;  // rows depend on others there
     GapWatch& watch_;
     std::vector<int> touching_, own_;  // gaps that take part, and friction elements of no unilateral contact
     std::vector<int> rubbing_;         // friction elements that take part, except the sliding of contacts
