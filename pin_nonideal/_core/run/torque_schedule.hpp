@@ -10,8 +10,8 @@ class Torques {
 public:
     Torques(System& system, Progress& progress, const Options& options, Output& output, Breaks& breaks);
 
-    // Pass a break of time functions if one was reached. Time stepping computes velocity jumps itself.
-    void enter() { if (breaks_.reached()) breaks_.enter(); }
+    // Pass the breaks of time functions up to a time. Time stepping computes velocity jumps itself.
+    void enter(double at) { if (breaks_.next() <= at) breaks_.enter(at); }
     // Sample the sampled control if its next period begins now.
     void sample();
     // Call the user's callback, and set the torques that it returns. Return false if the callback ends the run.

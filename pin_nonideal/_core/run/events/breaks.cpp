@@ -76,12 +76,12 @@ Breaks::Breaks(System& system, Progress& progress, Output& output, Recording& ou
         for (const TimeFunction* f : time_functions(p.blocks[i].kind)) motions_.push_back({i, f});
 }
 
-void Breaks::enter() {
-    const auto after = std::upper_bound(p.breaks.begin(), p.breaks.end(), now_.t);
+void Breaks::enter(double at) {
+    const auto after = std::upper_bound(p.breaks.begin(), p.breaks.end(), at);
     double last = after == p.breaks.begin() ? -HUGE_VAL : *(after - 1);
     next_ = after == p.breaks.end() ? HUGE_VAL : *after;
     double& found = now_.found_break;
-    if (found <= now_.t) {
+    if (found <= at) {
         last = std::max(last, found);
         found = HUGE_VAL;
     }

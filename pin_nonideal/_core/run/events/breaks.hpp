@@ -14,9 +14,10 @@ class Breaks {
 public:
     Breaks(System& system, Progress& progress, Output& output, Recording& out);
 
-    // Set the stretch between the last break and the next one at the current time. Rows are evaluated within this
-    // stretch.
-    void enter();
+    // Set the stretch between the last break and the next one at the current time, or at another one. Rows are evaluated
+    // within this stretch.
+    void enter() { enter(now_.t); }
+    void enter(double at);
     // Time of the next break (infinity if none), and a check if it is reached.
     double next() const { return next_; }
     bool reached() const { return now_.t >= next_; }

@@ -70,8 +70,8 @@ void Moreau::step(double t, double h, VecX& y, double& moved_energy) {
 
 // Solve the step with the forces at the mean velocity found so far. `anew`: the rows have changed.
 void Moreau::sweep(double t, JointDrives::Step& drives, bool anew) {
-    drives.move(mean_.start(), mean_.value());
     if (anew) begin_rows_inside(p, w, t0_, q0_, t, q_mid_, mean_.value());
+    drives.move(mean_.start(), mean_.value());
     solve_without_friction(t);
     if (anew) respond();
     pose_problem();

@@ -136,8 +136,8 @@ bool MoreauContacts::project(double t, VecX& y, double& moved_energy) {
 
 // Solve the step with the forces at the mean velocity found so far.
 void MoreauContacts::sweep(double t, JointDrives::Step& drives, bool first) {
-    drives.move(mean_.start(), mean_.value());
     if (first || p.has_user_rows) begin_rows_inside(p, w, t0_, q0_, t, q_mid_, mean_.value());
+    drives.move(mean_.start(), mean_.value());
     solve_free(t);
     if (first) {
         find_touching(t);
