@@ -57,7 +57,7 @@ void Torques::take_rate_anew() {
 }
 
 double Torques::next_stop(double after, double t_end) const {
-    double stop = std::min(t_end, breaks_.next());
+    double stop = std::min(t_end, breaks_.next(after));
     if (const auto* sampled = std::get_if<SampledTorque>(&p.actuation))
         stop = std::min(stop, options_.t0 + now_.next_period * sampled->period);
     if (const auto* table = std::get_if<TorqueTable>(&p.actuation)) {

@@ -18,8 +18,8 @@ public:
     bool ask_callback();
     // Replace the actuation torques from now on.
     void set(const VecX& torque);
-    // Return the next time at which the actuation jumps or kinks, after the given one, or at which a time function breaks.
-    // It is at most `t_end`.
+    // Return the next time after the given one at which the actuation jumps or kinks or a time function breaks. It is at
+    // most `t_end`.
     double next_stop(double after, double t_end) const;
 
 private:

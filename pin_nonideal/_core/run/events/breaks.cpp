@@ -89,6 +89,12 @@ void Breaks::enter(double at) {
     w.now.set_stretch(last, next_);
 }
 
+double Breaks::next(double after) const {
+    const auto stated = std::upper_bound(p.breaks.begin(), p.breaks.end(), after);
+    const double found = now_.found_break > after ? now_.found_break : HUGE_VAL;
+    return std::min(found, stated == p.breaks.end() ? HUGE_VAL : *stated);
+}
+
 std::vector<double> Breaks::rates(double t) const {
     std::vector<double> rates;
     for (const Motion& motion : motions_) rates.push_back(evaluate(*motion.function, w.now.row_time(t))[1]);

@@ -18,8 +18,10 @@ public:
     // within this stretch.
     void enter() { enter(now_.t); }
     void enter(double at);
-    // Time of the next break (infinity if none), and a check if it is reached.
+    // Time of the next break after the current time or after another one (infinity if none), and a check if it is
+    // reached.
     double next() const { return next_; }
+    double next(double after) const;
     bool reached() const { return now_.t >= next_; }
     // Pass the break that was reached, and recompute the rate. Return true if the velocity has jumped. The caller must
     // then select the modes of contacts and friction.

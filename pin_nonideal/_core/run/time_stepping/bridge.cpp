@@ -40,17 +40,19 @@ TimeStepping::TimeStepping(System& system, Progress& progress, GapWatch& watch, 
       asked_always_(asks_always(system.p, options)) {}
 
 // End of a step of this size: at a stop, a jump of the actuation or a due sample before it. Times that differ by rounding
-// are one end, the first of them.
+// are one end, the last of them.
 double TimeStepping::end_of_step(double size, double stop, double t_end) const {
     double end = now_.t + size;
     bool met = false;
     const double rounding = least_part * size;
     const auto meet = [&](double time) {
         if (!(time > now_.t + rounding) || !(time < end + rounding)) return;
-        end = met && time > end - rounding ? std::min(end, time) : time;
+        end = met && time > end - rounding ? std::max(end, time) : time;
         met = true;
     };
-    meet(torques_.next_stop(now_.t + rounding, t_end));
+    const double jump = torques_.next_stop(now_.t + rounding, t_end);
+    meet(jump);
+    meet(torques_.next_stop(jump, t_end));
     if (options_.output_dt > 0.0) meet(output_.next());
     if (stop < end + rounding) end = stop;
     return end;

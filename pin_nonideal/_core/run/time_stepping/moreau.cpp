@@ -21,6 +21,7 @@ namespace {
 constexpr int load_passes = 60;           // maximum passes for load-dependent limits
 constexpr double load_tolerance = 1e-13;  // change of limits that counts as rounding, relative to the largest limit
 constexpr double limit_rounding = 1e-12;  // distance of a force at its limit, relative to the limit
+constexpr double rest_rounding = 1e-9;    // slip at the end that counts as none, relative to that without friction
 
 // Return all elements of a scene without unilateral contacts, else none. MoreauContacts treats other scenes.
 std::vector<int> all_elements(const System& system) {
@@ -168,13 +169,14 @@ void Moreau::end_velocity() {
     problem_.acceleration(p, w, force_, a_friction_);
     a_friction_ += a_free_;
     mean_.end(a_friction_, v1_);
-    const double still = rest_rate(v1_);
+    const double still = rest_rate(v1_), rounding = rest_rounding * problem_.alpha0.cwiseAbs().maxCoeff();
     for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e) {
         const int dim = problem_.dims[e];
         w.state.percussion.segment(p.blocks[p.frictions[e].block].row, dim) = force_.segment(at, dim);
         shifted_ = force_.segment(at, dim);
         if (dim == 1) shifted_[0] -= force_limit_.middle[at];
-        const bool rests = h_ * alpha_.segment(at, dim).norm() <= still;
+        const double slip = alpha_.segment(at, dim).norm();
+        const bool rests = h_ * slip <= still && slip <= rounding;
         const bool held = shifted_.norm() < force_limit_[e] * (1.0 - limit_rounding) || rests;
         modes_[e] = held ? sticking : dim > 1 || alpha_[at] > 0.0 ? slip_plus : slip_minus;
         const Block& block = p.blocks[p.frictions[e].block];
