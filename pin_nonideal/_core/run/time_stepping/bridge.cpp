@@ -53,7 +53,8 @@ double TimeStepping::end_of_step(double size, double stop, double t_end) const {
     const double jump = torques_.next_stop(now_.t + rounding, t_end);
     meet(jump);
     meet(torques_.next_stop(jump, t_end));
-    if (options_.output_dt > 0.0) meet(output_.next());
+    // A sample that differs by rounding is taken at the end of the step, which it does not change.
+    if (options_.output_dt > 0.0 && output_.next() < end - rounding) meet(output_.next());
     if (stop < end + rounding) end = stop;
     return end;
 }

@@ -169,7 +169,7 @@ void Moreau::end_velocity() {
     problem_.acceleration(p, w, force_, a_friction_);
     a_friction_ += a_free_;
     mean_.end(a_friction_, v1_);
-    const double still = rest_rate(v1_), rounding = rest_rounding * problem_.alpha0.cwiseAbs().maxCoeff();
+    const double still = rest_rate(v1_), rounding = rest_rounding * problem_.alpha0.lpNorm<Eigen::Infinity>();
     for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e) {
         const int dim = problem_.dims[e];
         w.state.percussion.segment(p.blocks[p.frictions[e].block].row, dim) = force_.segment(at, dim);
