@@ -12,7 +12,7 @@ namespace pn {
 namespace {
 
 // Shortest remainder of a step that becomes a step of its own, relative to the step.
-constexpr double least_part = 1e-9;
+constexpr double min_remainder = 1e-9;
 // Shortest part of a step while edges approach each other, relative to the step.
 constexpr double least_cut = 1e-3;
 
@@ -42,7 +42,7 @@ TimeStepping::TimeStepping(System& system, Progress& progress, GapWatch& watch, 
 double TimeStepping::end_of_step(double size, double stop, double t_end) const {
     double end = std::min({now_.t + size, stop, torques_.next_stop(t_end)});
     if (options_.output_dt > 0.0) end = std::min(end, std::max(output_.next(), std::nextafter(now_.t, stop)));
-    return stop - end < least_part * size ? stop : end;
+    return stop - end < min_remainder * size ? stop : end;
 }
 
 // Check if nothing moves and the sticking elements leave no freedom.
@@ -63,7 +63,7 @@ bool TimeStepping::asks_for_motion(double end, double t_end) const {
 void TimeStepping::take_part(double end, double t_end, double least) {
     double& t = now_.t;
     const double left = end - t, h = std::max(moreau_contacts_.allowed(t, left, now_.y), least);
-    const bool whole = h >= (1.0 - least_part) * left;
+    const bool whole = h >= (1.0 - min_remainder) * left;
     moreau_contacts_.step(t, whole ? left : h, now_.y, now_.moved_energy, now_.impact_energy);
     t = whole ? end : t + h;
     const MoreauContacts::Relaxed& relaxed = moreau_contacts_.relaxed();

@@ -4,8 +4,6 @@
 
 namespace pn {
 
-// Acceleration of a tree at rest that counts as rounding, relative to that without forces.
-constexpr double canceled = 1e-9;
 
 SeparateTrees::SeparateTrees(const Program& p) : blocks_(p) {}
 
@@ -67,7 +65,8 @@ void SeparateTrees::keep_rest(double h, const VecX& v0, VecX& v1) const {
         const int n = blocks_.size(root);
         if ((v0.segment(root, n).array() != 0.0).any()) continue;
         const double free = a_free_.segment(root, n).cwiseAbs().maxCoeff();
-        if (v1.segment(root, n).cwiseAbs().maxCoeff() <= canceled * h * free) v1.segment(root, n).setZero();
+        const double left = v1.segment(root, n).cwiseAbs().maxCoeff();
+        if (left <= tree_acceleration_rounding * h * free) v1.segment(root, n).setZero();
     }
 }
 
