@@ -1,4 +1,4 @@
-"""Compile time of the core: processor time, wall time and memory of the sources of each folder."""
+"""Compile time of the core: processor time, wall time and memory of the sources of each target."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def build() -> int:
 
 
 def table(units: list[dict[str, float | str]], wall: float) -> str:
-    """Return sums by folder of the core, as text.
+    """Return sums by target of the core, as text. Most targets are the sources of one folder.
 
     Args:
         units: output, processor and wall time [s] and peak memory [MB] of each compiler call.
@@ -72,9 +72,9 @@ def total(units: list[dict[str, float | str]], key: str) -> float:
 
 
 def room_of(output: str) -> str:
-    """Return the folder of a source in the core, from the path of its object file."""
+    """Return the target of the core that an object file belongs to, from its path."""
     if not output.endswith(".o"):
         return "precompiled headers" if output.endswith((".gch", ".pch")) else "link"
     if "nanobind" in output:
         return "nanobind"
-    return Path(output).parent.name
+    return output.partition("CMakeFiles/")[2].partition(".dir/")[0]

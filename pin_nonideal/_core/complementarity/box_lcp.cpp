@@ -9,12 +9,12 @@ namespace pn {
 
 namespace {
 
-constexpr double met = 1e-9;  // part of the acceleration scale that counts as zero
-constexpr double at_limit = 1e-12;  // relative distance to the limit at which a force is at it
-constexpr double rounding = 1e-13;  // rounding, relative to a limit or to the acceleration scale
-constexpr double noise_of_others = 1e-14;  // rounding of other elements, relative to the largest acceleration
+constexpr double met = 1e-9;                   // part of the acceleration scale that counts as zero
+constexpr double box_limit_tolerance = 1e-12;  // relative distance to the limit at which a force is at it
+constexpr double box_rounding = 1e-13;         // rounding, relative to a limit or to the acceleration scale
+constexpr double noise_of_others = 1e-14;      // rounding of other elements, relative to the largest acceleration
 // Smallest root of a pivot of W, scaled to a unit diagonal, for which the Cholesky factor is as good as an orthogonal one.
-constexpr double regular_pivot = 1e-3;
+constexpr double min_box_pivot = 1e-3;
 constexpr int most_patience = 10;  // rounds of block pivoting without progress
 
 // Compute the Cholesky factor of A, scaled to a unit diagonal, by rows, with the inverse pivots. Returns false if A is
@@ -26,7 +26,7 @@ PN_WIDE bool factor_scaled(int n, const double* A, const double* scale, double* 
             const double* Lj = L + j * n;
             const double sum = A[i + j * n] * scale[i] * scale[j] - dot(Li, Lj, j);
             if (j < i) Li[j] = sum * inverse[j];
-            else if (!(sum > regular_pivot * regular_pivot)) return false;
+            else if (!(sum > min_box_pivot * min_box_pivot)) return false;
             else inverse[i] = 1.0 / std::sqrt(sum);
         }
     }
@@ -77,7 +77,7 @@ void BoxProgram::solve_free(const MatX& W) {
         for (int i = 0; i < n; ++i) A(i, j) = W(list_[i], list_[j]);
     }
     if (!solve_regular(n)) {
-        solver_.factor_orthogonally(A, rank_threshold);
+        solver_.factor_orthogonally(A, response_rank_threshold);
         solver_.solve(rhs, x);
     }
     for (int i = 0; i < n; ++i) x_[list_[i]] = x[i];
@@ -96,7 +96,7 @@ void BoxProgram::start(const VecX& s, const VecX* near) {
     f_.setZero(n);
     is_free_.assign(n, 1);
     for (int i = 0; i < n; ++i) {
-        is_free_[i] = s[i] > 0.0 && (!near || std::abs((*near)[i]) < s[i] * (1.0 - at_limit));
+        is_free_[i] = s[i] > 0.0 && (!near || std::abs((*near)[i]) < s[i] * (1.0 - box_limit_tolerance));
         if (near && s[i] > 0.0) f_[i] = is_free_[i] ? (*near)[i] : (*near)[i] > 0.0 ? s[i] : -s[i];
     }
 }
@@ -136,7 +136,7 @@ void BoxProgram::descend(const MatX& W, const VecX& alpha0, const VecX& s) {
         alpha_ = alpha0;
         alpha_.noalias() += W * f_;
         int worst = -1;  // element that accelerates most along its force: it becomes free
-        double most = rounding;
+        double most = box_rounding;
         for (int i = 0; i < n; ++i) {
             const double back = alpha_[i] * (f_[i] > 0.0 ? 1.0 : -1.0) - noise_;
             if (is_free_[i] || !(s[i] > 0.0) || !(back > most * size_[i])) continue;
@@ -166,8 +166,8 @@ bool BoxProgram::pivot_blocks(const MatX& W, const VecX& alpha0, const VecX& s) 
         wrong_.clear();
         for (int i = 0; i < n; ++i) {
             if (is_free_[i] && std::abs(alpha_[i]) > met * size_[i] + noise_) return false;
-            const bool outside = is_free_[i] && std::abs(f_[i]) > s[i] * (1.0 + rounding);
-            const bool drives = !is_free_[i] && alpha_[i] * f_[i] > (rounding * size_[i] + noise_) * std::abs(f_[i]);
+            const bool outside = is_free_[i] && std::abs(f_[i]) > s[i] * (1.0 + box_rounding);
+            const bool drives = !is_free_[i] && alpha_[i] * f_[i] > (box_rounding * size_[i] + noise_) * std::abs(f_[i]);
             if (outside || drives) wrong_.push_back(i);
         }
         if (wrong_.empty()) return true;
@@ -194,7 +194,7 @@ void BoxProgram::solve(const MatX& W, const VecX& alpha0, const VecX& s, const V
     f_.setZero(n);
     is_free_.assign(n, 1);
     for (int i = 0; near && i < n; ++i) {
-        is_free_[i] = std::abs(near_[i]) < s[i] * (1.0 - at_limit);
+        is_free_[i] = std::abs(near_[i]) < s[i] * (1.0 - box_limit_tolerance);
         if (!is_free_[i]) f_[i] = near_[i] > 0.0 ? s[i] : -s[i];
     }
     if (!pivot_blocks(W, alpha0, s)) {

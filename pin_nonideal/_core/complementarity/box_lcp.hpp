@@ -9,7 +9,7 @@
 namespace pn {
 
 // Responses below this part of the largest count as zero. rank_tolerance_sticking is its square root.
-constexpr double rank_threshold = 1e-13;
+constexpr double response_rank_threshold = 1e-13;
 
 // Solver with persistent buffers: a program no larger than an earlier one allocates no memory.
 class BoxProgram {

@@ -9,7 +9,7 @@ namespace pn {
 namespace {
 
 // Pivot of the elimination, as a part of the largest entry, below which a full rank is uncertain.
-constexpr double regular_pivot = 1e-9;
+constexpr double min_elimination_pivot = 1e-9;
 
 // Compute the reflector that maps x = (x0, rest) to (beta, 0): I - tau (1, u)(1, u)^T, with u in place of rest. Returns tau.
 template <class Rest>
@@ -35,7 +35,7 @@ bool DenseSolver::eliminate(const Eigen::Ref<const MatX>& A) {
     auto L = factors_.matrix(n_, n_);
     L = A;
     order_.resize(std::max<size_t>(order_.size(), n_));
-    const double least = regular_pivot * (n_ > 0 ? A.cwiseAbs().maxCoeff() : 0.0);
+    const double least = min_elimination_pivot * (n_ > 0 ? A.cwiseAbs().maxCoeff() : 0.0);
     for (int k = 0; k < n_; ++k) {
         int pivot = 0;
         const double size = L.col(k).tail(n_ - k).cwiseAbs().maxCoeff(&pivot);

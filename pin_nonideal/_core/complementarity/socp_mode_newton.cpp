@@ -19,10 +19,10 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr int most_steps = 60, most_newton = 12;
-constexpr double gap_tolerance = 1e-17;  // z . y, relative to the acceleration scale (rounding may end the iteration before)
-constexpr double to_boundary = 0.99;     // part of the way to the cone's boundary that a step takes
-constexpr double newton_tolerance = 4e-16, condition = 1e-12;
+constexpr int max_socp_steps = 60, max_mode_newton = 12;
+// Largest z . y of a solution, relative to the acceleration scale. Rounding may end the iteration before.
+constexpr double socp_gap_tolerance = 1e-17;
+constexpr double mode_newton_tolerance = 4e-16, condition = 1e-12;
 
 struct ConeProgram {
     const MatX& W;
@@ -123,7 +123,7 @@ struct ConeProgram {
         }
         VecX dx(n);
         std::vector<Cone> dy(elements), second(elements);
-        for (int it = 0; it < most_steps && gap() > gap_tolerance; ++it) {
+        for (int it = 0; it < max_socp_steps && gap() > socp_gap_tolerance; ++it) {
             if (!factorize()) return;
             std::fill(second.begin(), second.end(), Cone());
             direction(0.0, second, dx, dy);
@@ -133,7 +133,7 @@ struct ConeProgram {
             direction(left * left * left * gap(), second, dx, dy);
             const VecX x_before = x;
             const std::vector<Cone> y_before = y;
-            advance(std::min(1.0, to_boundary * length(dx, dy)), dx, dy);
+            advance(std::min(1.0, max_boundary_part * length(dx, dy)), dx, dy);
             if (inside()) continue;
             x = x_before;  // rounding allows no further progress
             y = y_before;
@@ -149,7 +149,7 @@ struct ConeProgram {
         for (int e = 0; e < elements; ++e)
             if (slides[e]) m[e] = y[e].tail.norm();
         double last = HUGE_VAL;
-        for (int it = 0; it < most_newton; ++it) {
+        for (int it = 0; it < max_mode_newton; ++it) {
             MatX J = MatX::Zero(n + elements, n + elements);
             VecX residual = VecX::Zero(n + elements);
             J.topLeftCorner(n, n) = V;
@@ -164,10 +164,10 @@ struct ConeProgram {
                 residual[n + e] = 0.5 * (xe.squaredNorm() - 1.0);
             }
             const double error = residual.cwiseAbs().maxCoeff();
-            const bool done = error <= newton_tolerance || (error < condition && error >= last);
+            const bool done = error <= mode_newton_tolerance || (error < condition && error >= last);
             last = error;
             if (done) break;
-            const VecX step = least_squares(J, residual, rank_threshold);
+            const VecX step = least_squares(J, residual, response_rank_threshold);
             there -= step.head(n);
             m -= step.tail(elements);
         }

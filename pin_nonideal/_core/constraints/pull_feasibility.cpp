@@ -9,10 +9,8 @@ namespace pn {
 
 namespace {
 
-// Entry of a unit null-space vector of multipliers below which a row has no share in it.
-constexpr double takes_part = 1e-9;
-constexpr double binding = 1e-6;     // part of the largest weight below which a row does not bind
-constexpr double rounding = 1e-12;   // rounding of a margin, relative to the loads
+constexpr double binding = 1e-6;                // part of the largest weight below which a row does not bind
+constexpr double pull_margin_rounding = 1e-12;  // rounding of a margin, relative to the loads
 
 // Return a basis of the multipliers of all described rows that together exert no force. The rows of Z follow the
 // described rows, and its columns are orthonormal. The other rows depend on the first described row of each row in use:
@@ -54,7 +52,7 @@ MatX of_pressing(const std::vector<int>& pressing, const MatX& Z) {
     MatX part(static_cast<Eigen::Index>(pressing.size()), Z.cols());
     for (size_t k = 0; k < pressing.size(); ++k) {
         part.row(k) = Z.row(pressing[k]);
-        if (!(part.row(k).norm() > takes_part)) part.row(k).setZero();
+        if (!(part.row(k).norm() > min_null_space_entry)) part.row(k).setZero();
     }
     return part;
 }
@@ -65,7 +63,7 @@ std::vector<int> sharing_with(int index, const MatX& Z) {
     std::vector<int> found{index};
     for (size_t k = 0; k < found.size(); ++k)
         for (int j = 0; j < static_cast<int>(Z.rows()); ++j)
-            if (std::abs(coupling(found[k], j)) > takes_part * takes_part &&
+            if (std::abs(coupling(found[k], j)) > min_null_space_entry * min_null_space_entry &&
                 std::find(found.begin(), found.end(), j) == found.end())
                 found.push_back(j);
     return found;
@@ -90,7 +88,7 @@ Press press(const std::vector<Block>& blocks, const std::vector<double>& B,
     }
     const LargestLeast least = largest_least(Z, N);
     found.margin = least.value;
-    found.must_pull = least.value < -rounding * N.cwiseAbs().maxCoeff();
+    found.must_pull = least.value < -pull_margin_rounding * N.cwiseAbs().maxCoeff();
     for (int k = 0; k < least.weight.size(); ++k)
         if (least.weight[k] > binding * least.weight.maxCoeff()) found.pulling.push_back(found.sharing[k]);
     return found;

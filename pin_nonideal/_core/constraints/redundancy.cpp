@@ -7,7 +7,7 @@ namespace pn {
 // Weights of rows are solved from products of rows, which square the condition number. A second pass therefore solves
 // for the rest of the dependent row, unless this rest is rounding. [Bjorck: Stability analysis of the method of
 // seminormal equations, 1987.]
-static constexpr double spanned = 1e-14;
+static constexpr double dependent_row_rounding = 1e-14;
 static constexpr int most_passes = 2;
 
 std::vector<int> dependent_rows(const RowSystem& s) {
@@ -30,7 +30,7 @@ MatX dependence(const std::vector<Block>& blocks, const std::vector<double>& B, 
         unit[dependent[k]] = 1.0;
         for (int i : s.blocks) add_transpose(blocks[i], B, unit, column);
         unit[dependent[k]] = 0.0;
-        const double least = spanned * column.norm();
+        const double least = dependent_row_rounding * column.norm();
         for (int pass = 0; pass < most_passes && column.norm() > least; ++pass) {
             for (int i : s.blocks) multiply(blocks[i], B, column, products);
             solve_rows(s, products, weights);

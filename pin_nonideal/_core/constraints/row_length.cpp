@@ -11,7 +11,7 @@ namespace {
 
 // Part of the length of a force that moves all mass, below which the length of a row may be rounding. For example, a
 // force through the only pin of a body moves nothing at any position of the pin.
-constexpr double least_part = 1e-4;
+constexpr double min_length_part = 1e-4;
 // Lower bound on the length of a row of a user's function, as a part of the longest row. Rounding of a direction
 // without freedom is far shorter, and rows in other units are longer.
 constexpr double least_of_function = 1e-4;
@@ -22,7 +22,7 @@ public:
         if (block.deep) body_.resize(m.joints.size());
         double mass = 0.0;
         for (const Joint& joint : m.joints) mass += joint.mass;
-        if (mass > 0.0) least_ = least_part * least_part / mass;
+        if (mass > 0.0) least_ = min_length_part * min_length_part / mass;
     }
 
     // Return the squared length of the row of one unit wrench.

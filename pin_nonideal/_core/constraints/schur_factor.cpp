@@ -118,7 +118,7 @@ static PN_INLINE bool factor_cholesky(RowSystem& s) {
             pivot -= Li[j] * Li[j];
         }
         s.min_pivot = std::min(s.min_pivot, pivot);
-        if (!(pivot >= safe_pivot)) return false;
+        if (!(pivot >= min_schur_pivot)) return false;
         Li[i] = 1.0 / std::sqrt(pivot);
     }
     return true;

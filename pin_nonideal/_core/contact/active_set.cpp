@@ -26,14 +26,14 @@ constexpr double sure_gap = 1e-3;
 // Minimum number of contacts that can share a load in several ways.
 constexpr int may_share = 2;
 
-// Slip accelerations below `slow`, relative to the scale of accelerations, do not define a direction. `astray` is the
-// allowed deviation of the direction (1 - cosine).
-constexpr double slow = 1e-4, astray = 1e-6;
+// Minimum slip acceleration that defines a direction, relative to the scale of accelerations, and allowed deviation of
+// the direction (1 - cosine).
+constexpr double min_direction_acceleration = 1e-4, astray = 1e-6;
 
 }  // namespace
 
 bool goes_its_way(const Program& p, Workspace& w, const VecX& v) {
-    const double least = slow * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
+    const double least = min_direction_acceleration * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
     for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
         if (!slips(w.state.mode[e])) continue;
         const Friction& f = p.frictions[e];

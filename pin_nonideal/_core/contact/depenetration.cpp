@@ -17,8 +17,8 @@ namespace pn {
 namespace {
 
 // Moves longer than this many times the longest single-contact move do not resolve all penetrations.
-constexpr double far = 10.0;
-constexpr int most_steps = 20;  // Newton-like steps, each much shorter than the last one
+constexpr double max_joint_move_ratio = 10.0;
+constexpr int max_depenetration_steps = 20;  // Newton-like steps, each much shorter than the last one
 
 VecX widths(const Program& p, Workspace& w, double t, const VecX& v, const std::vector<int>& gaps) {
     VecX out(gaps.size());
@@ -47,7 +47,7 @@ bool strays_from_planes(const Program& p, Workspace& w, double longest_single) {
         if (opening(p, w, p.gaps[i].block, allowed) != 0.0) return true;
         widest = std::max(widest, longest_single / w.now.rows.scale[p.blocks[p.gaps[i].block].row]);
     }
-    return widest > allowed && !(closing_distance(p, w) <= far * longest_single);
+    return widest > allowed && !(closing_distance(p, w) <= max_joint_move_ratio * longest_single);
 }
 
 bool move_out(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
@@ -62,7 +62,7 @@ bool move_out(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) 
     VecX move = VecX::Zero(p.mechanism.nv), press = VecX::Zero(gaps.size()), width = press, step;
     ConeComplementarity solver;
     bool outside = false;
-    for (int k = 0; k < most_steps; ++k) {
+    for (int k = 0; k < max_depenetration_steps; ++k) {
         begin_rows(p, w, t, q, v);
         project_position(p, w, t, q, v, true);
         width = widths(p, w, t, v, gaps);

@@ -15,7 +15,7 @@ namespace pn {
 namespace {
 
 // Rounding of responses relative to the largest response to an impulse, and of velocities relative to the speed.
-constexpr double no_response = 1e-12, velocity_rounding = 1e-14;
+constexpr double min_impulse_response = 1e-12, impact_velocity_rounding = 1e-14;
 
 // Throw a failure: constraints drive bodies into each other, or the impulse solver failed.
 [[noreturn]] void refuse(const Program& p, double t, const std::vector<int>& gaps, ConeStatus status) {
@@ -83,9 +83,9 @@ VecX poisson(const ContactRows& rows, double t, const VecX& velocity) {
 void clean(const ContactRows& rows, double speed, VecX& w0) {
     const Spectrum modes = symmetric_spectrum(rows.W);
     const VecX& response = modes.values;
-    for (int i = 0; i < w0.size() && response[i] <= no_response * response[w0.size() - 1]; ++i) {
+    for (int i = 0; i < w0.size() && response[i] <= min_impulse_response * response[w0.size() - 1]; ++i) {
         const double held = modes.vectors.col(i).dot(w0);
-        if (std::abs(held) <= velocity_rounding * (1.0 + speed)) w0 -= held * modes.vectors.col(i);
+        if (std::abs(held) <= impact_velocity_rounding * (1.0 + speed)) w0 -= held * modes.vectors.col(i);
     }
 }
 

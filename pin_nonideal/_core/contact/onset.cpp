@@ -14,15 +14,15 @@ namespace pn {
 
 namespace {
 
-constexpr double none = 1e-12;      // rounding relative to the scale of accelerations
-constexpr double noise = 1e-14;     // rounding of a slip without own terms, relative to the scale of all accelerations
-constexpr double clearly = 1e-6;    // motion that differs from rest, relative to the scale of accelerations
-constexpr double at_limit = 1e-9;   // rounding relative to the limit of a force
+constexpr double none = 1e-12;  // rounding relative to the scale of accelerations
+constexpr double common_slip_rounding = 1e-14;  // rounding of a slip without own terms, relative to all accelerations
+constexpr double min_other_motion = 1e-6;  // motion that differs from rest, relative to the scale of accelerations
+constexpr double contact_limit_rounding = 1e-9;  // rounding relative to the limit of a force
 constexpr double breaking_by = 1e-6;  // relative reduction of the limit of elements that just reached it
-constexpr int most_releases = 4;    // rounds that set kinetic limits of slipping contacts
-constexpr int most_turns = 100;     // maximum iterations of loads and their friction
-constexpr double settled = 1e-13;   // rounding of the loads' change, relative to the largest acceleration
-constexpr int many = 8;             // contacts whose rest is first sought without the matrix of their responses
+constexpr int most_releases = 4;  // rounds that set kinetic limits of slipping contacts
+constexpr int max_load_iterations = 100;  // maximum iterations of loads and their friction
+constexpr double settled = 1e-13;  // rounding of the loads' change, relative to the largest acceleration
+constexpr int many = 8;  // contacts whose rest is first sought without the matrix of their responses
 
 // Check if the cone problem applies. All friction must be sliding of contacts that grows from zero with the load, or have
 // a constant limit. No user law may depend on reactions.
@@ -157,13 +157,13 @@ struct RestingProblem {
                (W.middleRows(row, count).cwiseAbs() * f.cwiseAbs()).maxCoeff();
     }
     // Accelerations of these rows, and of the slip of a cone, that are rounding.
-    double rounding(int row, int count) const { return none * in_play(row, count) + noise * in_play(); }
+    double rounding(int row, int count) const { return none * in_play(row, count) + common_slip_rounding * in_play(); }
     double slip_rounding(size_t i) const { return rounding(first[i] + head(i), tail(i)); }
 
     // Check if friction is at its limit. A contact that shares a load may have a load of rounding only.
     bool at_its_limit(size_t i) const {
         const double most = cones[i].bound * (head(i) ? f[first[i]] : 1.0), rounding = none * f.cwiseAbs().maxCoeff();
-        return tail_of(f, i).norm() >= most * (1.0 - at_limit) - rounding;
+        return tail_of(f, i).norm() >= most * (1.0 - contact_limit_rounding) - rounding;
     }
 
     // Set the kinetic limit of contacts that slip from rest. Return true if any limit changed.
@@ -220,7 +220,7 @@ struct RestingProblem {
         for (int round = 0; round < most_releases; ++round) {
             const bool solved = solver.solve(W, w0, cones, warm || round > 0, f) == ConeStatus::solved;
             if (round == 0 && !warm && (!solved || moves())) {
-                const bool another = solved && (w0 + W * f).cwiseAbs().maxCoeff() > clearly * in_play();
+                const bool another = solved && (w0 + W * f).cwiseAbs().maxCoeff() > min_other_motion * in_play();
                 if (hold(solver)) {
                     several = another;
                     break;
@@ -237,7 +237,7 @@ struct RestingProblem {
     // convergence.
     bool take_turns(const VecX& free) {
         bool shared = false;
-        for (int turn = 0; turn < most_turns; ++turn) {
+        for (int turn = 0; turn < max_load_iterations; ++turn) {
             const VecX before = f;
             w0 = free + dragging * before;
             if (!solve_cones(true, shared)) return false;

@@ -9,7 +9,7 @@
 namespace pn {
 
 // Rounding of a sum, relative to the sum of the magnitudes of its terms.
-constexpr double sum_rounding = 1e-12;
+constexpr double gap_sum_rounding = 1e-12;
 // Tolerance of coincident lines and points: relative distance from the origin, or sine of an angle.
 constexpr double one_place = 1e-12;
 
@@ -30,7 +30,7 @@ static std::pair<double, double> rate_of_rate(const Program& p, const Workspace&
 double gap_acceleration(const Program& p, const Workspace& w, int gap) { return rate_of_rate(p, w, gap).first; }
 
 double acceleration_rounding(const Program& p, const Workspace& w, int gap) {
-    return sum_rounding * (rate_of_rate(p, w, gap).second + p.mechanism.gravity.norm());
+    return gap_sum_rounding * (rate_of_rate(p, w, gap).second + p.mechanism.gravity.norm());
 }
 
 namespace {
@@ -99,7 +99,7 @@ double load(const Program& p, Workspace& w, int gap) {
 
 double load_rounding(const Program& p, const Workspace& w, int gap) {
     const double scale = w.now.rows.scale[p.blocks[p.gaps[gap].block].row];  // squared: mass that the row moves
-    return sum_rounding * scale * scale * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
+    return gap_sum_rounding * scale * scale * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
 }
 
 int pulling_contact(const Program& p, Workspace& w) {

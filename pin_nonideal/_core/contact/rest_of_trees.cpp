@@ -7,8 +7,8 @@
 
 namespace pn {
 
-// Error of the forces, and acceleration relative to that without them, that count as rounding.
-constexpr double solved = 1e-10, canceled = 1e-9;
+// Error of the forces that counts as rounding.
+constexpr double tree_rest_tolerance = 1e-10;
 
 bool rest_on_trees(const Program& p, Workspace& w, const std::vector<int>& gaps, const std::vector<int>& others,
                    const std::vector<ConeElement>& cones) {
@@ -29,13 +29,13 @@ bool rest_on_trees(const Program& p, Workspace& w, const std::vector<int>& gaps,
     solver.problem.offset = VecX::Zero(solver.problem.rows);
     if (!solver.pose()) return false;
     VecX f = solver.problem.offset;
-    if (!(solver.solve(f) <= solved)) return false;
+    if (!(solver.solve(f) <= tree_rest_tolerance)) return false;
     double rest = 0.0, moves = 0.0;
     for (const BlockNode& node : solver.problem.nodes) {
         rest = std::max(rest, w.now.a.segment(node.first, node.size).cwiseAbs().maxCoeff());
         moves = std::max(moves, solver.x().segment(node.first, node.size).cwiseAbs().maxCoeff());
     }
-    return moves <= canceled * rest;
+    return moves <= tree_acceleration_rounding * rest;
 }
 
 }  // namespace pn

@@ -19,7 +19,7 @@ constexpr double runaway_inertia = 1e30;
 // Rounding of balanced forces, relative to the acceleration of gravity.
 constexpr double balance_rounding = 1e-14;
 // Rounding of a sum, relative to the sum of the magnitudes of its terms.
-constexpr double sum_rounding = 1e-13;
+constexpr double residual_sum_rounding = 1e-13;
 
 // Evaluations between two looks at signals and wall time. Those of large scenes take milliseconds.
 constexpr long evaluations_a_watch = 16;
@@ -147,7 +147,7 @@ static bool is_balanced(const Program& p, Workspace& w) {
         for (int dof : block.support)
             for (size_t k = 0; k < block.kept.size(); ++k) size[dof] += std::abs(*entry++ * w.now.lam[block.row + k]);
     }
-    return (left.cwiseAbs().array() <= sum_rounding * size.array()).all();
+    return (left.cwiseAbs().array() <= residual_sum_rounding * size.array()).all();
 }
 
 // Set the results of the laws if no law acts.

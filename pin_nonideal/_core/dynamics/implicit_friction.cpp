@@ -13,19 +13,18 @@ namespace pn {
 
 namespace {
 
-constexpr double reaction_tolerance = 4e-15;  // relative change of y that counts as rounding
-constexpr double newton_tolerance = 3.2e-14;  // the same after a linear solve
-constexpr double stalled = 1e-12;             // Newton error below this that no longer falls is rounding
-constexpr double slow_change = 1e-13;         // slowly contracting changes above this are iterated further
-constexpr double good_contraction = 0.25;     // slower fixed-point iterations switch to Newton's method
-constexpr int fixed_point_limit = 30, newton_limit = 30;
+constexpr double reaction_tolerance = 4e-15;           // relative change of y that counts as rounding
+constexpr double reaction_newton_tolerance = 3.2e-14;  // the same after a linear solve
+constexpr double reaction_stall_tolerance = 1e-12;     // Newton error below this that no longer falls is rounding
+constexpr double slow_change = 1e-13;                  // slowly contracting changes above this are iterated further
+constexpr double max_reaction_contraction = 0.25;      // slower fixed-point iterations switch to Newton's method
+constexpr int fixed_point_limit = 30;
 // Growth of the equation below which a uniqueness proof stays valid for max(n, kept_steps) steps. The proof then costs
 // about one motion per step. The growth does not rise from this value to one in so short a time.
 constexpr double safe_growth = 0.5;
 constexpr int kept_steps = 4;
-constexpr int most_pieces = 30;  // maximum number of zero-load sets to try, one solution each
-constexpr double least_part = 0x1p-10;  // smallest fraction of the step to a solution of another zero-load set
-constexpr double least_gain = 0.1;      // required relative decrease of the error, per fraction of that step
+constexpr double min_zero_load_step = 0x1p-10;  // smallest fraction of the step to a solution of another zero-load set
+constexpr double min_error_gain = 0.1;  // required relative decrease of the error, per fraction of that step
 
 struct Implicit : Unknowns {
     using Unknowns::Unknowns;
@@ -62,7 +61,7 @@ struct Implicit : Unknowns {
         try {
             image(y, g);
             double error = (g - y).norm();
-            for (int turn = 0; turn < most_pieces; ++turn) {
+            for (int turn = 0; turn < max_zero_load_sets; ++turn) {
                 const VecX from = y;
                 {
                     const HeldPiece piece(p, w);
@@ -85,11 +84,11 @@ struct Implicit : Unknowns {
     // error.
     bool approach(const VecX& from, double& error, VecX& y, VecX& g) {
         const VecX way = y - from;
-        for (double part = 1.0; part >= least_part; part *= 0.5) {
+        for (double part = 1.0; part >= min_zero_load_step; part *= 0.5) {
             y = from + part * way;
             image(y, g);
             const double there = (g - y).norm();
-            if (!(there < (1.0 - least_gain * part) * error)) continue;
+            if (!(there < (1.0 - min_error_gain * part) * error)) continue;
             error = there;
             return true;
         }
@@ -109,7 +108,7 @@ struct Implicit : Unknowns {
         if (!regular || is_due()) decide(*this, arrays, before, y, solved);
         w.now.determinant = newton.factorize(arrays, y);
         double last = std::numeric_limits<double>::infinity();
-        for (int it = 0; it < newton_limit; ++it) {  // removes the rounding of the arrays
+        for (int it = 0; it < max_reaction_newton; ++it) {  // removes the rounding of the arrays
             image(y, newton.image);
             newton.residual = newton.image - y;
             const double error = newton.residual.cwiseAbs().maxCoeff();
@@ -125,14 +124,15 @@ struct Implicit : Unknowns {
         VecX g(n);
         double size = 0.0, last = std::numeric_limits<double>::infinity();
         MatX& J = w.scratch.jacobian;
-        for (int it = 0; it < newton_limit; ++it) {
+        for (int it = 0; it < max_reaction_newton; ++it) {
             image(y, g);
             const VecX residual = g - y;
             size = std::max({size, y.cwiseAbs().maxCoeff(), g.cwiseAbs().maxCoeff()});
             const double error = residual.cwiseAbs().maxCoeff();
             if (!g.allFinite()) throw Failure(Failure::Kind::not_finite, t);
             differentiate(*this, y, g, size, J);
-            if (error <= newton_tolerance * size || (it > 3 && error <= stalled * size && error >= last)) {
+            const bool stalls = it > 3 && error <= reaction_stall_tolerance * size && error >= last;
+            if (error <= reaction_newton_tolerance * size || stalls) {
                 look_for_others(*this, y, J, size);
                 image(y, g);
                 return;
@@ -162,7 +162,7 @@ struct Implicit : Unknowns {
             if (!g.head(n).allFinite()) throw Failure(Failure::Kind::not_finite, t);
             yn = g.head(n);
             if (change <= reaction_tolerance * size) return true;
-            if (it > 1 && change > good_contraction * last && change > slow_change * size + rounding()) return false;
+            if (it > 1 && change > max_reaction_contraction * last && change > slow_change * size + rounding()) return false;
             if (it > 1 && change >= last) return true;  // rounding
             // The next change would be below rounding: compute the motion once more without a check.
             if (it > 0 && change * (change / last) <= reaction_tolerance * size) {

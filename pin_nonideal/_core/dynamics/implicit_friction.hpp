@@ -9,6 +9,9 @@
 
 namespace pn {
 
+// Maximum number of zero-load sets to try, one solution each.
+constexpr int max_zero_load_sets = 30;
+
 // Check if any law acts. Friction of contacts does not act if all contacts are open.
 inline bool laws_act(const Program& p, const Workspace& w) {
     return p.has_laws() && (!p.rubs_while_closed || !w.now.touching.empty());

@@ -14,7 +14,7 @@ namespace {
 
 // Past its first steps an iteration that keeps more than this fraction of the largest residual has converged to
 // rounding. Newton's method at least halves the residual near the constraints. The first steps may start far away.
-constexpr double stalled_part = 0.5;
+constexpr double projection_stall_ratio = 0.5;
 constexpr int sure_position_steps = 3, sure_velocity_steps = 1;
 // Factorization at the new position costs less than this many iterations.
 constexpr double iterations_for_factors = 3.0;
@@ -22,7 +22,7 @@ constexpr double iterations_for_factors = 3.0;
 // rank_tolerance. The first choice (fewest rows) whose projection closes all other rows is taken.
 constexpr double tolerances_near[] = {1e-3, 1e-5, 1e-7, 1e-9};
 // Maximum choices of rows to project one position. Each choice reduces the gaps of the other rows quadratically.
-constexpr int most_choices = 3;
+constexpr int max_row_choices = 3;
 // Near a singular position the floor is zero. Iteration counts then assume convergence to unit roundoff.
 constexpr double no_floor = 1e-16;
 
@@ -253,7 +253,7 @@ bool project_position(const Program& p, Workspace& w, double t, VecX& q, const V
             now = gather_residuals(p, w);
             count = 0;
         }
-        if (it > sure_position_steps && now > stalled_part * largest) break;  // converged to rounding
+        if (it > sure_position_steps && now > projection_stall_ratio * largest) break;  // converged to rounding
         rate = now / largest;
         largest = now;
     }
@@ -285,7 +285,7 @@ bool project_onto_dependent(const Program& p, Workspace& w, double t, VecX& q, c
     const int rank = static_cast<int>(std::count(w.now.rows.active.begin(), w.now.rows.active.end(), char(1)));
     bool moved = false;
     const auto is_open = [&] { return dependent_residual(p, w) > creeping_gap * scene_size(p, w); };
-    for (int k = 0; k < most_choices && (is_open() || (k == 0 && w.now.rows.distance < near_singular)); ++k) {
+    for (int k = 0; k < max_row_choices && (is_open() || (k == 0 && w.now.rows.distance < near_singular)); ++k) {
         configure(p, w, t, q, v);
         choose_rows(p, w, rank_tolerance, rank);
         moved |= project_position(p, w, t, q, v);
@@ -357,7 +357,7 @@ bool project_velocity(const Program& p, Workspace& w, double t, VecX& v) {
         moved = true;
         configure_velocity(p, w, t, v);
         const double now = gather_rates(p, w, t, v);
-        if (it > sure_velocity_steps && now > stalled_part * last) break;
+        if (it > sure_velocity_steps && now > projection_stall_ratio * last) break;
         last = now;
     }
     rest_alone(p, w, v);

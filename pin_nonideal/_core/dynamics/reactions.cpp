@@ -62,8 +62,6 @@ static void sweep_tree(const Mechanism& m, const Evaluation& now, Reactions& r) 
     }
 }
 
-// A contact with a smaller row in the orthonormal null-space basis of the multipliers does not share loads.
-static constexpr double takes_part = 1e-9;
 // Maximum number of load-sharing contacts for which all zero-load sets are tried.
 static constexpr size_t most_sharing = 6;
 
@@ -91,7 +89,7 @@ static void press_all(const Program& p, Workspace& w, Reactions& r) {
     for (size_t k = 0; k < gaps.size(); ++k) {
         const int row = p.blocks[p.gaps[gaps[k]].block].row;
         Z.row(k) = free.row(row);
-        if (!(Z.row(k).norm() > takes_part)) Z.row(k).setZero();
+        if (!(Z.row(k).norm() > min_null_space_entry)) Z.row(k).setZero();
         N[k] = r.lam[row];
         held[k] = r.unloaded[gaps[k]];
     }

@@ -10,15 +10,13 @@ namespace pn {
 
 namespace {
 
-constexpr double difference = 1e-7;      // relative to the unknowns' size: square root of the rounding, with a margin
-constexpr double least_size = 1e-300;    // size if all unknowns are zero
-constexpr int newton_limit = 30;
-constexpr int most_mixed = 6;            // more laws mirror one branch at a time instead of all combinations
-constexpr double same_solution = 1e-9;   // relative residual at which a point is a solution
+constexpr double unknown_difference_step = 1e-7;  // relative to the unknowns: square root of the rounding, with a margin
+constexpr int most_mixed = 6;  // more laws mirror one branch at a time instead of all combinations
+constexpr double same_solution = 1e-9;  // relative residual at which a point is a solution
 constexpr double other_solution = 1e-6;  // relative distance beyond which two solutions differ
-constexpr double near_motion = 1e-6;     // tolerance between solutions of the arrays and motions, relative to the unknowns
-constexpr int refinements = 3;           // corrections of such a solution
-constexpr double at_limit = 1e-9;        // tolerance of a holding force, relative to its limit
+constexpr double near_motion = 1e-6;  // tolerance between solutions of the arrays and motions, relative to the unknowns
+constexpr int refinements = 3;  // corrections of such a solution
+constexpr double holding_limit_tolerance = 1e-9;  // tolerance of a holding force, relative to its limit
 
 using Solutions = Failure::Solutions;
 
@@ -48,7 +46,7 @@ double determinant_at(const ReactionEquation& equation, const VecX& y) {
 void sort_by_distance(const ReactionEquation& equation, const VecX& start, std::vector<VecX>& roots) {
     VecX size = start;
     for (const VecX& y : roots) size = size.cwiseMax(y);
-    size = size.cwiseMax(least_size);
+    size = size.cwiseMax(min_scale);
     const auto rank = [&](const VecX& y) {
         return std::pair(determinant_at(equation, y) < least_determinant_told,
                          (y - start).cwiseQuotient(size).cwiseAbs().maxCoeff());
@@ -89,7 +87,9 @@ bool holds(Unknowns& u, const VecX& y) {
     u.set(y);
     u.motion();
     for (int e = 0; e < static_cast<int>(u.p.frictions.size()); ++e)
-        if (u.w.state.mode[e] == sticking && !holding_force(u.p, u.w, e, u.t, u.q, u.v).is_within(at_limit)) return false;
+        if (u.w.state.mode[e] == sticking &&
+            !holding_force(u.p, u.w, e, u.t, u.q, u.v).is_within(holding_limit_tolerance))
+            return false;
     return true;
 }
 
@@ -183,7 +183,7 @@ void decide(Unknowns& u, const ReactionEquation& equation, const VecX& start, Ve
     if (!shown && determinant_at(equation, y) > least_determinant_told) return;
     state.unique = Uniqueness::several;
     VecX::Index most = 0;
-    (found.back() - y).cwiseQuotient((found.back() + y).cwiseMax(least_size)).cwiseAbs().maxCoeff(&most);
+    (found.back() - y).cwiseQuotient((found.back() + y).cwiseMax(min_scale)).cwiseAbs().maxCoeff(&most);
     u.w.now.several_element = u.elements()[most];
     if (u.w.continues && determinant_at(equation, y) > least_determinant_told) return;
     if (found.size() == 1) throw paradox(u, std::min(least, edge));
@@ -193,7 +193,7 @@ void decide(Unknowns& u, const ReactionEquation& equation, const VecX& start, Ve
 void differentiate(Unknowns& u, const VecX& y, const VecX& g, double size, MatX& J) {
     J.resize(u.n, u.n);
     VecX shifted = y, image_there(u.n);
-    const double h = difference * std::max(size, least_size);
+    const double h = unknown_difference_step * std::max(size, min_scale);
     for (int k = 0; k < u.n; ++k) {
         shifted[k] = y[k] + h;
         u.image(shifted, image_there);
@@ -248,7 +248,7 @@ bool leads_elsewhere(Unknowns& u, const VecX& y, VecX& start, double size) {
     VecX g(u.n);
     MatX J;
     try {
-        for (int it = 0; it < newton_limit; ++it) {
+        for (int it = 0; it < max_reaction_newton; ++it) {
             u.image(start, g);
             const VecX residual = g - start;
             const double scale = std::max({size, start.cwiseAbs().maxCoeff(), g.cwiseAbs().maxCoeff()});

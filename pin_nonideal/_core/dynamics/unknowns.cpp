@@ -9,7 +9,7 @@
 namespace pn {
 
 // Rounding of a solution at the boundary of two zero-load sets, relative to the unknowns.
-static constexpr double same_piece = 1e-11;
+static constexpr double zero_load_set_rounding = 1e-11;
 // Rounding of shared loads, relative to the largest multiplier.
 static constexpr double shared_rounding = 1e-13;
 
@@ -69,7 +69,7 @@ bool Unknowns::is_motion(const VecX& y) {
     VecX g(n);
     image(y, g);
     const double size = g.cwiseAbs().maxCoeff() + y.head(n).cwiseAbs().maxCoeff();
-    return (g - y.head(n)).cwiseAbs().maxCoeff() <= same_piece * size + rounding();
+    return (g - y.head(n)).cwiseAbs().maxCoeff() <= zero_load_set_rounding * size + rounding();
 }
 
 void Unknowns::equation(const VecX& y, ReactionEquation& found) {

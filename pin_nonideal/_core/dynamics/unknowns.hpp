@@ -7,6 +7,9 @@
 
 namespace pn {
 
+// Maximum steps of Newton's method for y = g(y).
+constexpr int max_reaction_newton = 30;
+
 struct Unknowns {
     const Program& p;
     Workspace& w;

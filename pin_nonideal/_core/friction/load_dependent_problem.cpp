@@ -8,9 +8,7 @@
 namespace pn {
 
 // Rounding of the limits at the boundary of two zero-load sets, relative to the limits.
-constexpr double same_piece = 1e-10;
-// Rounding of accelerations, relative to their scale.
-constexpr double no_acceleration = 1e-12;
+constexpr double zero_load_limit_rounding = 1e-10;
 
 static std::vector<int> joined(std::vector<int> list, const std::vector<int>& more) {
     list.insert(list.end(), more.begin(), more.end());
@@ -26,7 +24,7 @@ RestProblem::RestProblem(const Program& program, Workspace& workspace, double ti
     equation.n = problem_.rows;
     equation.W = problem_.W;
     equation.alpha0 = problem_.slip_accelerations(p, w);
-    const double noise = no_acceleration * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
+    const double noise = relative_acceleration_rounding * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
     for (int i = 0; i < problem_.rows; ++i)  // rows held by the constraints have no slip acceleration
         if (problem_.W(i, i) == 0.0 && std::abs(equation.alpha0[i]) <= noise) equation.alpha0[i] = 0.0;
     for (size_t i = 0; i < problem_.elements.size(); ++i) describe(i, i < resting.size());
@@ -132,7 +130,7 @@ bool RestProblem::is_motion(const VecX& x) {
         off = std::max(off, std::abs(limit - limits[i]));
         size = std::max(size, limit);
     }
-    return off <= same_piece * size;
+    return off <= zero_load_limit_rounding * size;
 }
 
 void RestProblem::enter_piece(const VecX& x) {

@@ -11,9 +11,9 @@ namespace {
 
 // Sticking removes slip of rounding. At a dead center of a loop, slip reverses while other bodies move, and its removal
 // could stop the whole motion. A relative change of the velocity above this value is a change of the motion.
-constexpr double least_speed = 1e-6;
-constexpr double slack = 1e-9;  // rounding relative to the limit, or to the scale of accelerations
-constexpr int rounds = 6;       // rounds of mode changes before the full problem is solved
+constexpr double min_velocity_change = 1e-6;
+constexpr double mode_condition_slack = 1e-9;  // rounding relative to the limit, or to the scale of accelerations
+constexpr int rounds = 6;                      // rounds of mode changes before the full problem is solved
 
 // Change the modes whose conditions fail in the current motion. An element past its limit slips, and an element driven
 // against its slip sticks. Return the number of changes. Return nothing if one motion does not decide, for elements of
@@ -25,11 +25,11 @@ std::optional<int> change_modes(const Program& p, Workspace& w, double t, const 
     for (int e : at_rest) {
         if (modes[e] == sticking) {
             const HoldingForce held = holding_force(p, w, e, t, q, v);
-            if (held.is_within(slack)) continue;
+            if (held.is_within(mode_condition_slack)) continue;
             if (p.frictions[e].dim > 1 || w.now.rows.redundant) return std::nullopt;
             modes[e] = held.force[0] < 0.0 ? slip_plus : slip_minus;
         } else {
-            if (slip_rate_along_mode(p, w, e) >= -slack * size) continue;
+            if (slip_rate_along_mode(p, w, e) >= -mode_condition_slack * size) continue;
             modes[e] = sticking;
         }
         ++changed;
@@ -52,7 +52,7 @@ bool go_on(const Program& p, Workspace& w, double t, VecX& q, VecX& v, const Mod
         set_modes(p, w, modes);
         try {
             project_into_modes(p, w, t, q, v);
-            if ((v - v_before).cwiseAbs().maxCoeff() > least_speed * (1.0 + v_before.cwiseAbs().maxCoeff())) break;
+            if ((v - v_before).cwiseAbs().maxCoeff() > min_velocity_change * (1.0 + v_before.cwiseAbs().maxCoeff())) break;
             begin_step(p, w, t, q, v);
         } catch (const Failure& failure) {
             if (failure.kind != Failure::Kind::inconsistent) throw;

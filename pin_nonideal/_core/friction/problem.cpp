@@ -6,8 +6,6 @@
 
 namespace pn {
 
-// Minimum response under constraints, relative to the free response of an element. Smaller responses are rounding.
-constexpr double least_response = 1e-13;
 
 static const Block& block_of(const Program& p, int element) { return p.blocks[p.frictions[element].block]; }
 
@@ -127,7 +125,7 @@ void FrictionProblem::clean(const Program& p, Workspace& w) {
 
 // Set row and column i of W to zero if its response is rounding compared to the unconstrained response.
 void FrictionProblem::drop_held(int i, double unconstrained) {
-    if (W(i, i) > least_response * unconstrained) return;
+    if (W(i, i) > min_constrained_response * unconstrained) return;
     W.row(i).setZero();
     W.col(i).setZero();
 }

@@ -7,9 +7,8 @@
 
 namespace pn {
 
-constexpr double at_limit = 1e-13;         // rounding relative to a limit
-constexpr double limit_slack = 1e-9;       // allowed violation of a mode's condition, relative to a limit
-constexpr double no_acceleration = 1e-12;  // rounding relative to the scale of accelerations
+constexpr double slip_limit_rounding = 1e-13;    // rounding relative to a limit
+constexpr double limit_slack = 1e-9;             // allowed violation of a mode's condition, relative to a limit
 
 // Modes to compute: modes of moving elements are known, the other elements are at rest along their directions.
 struct ModeQuestion {

@@ -19,10 +19,8 @@ namespace pn {
 
 namespace {
 
-constexpr double limit_tolerance = 1e-12; // relative change of the limits at convergence
-constexpr double least_limit = 1e-300;    // divisor in place of a zero limit
-constexpr int most_turns = 100;           // maximum iterations of forces and limits
-constexpr int most_pieces = 30;           // maximum number of zero-load sets to try
+constexpr double limit_tolerance = 1e-12;  // relative change of the limits at convergence
+constexpr int max_limit_iterations = 100;  // maximum iterations of forces and limits
 
 bool contains(const std::vector<int>& list, int e) { return std::find(list.begin(), list.end(), e) != list.end(); }
 
@@ -68,7 +66,7 @@ struct Search {
         const double size = w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm();
         return std::all_of(list.begin(), list.end(), [&](int e) {
             if (w.state.mode[e] == sticking)
-                return holding_force(p, w, e, t, q, v).is_within(at_limit);
+                return holding_force(p, w, e, t, q, v).is_within(slip_limit_rounding);
             return p.frictions[e].dim == 1 && slip_rate_along_mode(p, w, e) >= -limit_slack * size;
         });
     }
@@ -94,7 +92,7 @@ struct Search {
     // Solve for one zero-load set after the other until the motion is consistent with its own set. If this fails, try
     // all sets.
     bool find_in_pieces(RestProblem& problem, VecX& x) {
-        for (int turn = 0; turn < most_pieces && find(problem, x); ++turn) {
+        for (int turn = 0; turn < max_zero_load_sets && find(problem, x); ++turn) {
             if (!problem.has_pieces() || problem.is_motion(x)) return true;
             problem.enter_piece(x);
         }
@@ -109,7 +107,7 @@ struct Search {
 
     // Refine by Newton's method alone, near a solution.
     bool refine_in_pieces(RestProblem& problem, VecX& x) {
-        for (int turn = 0; turn < most_pieces; ++turn) {
+        for (int turn = 0; turn < max_zero_load_sets; ++turn) {
             if (problem.has_pieces()) problem.enter_piece(x);
             if (!refine_rest(problem.equation, x)) return false;
             if (!problem.has_pieces() || problem.is_motion(x)) return true;
@@ -124,7 +122,7 @@ struct Search {
         const auto may_stick = [](const RestElement& e) { return e.may_stick; };  // the constraints drive the others
         if (!std::all_of(begin, begin + list.size(), may_stick)) return false;
         x = problem.equation.holding_forces();
-        for (int turn = 0; turn < most_pieces; ++turn) {
+        for (int turn = 0; turn < max_zero_load_sets; ++turn) {
             const bool holds = hold_at_rest(problem.equation, x);
             if (!problem.has_pieces() || problem.is_motion(x)) return holds;
             problem.enter_piece(x);
@@ -219,7 +217,7 @@ struct Search {
             SlipLimits now = static_limits(p, w, list[i], t, q, v);
             if (modes[list[i]] != sticking) now = w.now.load[list[i]] * friction.speed_factor(0.0);
             const double missed = std::max(std::abs(now.reach() - limits[i]), std::abs(now.middle() - limits.middle[at]));
-            change = std::max(change, missed / std::max(now.reach(), least_limit));
+            change = std::max(change, missed / std::max(now.reach(), min_scale));
             limits.size[i] = now.reach();
             limits.middle[at] = now.middle();
         }
@@ -231,7 +229,7 @@ struct Search {
         FrictionProblem problem(p, w, list);
         problem.clean(p, w);
         problem.alpha0 = problem.slip_accelerations(p, w);
-        const double noise = no_acceleration * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
+        const double noise = relative_acceleration_rounding * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
         for (int i = 0; i < problem.rows; ++i)  // rows held by the constraints have no slip acceleration
             if (problem.W(i, i) == 0.0 && std::abs(problem.alpha0[i]) <= noise) problem.alpha0[i] = 0.0;
         FrictionLimits limits(static_cast<int>(list.size()), problem.rows);
@@ -241,7 +239,7 @@ struct Search {
             limits.middle[at] = now.middle();
         }
         double change = 0.0;
-        for (int turn = 0; turn < most_turns; ++turn) {
+        for (int turn = 0; turn < max_limit_iterations; ++turn) {
             const VecX f = friction_program(problem.W, problem.alpha0, problem.dims, limits);
             const std::vector<Mode> next = modes_of(w, question, problem, f, limits);
             if (next == modes && change <= limit_tolerance) return true;

@@ -11,16 +11,15 @@ namespace pn {
 namespace {
 
 // Rounding of a few products, relative to the numbers that cancel.
-constexpr double rounding = 1e-13;
+constexpr double nnls_rounding = 1e-13;
 // Relative pivot below which a column counts as spanned by the others.
-constexpr double spanned = 1e-11;
+constexpr double min_column_pivot = 1e-11;
 // Slack for the search of binding numbers if no z is feasible, relative to max |N|. It must exceed rounding.
-constexpr double slack = 1e-9;
+constexpr double binding_slack = 1e-9;
 // Rounding of a zero in a least-squares solution, relative to the numbers that it sums.
 constexpr double met_rounding = 1e-11;
 // Maximum number of exchanges per column. The method is finite and takes about one. Further exchanges are rounding.
 constexpr int exchanges = 10;
-constexpr double least_size = 1e-300;  // scale of numbers that are all zero
 constexpr int most_cuts = 50;  // updates of the bound in largest_least, each exact for the binding numbers
 
 // Solve the least-squares problem over the listed columns.
@@ -36,7 +35,7 @@ double largest(const VecX& x) { return x.size() > 0 ? x.cwiseAbs().maxCoeff() : 
 MatX complement_of(const MatX& Z) {
     const Eigen::Index n = Z.rows();
     if (Z.cols() == 0) return MatX::Identity(n, n);
-    const MatX Q = orthogonal_complement(Z, spanned);
+    const MatX Q = orthogonal_complement(Z, min_column_pivot);
     return Q * Q.transpose();
 }
 
@@ -54,7 +53,7 @@ VecX nonnegative_least_squares(const MatX& A, const VecX& b) {
         for (int j = 0; j < n; ++j) {
             if (refused[j] || std::find(used.begin(), used.end(), j) != used.end()) continue;
             const double length = A.col(j).norm();
-            if (!(descent[j] > rounding * length * (b.norm() + A.cwiseAbs().maxCoeff() * largest(x)))) continue;
+            if (!(descent[j] > nnls_rounding * length * (b.norm() + A.cwiseAbs().maxCoeff() * largest(x)))) continue;
             if (descent[j] > steepest * length) { steepest = descent[j] / length; best = j; }
         }
         if (best < 0) break;
@@ -70,7 +69,7 @@ VecX nonnegative_least_squares(const MatX& A, const VecX& b) {
             for (size_t k = 0; k < used.size(); ++k)
                 if (s[k] <= 0.0) part = std::min(part, x[used[k]] > 0.0 ? x[used[k]] / (x[used[k]] - s[k]) : 0.0);
             for (size_t k = 0; k < used.size(); ++k) x[used[k]] += part * (s[k] - x[used[k]]);
-            const auto stays = [&](int j) { return x[j] > rounding * largest(x); };
+            const auto stays = [&](int j) { return x[j] > nnls_rounding * largest(x); };
             for (int j : used)
                 if (!stays(j)) x[j] = 0.0;
             used.erase(std::stable_partition(used.begin(), used.end(), stays), used.end());
@@ -86,7 +85,7 @@ VecX least_violation(const MatX& Z, const VecX& N) {
     if (N.size() == 0 || N.minCoeff() >= 0.0) return VecX::Zero(N.size());
     const MatX P = complement_of(Z);
     const VecX off = P * (N - nonnegative_least_squares(P, P * N));  // Z z takes up the rest
-    const double noise = rounding * static_cast<double>(N.size()) * largest(N);
+    const double noise = nnls_rounding * static_cast<double>(N.size()) * largest(N);
     return off.unaryExpr([noise](double x) { return x < -noise ? -x : 0.0; });
 }
 
@@ -97,14 +96,14 @@ VecX shortest_with_zeros(const MatX& Z, const VecX& N, const std::vector<char>& 
     VecX numbers(count);
     for (int i = 0, k = 0; i < N.size(); ++i)
         if (zero[i]) { rows.row(k) = Z.row(i); numbers[k++] = N[i]; }
-    return -least_squares(rows, numbers, spanned);
+    return -least_squares(rows, numbers, min_column_pivot);
 }
 
 // Return the numbers that bind in the shortest z with N + Z z >= 0. These are the positive entries of u >= 0 for which
 // [Z^T; -N^T] u is nearest to the last unit vector. [Lawson, Hanson, 23.4.]
 static std::vector<char> binding(const MatX& Z, const VecX& N) {
     MatX both(Z.cols() + 1, Z.rows());
-    both << Z.transpose(), -N.transpose() / std::max(largest(N), least_size);
+    both << Z.transpose(), -N.transpose() / std::max(largest(N), min_scale);
     const VecX u = nonnegative_least_squares(both, VecX::Unit(both.rows(), both.rows() - 1));
     std::vector<char> found(N.size());
     for (int i = 0; i < N.size(); ++i) found[i] = u[i] > 0.0;
@@ -121,7 +120,7 @@ Nonnegative shortest_nonnegative(const MatX& Z, const VecX& N) {
     found.met = !violated(noise());
     if (found.met) return found;
     const VecX violation = least_violation(Z, N);
-    found.held = binding(Z, N + violation + VecX::Constant(N.size(), slack * largest(N)));
+    found.held = binding(Z, N + violation + VecX::Constant(N.size(), binding_slack * largest(N)));
     for (int i = 0; i < N.size(); ++i)
         if (violation[i] > 0.0) found.held[i] = 1;
     found.z = shortest_with_zeros(Z, N, found.held);
@@ -130,14 +129,14 @@ Nonnegative shortest_nonnegative(const MatX& Z, const VecX& N) {
 
 LargestLeast largest_least(const MatX& Z, const VecX& N) {
     const double size = largest(N);
-    double value = N.maxCoeff() + std::max(size, least_size);  // above any weighted mean of N
+    double value = N.maxCoeff() + std::max(size, min_scale);  // above any weighted mean of N
     LargestLeast found{size, VecX()};
     for (int cut = 0; cut < most_cuts; ++cut) {
         const VecX violation = least_violation(Z, (N.array() - value).matrix());
         if (largest(violation) <= met_rounding * size) break;  // smaller violations are rounding
         found.weight = violation / violation.sum();
         const double bound = found.weight.dot(N);
-        if (!(bound < value - rounding * size)) { value = bound; break; }
+        if (!(bound < value - nnls_rounding * size)) { value = bound; break; }
         value = bound;
     }
     if (found.weight.size() > 0) found.value = value;

@@ -10,6 +10,8 @@ constexpr int dip_passes = 40;     // golden sections, which find a dip of 1e-16
 constexpr int root_passes = 60;
 constexpr int start_halvings = 30;  // halvings toward the start, near which a slip from rest may stop again
 constexpr double root_width = 1e-13, root_margin = 1e-13;  // the root is a guess for the repeated step
+constexpr double no_crossing = 2.0;  // part of a step that means no crossing
+constexpr double margin_slope_step = 1e-4;  // step of the difference for the rate of a margin, relative to the step
 
 // Return the root of a margin that is positive at `low` and negative at `high`, as parts of a step. Uses secants that
 // stay inside the bracket (Illinois).

@@ -22,14 +22,14 @@ namespace {
 // Planned number of periods of a stepper's run, and number of samples at events after which the samples are cleared.
 constexpr double planned_periods = 1e6;
 constexpr size_t most_samples = 100;
-constexpr double never = 1e300;  // the time to the next sample [s]
+constexpr double no_sample_interval = 1e300;  // the time to the next sample [s]
 
 Options options_of(const std::string& method, double period, double dt, double rtol, const Array& atol) {
     Options options;
     options.method = method_named(method);
     options.duration = planned_periods * period;
     options.dt = options.method.adaptive() ? 0.0 : dt;
-    options.output_dt = never;
+    options.output_dt = no_sample_interval;
     options.rtol = rtol;
     options.atol = map(atol);
     options.max_steps = std::numeric_limits<long>::max();

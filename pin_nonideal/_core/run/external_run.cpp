@@ -10,7 +10,7 @@
 namespace pn {
 
 // Relative step of central differences: cube root of the unit roundoff, which balances rounding and truncation errors.
-constexpr double difference = 6e-6;
+constexpr double derivative_step = 6e-6;
 // Minimum slip acceleration at an onset, relative to the acceleration by friction alone. The inverse ratio is the rate
 // at which the slip direction relaxes, times the time since the onset. Implicit steps resolve inverse ratios up to
 // about 30.
@@ -29,7 +29,7 @@ MatX FollowedRun::jacobian(double at, const VecX& y_outside) {
     MatX out = MatX::Zero(n, n);
     VecX ahead = y_outside, back = y_outside, rate_ahead(n), rate_back(n);
     for (int k = 0; k < n - system.nw; ++k) {
-        const double step = difference * (k < system.nq ? 1.0 : std::max(1.0, std::abs(y_outside[k])));
+        const double step = derivative_step * (k < system.nq ? 1.0 : std::max(1.0, std::abs(y_outside[k])));
         ahead[k] += step;
         back[k] -= step;
         derivative(at, ahead, rate_ahead);

@@ -18,6 +18,8 @@ const Model& model_of(const Mechanism& m) { return *static_cast<const Model*>(m.
 
 Motion motion(const pinocchio::Motion& x) { return {x.linear(), x.angular()}; }
 
+}  // namespace
+
 // A model of one joint, evaluated by `forwardKinematics`, which Pinocchio's library instantiates. The templates of the
 // joint itself (createData, calc) take fifteen seconds to compile.
 class LoneJoint {
@@ -41,6 +43,8 @@ private:
     pinocchio::Model model_;
     pinocchio::Data data_;
 };
+
+namespace {
 
 // Compute the placement of a body from Pinocchio's placement about the world's origin.
 void place(const Mechanism& m, const pinocchio::Data& data, int i, Body& b) {

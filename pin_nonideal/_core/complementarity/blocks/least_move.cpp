@@ -8,13 +8,11 @@ namespace pn {
 // Weight of a row, relative to the inertia that it moves, and the ratio of the next lower one.
 constexpr double most_weight = 1e8, less_weight = 1e-2;
 // A move longer than this many times the longest move of a single row resolves no gap: rows contradict each other.
-constexpr double far = 10.0;
+constexpr double max_move_ratio = 10.0;
 // Lever [m] below which the length of single moves is computed to judge a move.
 constexpr double short_lever = 0.1;
 // Largest part of a probing motion that rows leave to a node without freedom.
 constexpr double most_left = 1e-3;
-// Response of a row that counts as none, relative to the other rows of its element.
-constexpr double least_response = 1e-13;
 
 bool LeastMove::pose() {
     if (!problem.factor()) return false;
@@ -41,7 +39,7 @@ bool LeastMove::factor(int i) {
         double most = 0.0;
         for (int r = 0; r < e.dim(); ++r) most = std::max(most, W.c[r][r]);
         for (int r = 0; r < e.dim(); ++r) {
-            own_[e.row + r] = W.c[r][r] > least_response * most ? W.c[r][r] : most;
+            own_[e.row + r] = W.c[r][r] > min_block_response * most ? W.c[r][r] : most;
             G_[9 * k + r * (e.dim() + 1)] = own_[e.row + r] > 0.0 ? weight_[i] / own_[e.row + r] : 0.0;
         }
     }
@@ -111,7 +109,7 @@ bool LeastMove::seek(int i, const VecX& r, VecX& move) {
             size = std::max(size, move.segment(problem.nodes[n].first, problem.nodes[n].size).cwiseAbs().maxCoeff());
         if (size * short_lever <= residual) return true;
         if (longest < 0.0) longest = longest_single(i, r);
-        if (size <= far * longest) return true;
+        if (size <= max_move_ratio * longest) return true;
     }
     for (int n : islands_[i].nodes) move.segment(problem.nodes[n].first, problem.nodes[n].size).setZero();
     return false;

@@ -9,14 +9,13 @@ namespace {
 
 using ConeKind = ConeElement::Kind;
 
-constexpr double least_response = 1e-13;  // response of a direction that counts as none, relative to the other ones
-constexpr double decrease = 0.01;         // required part of the predicted decrease of the squared error
+constexpr double decrease = 0.01;  // required part of the predicted decrease of the squared error
 constexpr int most_refusals = 4, most_unguarded = 3;  // refused steps, then full steps without decrease
-constexpr double most_proximal = 0.1;     // largest weight of the proximal term
-constexpr double more_proximal = 5.0;     // growth of the weight after a refused step
-constexpr double kept_from = 0.3, kept_to = 3.0;      // change of the weight that keeps the factor
-constexpr double stagnant = 0.25;         // ratio of two errors that counts as no progress near the solution
-constexpr double nearly = 1e-9;           // error near the solution
+constexpr double most_proximal = 0.1;  // largest weight of the proximal term
+constexpr double more_proximal = 5.0;  // growth of the weight after a refused step
+constexpr double kept_from = 0.3, kept_to = 3.0;  // change of the weight that keeps the factor
+constexpr double stagnant = 0.25;  // ratio of two errors that counts as no progress near the solution
+constexpr double block_newton_stall_tolerance = 1e-9;  // error near the solution
 
 }  // namespace
 
@@ -34,7 +33,9 @@ void BlockNewton::pose(const BlockProblem& p) {
         double across = 0.0;
         for (int k = head; k < e.dim(); ++k) across += W.c[k][k] / tail;
         const double most = std::max(normal, across);
-        const auto inverse = [&](double own) { return most > 0.0 ? 1.0 / (own > least_response * most ? own : most) : 1.0; };
+        const auto inverse = [&](double own) {
+            return most > 0.0 ? 1.0 / (own > min_block_response * most ? own : most) : 1.0;
+        };
         for (int k = 0; k < e.dim(); ++k) {
             rho_[e.row + k] = inverse(k < head ? normal : across);
             root_rho_[e.row + k] = std::sqrt(rho_[e.row + k]);
@@ -306,7 +307,7 @@ double BlockNewton::solve(const BlockProblem& p, const Island& island, BlockFact
             least = error;
             each_row([&](int r) { f_best_[r] = f[r]; });
         }
-        if (least < nearly && error > stagnant * before && ++stagnant_steps > 1) break;
+        if (least < block_newton_stall_tolerance && error > stagnant * before && ++stagnant_steps > 1) break;
     }
     if (error > least || !(error < HUGE_VAL)) {
         each_row([&](int r) { f[r] = f_best_[r]; });

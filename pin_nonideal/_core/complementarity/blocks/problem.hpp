@@ -16,6 +16,9 @@ using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::Ro
 using BlockMap = Eigen::Map<RowMajor>;
 using ConstBlockMap = Eigen::Map<const RowMajor>;
 
+// Response of a direction of an element that counts as none, relative to its other directions.
+constexpr double min_block_response = 1e-13;
+
 struct BlockNode {
     int size = 0, first = 0;  // number of unknowns, and the first in x
     int M = 0;                // first entry of M and of its factor

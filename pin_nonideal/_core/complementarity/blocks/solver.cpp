@@ -7,8 +7,8 @@ namespace pn {
 namespace {
 
 constexpr double accepted = 1e-9;          // error of a solution. Newton stops at rounding, far below in most problems
-constexpr double close = 1e-6;             // error on the path of compliances
-constexpr double first_compliance = 1.0, least_compliance = 1e-7;  // relative to an element's own response
+constexpr double compliance_path_tolerance = 1e-6;             // error on the path of compliances
+constexpr double first_block_compliance = 1.0, min_block_compliance = 1e-7;  // relative to an element's own response
 constexpr double first_factor = 0.1, last_factor = 0.95;           // ratio of successive compliances
 constexpr double attempted_from = 1e-2;    // largest compliance from which a solution is attempted
 constexpr int most_stages = 30;
@@ -35,7 +35,7 @@ double BlockSolver::newton(int island, BlockNewton::Search search, double compli
     return newton_.solve(problem, islands_[island], factors_[island], search, compliance, f, x_, w_);
 }
 
-// Solve from forces that are close to a solution, which f becomes. Return true if it is one.
+// Solve from forces that are compliance_path_tolerance to a solution, which f becomes. Return true if it is one.
 bool BlockSolver::attempt(int island, VecX& f) {
     const double error = newton(island, BlockNewton::Search::patient, 0.0, f);
     if (error < least_) {
@@ -45,16 +45,16 @@ bool BlockSolver::attempt(int island, VecX& f) {
     return least_ <= accepted;
 }
 
-// Reduce a compliance of all elements to zero, from no forces. Each problem on the way has a solution close to that of
+// Reduce a compliance of all elements to zero, from no forces. Each problem on the way has a solution compliance_path_tolerance to that of
 // the last one, so the path ends at one solution of several.
 bool BlockSolver::stiffen(int island, VecX& f) {
     for (int i : islands_[island].elements) f.segment(problem.elements[i].row, problem.elements[i].dim()).setZero();
     on_path_ = f;
-    double compliance = first_compliance, factor = first_factor;
-    for (int stage = 0; stage < most_stages && compliance > least_compliance; ++stage) {
+    double compliance = first_block_compliance, factor = first_factor;
+    for (int stage = 0; stage < most_stages && compliance > min_block_compliance; ++stage) {
         f = on_path_;
         const auto search = stage == 0 ? BlockNewton::Search::patient : BlockNewton::Search::bold;
-        if (newton(island, search, compliance, f) <= close) {
+        if (newton(island, search, compliance, f) <= compliance_path_tolerance) {
             on_path_ = f;
             if (compliance <= attempted_from && attempt(island, f)) return true;
             compliance *= factor;

@@ -11,8 +11,8 @@ namespace {
 
 using ConeKind = ConeElement::Kind;
 
-constexpr double clearly = 1e-7;   // part of |y| |w0| by which y . w0 must be negative
-constexpr double shown = 1e-9;     // tolerance of quantities that must vanish
+constexpr double min_certificate_margin = 1e-7;                  // part of |y| |w0| by which y . w0 must be negative
+constexpr double shown = 1e-9;                                   // tolerance of quantities that must vanish
 constexpr double near_edges[] = {1e-5, 1e-4, 1e-3, 1e-6, 1e-7};  // parts of the largest force that count as zero
 constexpr double dependent = 1e-8;
 constexpr int most_sharpenings = 6;
@@ -62,7 +62,7 @@ bool no_forces(const ConeProblem& p, VecX& y) {
         if (element.is(ConeKind::equality) && ue.cwiseAbs().maxCoeff() > shown) return false;
         if (element.is(ConeKind::box)) margin -= element.bound * ue.norm();
     }
-    return margin > clearly;
+    return margin > min_certificate_margin;
 }
 
 // Replace y by a nearby y that balances exactly. Small forces become zero, and forces near the edge of a cone move onto it.
@@ -96,7 +96,7 @@ void sharpen(const ConeProblem& p, const MatX& E, double near_edge, VecX& y) {
 bool squeezes(const ConeProblem& p, VecX& y) {
     if (!(y.norm() > 0.0 && y.norm() < HUGE_VAL)) return false;
     y.normalize();
-    if ((p.W().transpose() * y).cwiseAbs().maxCoeff() > shown || -y.dot(p.w0()) < clearly) return false;
+    if ((p.W().transpose() * y).cwiseAbs().maxCoeff() > shown || -y.dot(p.w0()) < min_certificate_margin) return false;
     for (int e = 0; e < p.size(); ++e) {
         const int i = p.at[e], tails = p.elements[e].dim - 1;
         if (!p.elements[e].is(ConeKind::contact)) continue;

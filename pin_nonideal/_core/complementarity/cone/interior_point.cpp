@@ -11,9 +11,8 @@ using ConeKind = ConeElement::Kind;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr int most_steps = 60;
-constexpr double gap_tolerance = 1e-15, least_step = 1e-7;
-constexpr double to_boundary = 0.99;   // part of the way to the cone's boundary that a step takes
+constexpr int max_central_path_steps = 60;
+constexpr double central_path_gap_tolerance = 1e-15, least_step = 1e-7;
 constexpr double smooth_speed = 1e-12;  // slip speed below which the direction is undefined
 
 // Return the scale that makes the cone |f_t| <= mu f_n circular: forces (root f_n, f_t / root), velocities the other way.
@@ -160,10 +159,11 @@ double ConePath::gap(const ConeProblem& p) const {
 void ConePath::follow(const ConeProblem& p, Eigen::Ref<VecX> f, Slip slip) {
     start(p, f, slip);
     auto step = step_.vector(p.n), kept = kept_.vector(p.n);
-    for (int it = 0; it < most_steps; ++it, ++steps_) {
+    for (int it = 0; it < max_central_path_steps; ++it, ++steps_) {
         update(p, f);
         const double now = gap(p);
-        if (now < gap_tolerance && miss_.vector(p.n).cwiseAbs().maxCoeff() < gap_tolerance * 10.0) return;
+        const double miss = miss_.vector(p.n).cwiseAbs().maxCoeff();
+        if (now < central_path_gap_tolerance && miss < central_path_gap_tolerance * 10.0) return;
         factorize(p);
         for (int e = 0; e < p.size(); ++e) states_[e].second = Cone();
         direction(p, 0.0, 0.0);
@@ -173,7 +173,7 @@ void ConePath::follow(const ConeProblem& p, Eigen::Ref<VecX> f, Slip slip) {
             s.second = product(s.scaling.back(force(p, e, step, 0.0)), s.scaling.forth(s.dy));
         }
         direction(p, sigma * now, sigma);
-        const double a = std::min(1.0, to_boundary * length(p));
+        const double a = std::min(1.0, max_boundary_part * length(p));
         if (!(a > least_step)) return;
         kept = f;
         f += a * step;

@@ -11,11 +11,11 @@ using ConeKind = ConeElement::Kind;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double at_rest = 1e-9;    // w below this part of the largest w0 counts as zero
-constexpr double rounding = 3e-15;  // relative to the forces
-constexpr double nearly = 1e-12;    // the same if steps make no progress
-constexpr double damping = 1e-10;   // damping of Newton's method, relative to the residual
-constexpr int most_steps = 60, most_halvings = 10;
+constexpr double at_rest = 1e-9;                        // w below this part of the largest w0 counts as zero
+constexpr double minimum_norm_tolerance = 3e-15;        // relative to the forces
+constexpr double minimum_norm_stall_tolerance = 1e-12;  // the same if steps make no progress
+constexpr double damping = 1e-10;                       // damping of Newton's method, relative to the residual
+constexpr int max_minimum_norm_steps = 60, max_minimum_norm_halvings = 10;
 
 // Nearest point to z of a set, and its derivative.
 struct Nearest {
@@ -123,7 +123,7 @@ bool ConeShares::even_out(const ConeProblem& p, Eigen::Ref<VecX> f) {
     y = told;
     const double size = given.norm();
     double now = miss(p, y, rank);
-    for (int it = 0; it < most_steps && now > rounding * size; ++it) {
+    for (int it = 0; it < max_minimum_norm_steps && now > minimum_norm_tolerance * size; ++it) {
         project(p, z_.vector(p.n), g_.vector(p.n), true);
         for (int e = 0; e < p.size(); ++e) {
             const int i = p.at[e], d = p.elements[e].dim;
@@ -134,7 +134,7 @@ bool ConeShares::even_out(const ConeProblem& p, Eigen::Ref<VecX> f) {
         solver_.factor(J);
         solver_.solve(miss_.vector(rank), step);
         double length = 1.0, there = HUGE_VAL;
-        for (int halving = 0; halving < most_halvings && !(there < now); ++halving, length *= 0.5) {
+        for (int halving = 0; halving < max_minimum_norm_halvings && !(there < now); ++halving, length *= 0.5) {
             ahead = y - length * step;
             there = miss(p, ahead, rank);
         }
@@ -143,7 +143,7 @@ bool ConeShares::even_out(const ConeProblem& p, Eigen::Ref<VecX> f) {
         now = there;
     }
     now = miss(p, y, rank);
-    if (!(now <= nearly * size)) return false;
+    if (!(now <= minimum_norm_stall_tolerance * size)) return false;
     f = g_.vector(p.n).cwiseQuotient(p.scale());
     return true;
 }

@@ -10,10 +10,11 @@ namespace {
 using ConeKind = ConeElement::Kind;
 using Eigen::Vector3d;
 
-constexpr double rounding = 1e-15, nearly = 1e-11;  // errors that end it, the second if steps make no progress
-constexpr double enough = 1e-4;                     // required part of the predicted decrease
-constexpr int most_halvings = 7, most_blind = 3;    // steps without decrease that let the modes change
-constexpr int most_stalled = 2;                     // steps at rounding without progress
+// Errors that end the iteration. The second one ends it if steps make no progress.
+constexpr double cone_newton_tolerance = 1e-15, cone_newton_stall_tolerance = 1e-11;
+constexpr double cone_newton_decrease = 1e-4;  // required part of the predicted decrease
+constexpr int max_cone_halvings = 7, most_blind = 3;  // steps without decrease that let the modes change
+constexpr int most_stalled = 2;  // steps at rounding without progress
 
 // Data of the projection of one element's tangential rows.
 struct Disk {
@@ -121,10 +122,10 @@ void ConeNewton::differentiate(const ConeProblem& p, const Eigen::Ref<const VecX
 bool ConeNewton::advance(const ConeProblem& p, Eigen::Ref<VecX> f, double& merit) {
     auto step = step_.vector(p.n), ahead = ahead_.vector(p.n);
     double length = 1.0;
-    for (int halving = 0; halving < most_halvings; ++halving, length *= 0.5) {
+    for (int halving = 0; halving < max_cone_halvings; ++halving, length *= 0.5) {
         ahead = f - length * step;
         const double there = evaluate(p, ahead);
-        if (there < (1.0 - 2.0 * enough * length) * merit) {
+        if (there < (1.0 - 2.0 * cone_newton_decrease * length) * merit) {
             f = ahead;
             merit = there;
             return true;
@@ -166,7 +167,7 @@ double ConeNewton::solve(const ConeProblem& p, Eigen::Ref<VecX> f, int most_step
     blind_ = 0;
     int stalled = 0;
     regular_ = false;
-    for (int it = 0; it < most_steps && last > rounding; ++it, ++steps_) {
+    for (int it = 0; it < most_steps && last > cone_newton_tolerance; ++it, ++steps_) {
         if (changes_piece(p, f) || it == 0) {
             differentiate(p, f);
             solver_.factor(J);
@@ -179,7 +180,7 @@ double ConeNewton::solve(const ConeProblem& p, Eigen::Ref<VecX> f, int most_step
             least = now;
             best = f;
         }
-        if (least < nearly && now > 0.25 * last && ++stalled > most_stalled) break;
+        if (least < cone_newton_stall_tolerance && now > 0.25 * last && ++stalled > most_stalled) break;
         last = now;
     }
     f = best;

@@ -11,25 +11,25 @@ namespace {
 
 using ConeKind = ConeElement::Kind;
 
-constexpr double solved = 1e-11;     // error of a solution
-constexpr double no_force = 1e10;    // larger forces, in the problem's units, only squeeze
-constexpr double held = 1e-7;        // velocity of rest at the end of the central path, relative to the largest w0
-constexpr double still = 1e-12;      // velocity of rest of a solution, relative to its terms
-constexpr double noise = 1e-14;      // rounding relative to the largest velocity
-constexpr double evened = 1e-13;     // error of a minimum-norm solution
+constexpr double cone_tolerance = 1e-11;  // error of a solution
+constexpr double no_force = 1e10;  // larger forces, in the problem's units, only squeeze
+constexpr double held = 1e-7;  // velocity of rest at the end of the central path, relative to the largest w0
+constexpr double still = 1e-12;  // velocity of rest of a solution, relative to its terms
+constexpr double cone_velocity_rounding = 1e-14;  // rounding relative to the largest velocity
+constexpr double evened = 1e-13;  // error of a minimum-norm solution
 constexpr int few_steps = 3, first_steps = 20, more_steps = 30;
-constexpr int most_turns = 30, most_rounds = 40, sweeps = 40, most_starts = 100;
+constexpr int max_cone_alternations = 30, most_rounds = 40, sweeps = 40, most_starts = 100;
 constexpr int few_turns = 10, most_stretches = 60;
 constexpr double relaxation = 0.7;
 // Compliance of elements relative to their own response. It halves from the first value to the last.
-constexpr double first_compliance = 1e-2, least_compliance = 1e-9;
+constexpr double first_cone_compliance = 1e-2, min_cone_compliance = 1e-9;
 constexpr int most_approaches = 40;
 constexpr double softer = 0.1;  // ratio of successive compliances, if only the limit is needed
 // Residual below which the search ends if residuals are accepted, and ratio of successive residuals that counts as
 // stagnation. If the residual stagnates while elements stiffen, no forces change it. Elements that share a load, such
 // as the corners of a turning foot, then have contradicting velocities.
 constexpr double unchangeable = 1e-9, lasts = 0.9;
-constexpr double first_stretch = 0.1, least_stretch = 1e-5;  // parts of the way from no friction to full friction
+constexpr double first_friction_part = 0.1, min_friction_part = 1e-5;  // parts of the way from no friction to full friction
 
 }  // namespace
 
@@ -99,7 +99,7 @@ bool ConeComplementarity::stands_still(const Eigen::Ref<const VecX>& f) {
             speed = std::max(speed, std::abs(w[i]));
             terms = std::max(terms, std::abs(problem_.w0()[i]) + problem_.W().row(i).cwiseAbs().dot(f.cwiseAbs()));
         }
-        return speed <= still * terms + noise * all;
+        return speed <= still * terms + cone_velocity_rounding * all;
     };
     for (int e = 0; e < problem_.size(); ++e) {
         const int begin = problem_.at[e], end = begin + problem_.elements[e].dim;
@@ -114,7 +114,7 @@ bool ConeComplementarity::polish(Eigen::Ref<VecX> f, int most_steps) {
     auto there = f_.vector(problem_.n);
     there = f;
     error_ = newton_.solve(problem_, there, most_steps);
-    if (!(error_ <= solved) || there.cwiseAbs().maxCoeff() > no_force) return false;
+    if (!(error_ <= cone_tolerance) || there.cwiseAbs().maxCoeff() > no_force) return false;
     f = there;
     return true;
 }
@@ -138,23 +138,23 @@ bool ConeComplementarity::approach(Eigen::Ref<VecX> f) {
     grown_ = problem_;
     auto last = x_.vector(problem_.n), nearest = nearest_.vector(problem_.n);
     last.setZero();
-    double compliance = first_compliance, before = HUGE_VAL;
+    double compliance = first_cone_compliance, before = HUGE_VAL;
     for (int turn = 0; turn < most_approaches && !(least_miss_ <= unchangeable); ++turn) {
         grown_.W() = problem_.W();
         grown_.W().diagonal().array() += compliance;
         grown_.w0() = problem_.w0() - compliance * last;
         f = last;
         double error = newton_.solve(grown_, f, more_steps);
-        if (!(error <= solved)) {
+        if (!(error <= cone_tolerance)) {
             f.setZero();
             error = newton_.solve(grown_, f, more_steps);
         }
-        if (!(error <= solved)) {
+        if (!(error <= cone_tolerance)) {
             path_.follow(grown_, f, ConePath::Slip::follows);
             if (f.allFinite()) error = newton_.solve(grown_, f, more_steps);
         }
-        compliance = std::max(least_compliance, 0.5 * compliance);
-        if (!(error <= solved) || f.cwiseAbs().maxCoeff() > no_force) continue;
+        compliance = std::max(min_cone_compliance, 0.5 * compliance);
+        if (!(error <= cone_tolerance) || f.cwiseAbs().maxCoeff() > no_force) continue;
         last = f;
         if (polish(f, few_steps)) return true;
         error = newton_.error(problem_, f);
@@ -172,12 +172,12 @@ bool ConeComplementarity::stiffen(Eigen::Ref<VecX> f) {
     grown_ = problem_;
     auto there = x_.vector(problem_.n);
     there.setZero();
-    for (double compliance = first_compliance; compliance >= least_compliance; compliance *= softer) {
+    for (double compliance = first_cone_compliance; compliance >= min_cone_compliance; compliance *= softer) {
         grown_.W() = problem_.W();
         grown_.W().diagonal().array() += compliance;
-        if (newton_.solve(grown_, there, more_steps) <= solved) continue;
+        if (newton_.solve(grown_, there, more_steps) <= cone_tolerance) continue;
         path_.follow(grown_, there, ConePath::Slip::follows);
-        if (!there.allFinite() || !(newton_.solve(grown_, there, more_steps) <= solved)) return false;
+        if (!there.allFinite() || !(newton_.solve(grown_, there, more_steps) <= cone_tolerance)) return false;
     }
     const double error = error_;
     f_.vector(problem_.n) = there;
@@ -214,7 +214,7 @@ void ConeComplementarity::tidy(Eigen::Ref<VecX> f) const {
 // dynamique non régulière", 2009).
 bool ConeComplementarity::take_turns(Eigen::Ref<VecX> f) {
     f.setZero();
-    for (int turn = 0; turn < most_turns; ++turn) {
+    for (int turn = 0; turn < max_cone_alternations; ++turn) {
         path_.follow(problem_, f, ConePath::Slip::stands);
         if (!f.allFinite()) f.setZero();
         if (polish(f, more_steps)) return true;
@@ -251,23 +251,23 @@ bool ConeComplementarity::relax(Eigen::Ref<VecX> f) {
 // Continuation from zero friction, where the problem is convex, to full friction.
 bool ConeComplementarity::grow_friction(Eigen::Ref<VecX> f) {
     grown_ = problem_;
-    double reached = 0.0, stretch = first_stretch;
+    double reached = 0.0, stretch = first_friction_part;
     auto there = x_.vector(problem_.n);
     f.setZero();
-    for (int tried = 0; tried < most_stretches && stretch > least_stretch; ++tried) {
+    for (int tried = 0; tried < most_stretches && stretch > min_friction_part; ++tried) {
         const double next = std::min(1.0, reached + stretch);
         for (int e = 0; e < problem_.size(); ++e) grown_.elements[e].bound = next * problem_.elements[e].bound;
         there = f;
         double error = newton_.solve(grown_, there, more_steps);
-        for (int turn = 0; turn < few_turns && !(error <= solved); ++turn) {
+        for (int turn = 0; turn < few_turns && !(error <= cone_tolerance); ++turn) {
             path_.follow(grown_, there, turn == 0 ? ConePath::Slip::follows : ConePath::Slip::stands);
             if (!there.allFinite()) break;
             auto end = f_.vector(problem_.n);
             end = there;
             error = newton_.solve(grown_, end, more_steps);
-            if (error <= solved) there = end;
+            if (error <= cone_tolerance) there = end;
         }
-        if (!(error <= solved)) {
+        if (!(error <= cone_tolerance)) {
             stretch *= 0.3;
             continue;
         }

@@ -10,6 +10,9 @@
 
 namespace pn {
 
+// Maximum steps of Newton's method for a solution of the equation.
+constexpr int max_fixed_point_newton = 30;
+
 struct ReactionEquation {
     VecX constant;             // c
     std::vector<int> element;  // element of each vector

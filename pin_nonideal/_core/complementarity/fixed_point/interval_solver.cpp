@@ -8,18 +8,18 @@ namespace pn {
 
 namespace {
 
-constexpr int most_halved = 3;            // bisected unknowns
-constexpr double most_work = 20000.0;     // parts of the box, weighted by the size of the matrices
-constexpr double contracting = 0.9;       // largest growth of the unknowns that follow
-constexpr double least_part = 1e-7;       // smallest part of the box (its square is rounding, where two solutions merge)
-constexpr double alone = 0.9;             // size to which Newton's interval form must shrink a part, relative to it
-constexpr double margin = 1e-9;           // relative enlargement of a part and its bounds
-constexpr double rounding = 1e-13;        // residual relative to its terms
-constexpr double same_root = 1e-9;        // relative distance of equal solutions
+constexpr int most_halved = 3;  // bisected unknowns
+constexpr double most_work = 20000.0;  // parts of the box, weighted by the size of the matrices
+constexpr double max_followed_growth = 0.9;  // largest growth of the unknowns that follow
+constexpr double min_box_part = 1e-7;  // smallest part of the box (its square is rounding, where two solutions merge)
+constexpr double alone = 0.9;  // size to which Newton's interval form must shrink a part, relative to it
+constexpr double margin = 1e-9;  // relative enlargement of a part and its bounds
+constexpr double interval_residual_tolerance = 1e-13;  // residual relative to its terms
+constexpr double same_root = 1e-9;  // relative distance of equal solutions
 constexpr double least_determinant = 1e-8;  // smaller determinants count as zero
-constexpr double at_infinity = 1e-9;      // s below which a solution counts as infinite
-constexpr double far = 100.0;               // start of Newton's method beyond the bends of g
-constexpr int follow_passes = 1000, newton_passes = 30;
+constexpr double infinite_solution_scale = 1e-9;  // s below which a solution counts as infinite
+constexpr double far_newton_start = 100.0;  // start of Newton's method beyond the bends of g
+constexpr int follow_passes = 1000;
 
 struct Part {
     int fixed;  // coordinate that is one, while the others run from zero to one
@@ -86,7 +86,7 @@ Search::Search(const ReactionEquation& given) : eq_(given), n_(given.size()) {
 // contracts best.
 void Search::divide() {
     for (int i = 0; i < n_; ++i) following_.push_back(i);
-    while (!following_.empty() && growth(among(L_, following_, following_)) > contracting) {
+    while (!following_.empty() && growth(among(L_, following_, following_)) > max_followed_growth) {
         size_t best = 0;
         double least = HUGE_VAL;
         for (size_t i = 0; i < following_.size(); ++i) {
@@ -114,7 +114,7 @@ bool Search::follow(VecX& z, double s) const {
         eq_.image(trial, s, g);
         for (int i = 0; i < m; ++i) residual[i] = g[following_[i]] - trial[following_[i]];
         const double error = residual.cwiseAbs().maxCoeff();
-        if (error > before * contracting) {  // Newton's step failed, but the image itself contracts
+        if (error > before * max_followed_growth) {  // Newton's step failed, but the image itself contracts
             eq_.image(z, s, g);
             for (int i : following_) z[i] = g[i];
             trial = z;
@@ -122,7 +122,7 @@ bool Search::follow(VecX& z, double s) const {
             continue;
         }
         z = trial;
-        if (error <= rounding * terms(z, s)) return true;
+        if (error <= interval_residual_tolerance * terms(z, s)) return true;
         before = error;
         eq_.slope(z, s, J);
         const VecX step = solve(MatX::Identity(m, m) - among(J, following_, following_), residual);
@@ -175,10 +175,10 @@ bool Search::polish(int column, VecX& z, double& s) const {
     VecX g(n_);
     MatX A, D;
     const VecX none = VecX::Zero(n_);
-    for (int pass = 0; pass < newton_passes; ++pass) {
+    for (int pass = 0; pass < max_fixed_point_newton; ++pass) {
         eq_.image(z, s, g);
         const VecX residual = g - z;
-        if (residual.cwiseAbs().maxCoeff() <= rounding * terms(z, s)) return true;
+        if (residual.cwiseAbs().maxCoeff() <= interval_residual_tolerance * terms(z, s)) return true;
         interval_slope(z, s, none, 0.0, column, A, D);
         VecX step = solve(A, residual);
         if (!step.allFinite()) return false;
@@ -192,7 +192,7 @@ bool Search::polish(int column, VecX& z, double& s) const {
 }
 
 void Search::keep(const VecX& z, double s) {
-    if (s < at_infinity) {
+    if (s < infinite_solution_scale) {
         found_.at_edge = true;
         return;
     }
@@ -230,7 +230,7 @@ bool Search::settled(const Part& part) {
     MatX A, D;
     interval_slope(z, s, r, r_s, column(part), A, D);
     if (column(part) >= 0) r[column(part)] = r_s;
-    r.array() = r.array() * (1.0 + margin) + rounding * terms(z, s);
+    r.array() = r.array() * (1.0 + margin) + interval_residual_tolerance * terms(z, s);
     const VecX residual = g - z;
     if (((residual.cwiseAbs() - (A.cwiseAbs() + D) * r).array() > 0.0).any()) return true;
     const MatX inverse = pn::inverse(A);
@@ -241,7 +241,7 @@ bool Search::settled(const Part& part) {
     if (!polish(column(part), z, s)) return false;
     for (int i = 0; i <= halved(); ++i) {
         const double at = i < halved() ? z[halved_[i]] : s;
-        if (std::abs(at - part.center[i]) > part.half[i] * (1.0 + margin) + margin * least_part) return false;
+        if (std::abs(at - part.center[i]) > part.half[i] * (1.0 + margin) + margin * min_box_part) return false;
     }
     keep(z, s);
     return true;
@@ -269,20 +269,20 @@ ReactionRoots Search::run() {
         const Part part = parts_.back();
         parts_.pop_back();
         if (settled(part)) continue;
-        if (*std::max_element(part.half.begin(), part.half.begin() + halved() + 1) > least_part) split(part);
+        if (*std::max_element(part.half.begin(), part.half.begin() + halved() + 1) > min_box_part) split(part);
         else found_.at_edge = true;
     }
     if (!found_.complete) {
         newton_from(VecX::Zero(n_));
         newton_from(VecX::Ones(n_));
-        for (int i = 0; i < n_; ++i) newton_from(VecX::Ones(n_) + far * VecX::Unit(n_, i));
+        for (int i = 0; i < n_; ++i) newton_from(VecX::Ones(n_) + far_newton_start * VecX::Unit(n_, i));
     }
     return std::move(found_);
 }
 
 void Search::newton_from(VecX z) {
     double s = 1.0;
-    if (polish(-1, z, s) && (z.array() >= -rounding).all()) keep(z, s);
+    if (polish(-1, z, s) && (z.array() >= -interval_residual_tolerance).all()) keep(z, s);
 }
 
 }  // namespace

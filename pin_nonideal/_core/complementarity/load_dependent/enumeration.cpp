@@ -12,20 +12,20 @@ namespace pn {
 
 namespace {
 
-constexpr int room = most_searched + 1;  // forces, and tau
-using Point = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, room, 1>;
-using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, room, room>;
-using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, room>;  // rows of one element or vector
+constexpr int max_unknowns = most_searched + 1;  // forces, and tau
+using Point = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, max_unknowns, 1>;
+using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, max_unknowns, max_unknowns>;
+using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, max_unknowns>;  // rows of one element or vector
 using Short = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1>;
 using Turned = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 3>;
 
-constexpr double inflated = 1.05;      // boxes overlap, so that no solution lies on a border
-constexpr double least_box = 1e-9;     // smaller boxes stay undecided
-constexpr double rounding = 1e-14;     // rounding in a box, added to its radius
-constexpr double at_infinity = 1e-9;   // tau of a solution at infinity
-constexpr double same_motion = 1e-7;   // relative difference below which forces are equal
-constexpr double shrinks = 0.8;        // reduction of a box's widest side that justifies another pass
-constexpr double least_pivot = 1e-10;  // pivot of W relative to its diagonal
+constexpr double inflated = 1.05;               // boxes overlap, so that no solution lies on a border
+constexpr double least_box = 1e-9;              // smaller boxes stay undecided
+constexpr double box_radius_rounding = 1e-14;   // rounding in a box, added to its radius
+constexpr double infinite_solution_tau = 1e-9;  // tau of a solution at infinity
+constexpr double same_motion = 1e-7;            // relative difference below which forces are equal
+constexpr double shrinks = 0.8;                 // reduction of a box's widest side that justifies another pass
+constexpr double least_pivot = 1e-10;           // pivot of W relative to its diagonal
 constexpr int most_undecided = 100, most_boxes = 20000;
 
 // Interval of a value: middle and radius.
@@ -213,8 +213,8 @@ struct Search {
 
     // Store the solution near the middle of a box, if it is a motion.
     void take(Point x) {
-        if (x[n] < -at_infinity) return;
-        if (x[n] <= at_infinity) {
+        if (x[n] < -infinite_solution_tau) return;
+        if (x[n] <= infinite_solution_tau) {
             ++undecided;
             return;
         }
@@ -225,7 +225,8 @@ struct Search {
 
     // Krawczyk's test. Returns true if the box is done. Otherwise the box may have shrunk.
     bool decide(Box& box) {
-        const Point radius = (inflated * box.radius).array() + rounding * (box.radius.array() > 0.0).cast<double>();
+        const Point radius =
+            (inflated * box.radius).array() + box_radius_rounding * (box.radius.array() > 0.0).cast<double>();
         Square J(n, n), J_radius(n, n);
         Point lack(n);
         for (const Element& e : elements) {

@@ -10,15 +10,14 @@ namespace pn {
 
 namespace {
 
-constexpr double difference = 1e-7;      // difference relative to the forces: square root of the rounding, with a margin
-constexpr double least_size = 1e-300;    // scale of forces that are all zero
-constexpr double safe_pivot = 1e-8;      // pivot of the Cholesky factor of W, relative to its diagonal
+constexpr double force_difference_step = 1e-7;  // relative to the forces: square root of the rounding, with a margin
+constexpr double min_response_pivot = 1e-8;  // pivot of the Cholesky factor of W, relative to its diagonal
 constexpr double null_response = 1e-13;  // eigenvalues of W below this part of the largest count as zero
-constexpr double unmoved = 1e-9;         // part of the loads that forces without motion may change
+constexpr double unmoved = 1e-9;  // part of the loads that forces without motion may change
 
-constexpr double limit_rounding = 1e-9;  // relative excess of a sticking force over its limit
-constexpr double far = 1e9;              // unbounded forces, relative to those of limits and accelerations
-constexpr int most_signs = 6;            // elements with all combinations of slip signs
+constexpr double sticking_limit_rounding = 1e-9;  // relative excess of a sticking force over its limit
+constexpr double unbounded_force = 1e9;           // unbounded forces, relative to those of limits and accelerations
+constexpr int most_signs = 6;                     // elements with all combinations of slip signs
 
 auto part(const VecX& x, const RestElement& e) { return x.segment(e.row, e.dim); }
 
@@ -28,7 +27,7 @@ bool energy_factor(const RestEquation& equation, MatX& G, MatX& loads) {
     Cholesky cholesky;
     if (cholesky.compute(W)) {
         G = cholesky.factor().triangularView<Eigen::Lower>();
-        if ((G.diagonal().array().square() > safe_pivot * W.diagonal().array()).all()) {
+        if ((G.diagonal().array().square() > min_response_pivot * W.diagonal().array()).all()) {
             loads = cholesky.solve_lower(equation.loads.transpose()).transpose();
             return true;
         }
@@ -83,7 +82,8 @@ void RestEquation::differentiate(const VecX& x, MatX& dalpha, MatX& dlimits, Mat
         VecX alpha, alpha_there(n), shifted = x;
         FrictionLimits limits, limits_there;
         respond(x, alpha, limits);
-        const double h = difference * std::max({x.cwiseAbs().maxCoeff(), limits.size.cwiseAbs().maxCoeff(), least_size});
+        const double h =
+            force_difference_step * std::max({x.cwiseAbs().maxCoeff(), limits.size.cwiseAbs().maxCoeff(), min_scale});
         for (int k = 0; k < n; ++k) {
             shifted[k] = x[k] + h;
             respond(shifted, alpha_there, limits_there);
@@ -129,7 +129,7 @@ VecX RestEquation::residual(const VecX& x) const {
 
 double RestEquation::force_in_play(size_t i, const VecX& x, const FrictionLimits& limits) const {
     const RestElement& e = elements[i];
-    return std::max({limits[i], part(x, e).norm(), e.rho * part(alpha0, e).norm(), least_size});
+    return std::max({limits[i], part(x, e).norm(), e.rho * part(alpha0, e).norm(), min_scale});
 }
 
 double RestEquation::error(const VecX& x) const {
@@ -196,7 +196,8 @@ std::vector<bool> RestEquation::sticks(const VecX& x) const {
     for (size_t i = 0; i < elements.size(); ++i) {
         const RestElement& e = elements[i];
         out.push_back(e.may_stick &&
-                      (part(from_middle, e) - e.rho * part(alpha, e)).norm() <= limits[i] * (1.0 + limit_rounding));
+                      (part(from_middle, e) - e.rho * part(alpha, e)).norm() <=
+                       limits[i] * (1.0 + sticking_limit_rounding));
     }
     return out;
 }
@@ -221,7 +222,7 @@ double RestEquation::determinant_far_away() const {
         for (int i = 0; i < count; ++i) {
             const RestElement& e = elements[i];
             const double size = limits[i] + e.rho * part(alpha, e).norm(), sign = signs >> i & 1 ? 1.0 : -1.0;
-            x.segment(e.row, e.dim) = far * (e.may_stick ? VecX(sign * size * VecX::Unit(e.dim, 0))
+            x.segment(e.row, e.dim) = unbounded_force * (e.may_stick ? VecX(sign * size * VecX::Unit(e.dim, 0))
                                                          : VecX(-size * e.direction));
         }
         differentiate(x, dalpha, dlimits, dmiddle);

@@ -10,14 +10,14 @@ namespace pn {
 
 namespace {
 
-constexpr double solved = 1e-13;          // largest error of the equation, relative to each element's forces
-constexpr double rounding = 1e-10;        // the same if no step reduces the error
-constexpr double good_contraction = 0.5;  // error ratio of the alternation, above which Newton's method takes over
-constexpr double within = 1e-13;          // excess of a sticking force over its limit, relative to the largest force
-constexpr double least_gain = 1e-3;       // required relative decrease of the residual by a step
-constexpr int most_turns = 40, most_newton = 40, most_halvings = 12;
-constexpr double enough = 1e-4;           // required part of the predicted decrease
-constexpr double first_stretch = 0.25, least_stretch = 1e-4;  // steps of the continuation parameter
+constexpr double load_equation_tolerance = 1e-13;  // largest error of the equation, relative to each element's forces
+constexpr double load_equation_stall_tolerance = 1e-10;  // the same if no step reduces the error
+constexpr double max_alternation_ratio = 0.5;  // error ratio of the alternation, above which Newton's method takes over
+constexpr double within = 1e-13;  // excess of a sticking force over its limit, relative to the largest force
+constexpr double min_residual_gain = 1e-3;  // required relative decrease of the residual by a step
+constexpr int max_alternations = 40, max_load_newton = 40, max_load_halvings = 12;
+constexpr double load_newton_decrease = 1e-4;  // required part of the predicted decrease
+constexpr double first_continuation_step = 0.25, min_continuation_step = 1e-4;  // steps of the continuation parameter
 
 // Alternation of limits and forces. For given limits the forces are a convex program.
 struct Turns {
@@ -68,11 +68,11 @@ struct Turns {
 
     bool iterate(VecX& x) {
         double last = HUGE_VAL;
-        for (int it = 0; it < most_turns; ++it) {
+        for (int it = 0; it < max_alternations; ++it) {
             x = next(x);
             const double error = equation.error(x);
-            if (error <= solved) return true;
-            if (!(error < HUGE_VAL) || (it > 2 && error > good_contraction * last)) return false;
+            if (error <= load_equation_tolerance) return true;
+            if (!(error < HUGE_VAL) || (it > 2 && error > max_alternation_ratio * last)) return false;
             last = error;
         }
         return false;
@@ -83,7 +83,7 @@ VecX newton_step(const RestEquation& equation, const VecX& x, const VecX& lack) 
     const MatX J = equation.jacobian(x);
     LU lu;
     lu.compute(J);
-    if (!(lu.reciprocal_condition() > rank_threshold)) return least_squares(J, lack, rank_threshold);
+    if (!(lu.reciprocal_condition() > response_rank_threshold)) return least_squares(J, lack, response_rank_threshold);
     VecX step;
     lu.solve(lack, step);
     return step;
@@ -95,7 +95,7 @@ bool follow_path(const RestEquation& equation, VecX& x) {
     equation.respond(x, alpha, partly.fixed);
     partly.frozen = 1.0;
     if (!Turns(partly).iterate(x)) return false;
-    double stretch = first_stretch;
+    double stretch = first_continuation_step;
     while (partly.frozen > 0.0) {
         VecX ahead = x;
         const double before = partly.frozen;
@@ -107,7 +107,7 @@ bool follow_path(const RestEquation& equation, VecX& x) {
         }
         partly.frozen = before;
         stretch *= 0.25;
-        if (stretch < least_stretch) return false;
+        if (stretch < min_continuation_step) return false;
     }
     return true;
 }
@@ -128,7 +128,7 @@ void lack_of_rest(const RestEquation& equation, const VecX& x, VecX& lack, MatX&
     const VecX from_middle = x - limits.middle;
     const MatX slope = MatX::Identity(equation.n, equation.n) - dmiddle;
     const int n = equation.n, count = static_cast<int>(equation.elements.size());
-    const double no_limit = solved * largest_force_in_play(equation, x, limits);
+    const double no_limit = load_equation_tolerance * largest_force_in_play(equation, x, limits);
     lack.setZero(2 * n);
     J.setZero(2 * n, n);
     for (int i = 0; i < count; ++i) {
@@ -159,19 +159,19 @@ bool hold_at_rest(const RestEquation& equation, VecX& x) {
     VecX lack, there, ahead;
     MatX J, J_there;
     lack_of_rest(equation, x, lack, J);
-    for (int it = 0; it < most_newton; ++it) {
+    for (int it = 0; it < max_load_newton; ++it) {
         VecX alpha;
         FrictionLimits limits;
         equation.respond(x, alpha, limits);
         if (lack.cwiseAbs().maxCoeff() <= within * largest_force_in_play(equation, x, limits)) return true;
-        const VecX step = least_squares(J, lack, rank_threshold);
+        const VecX step = least_squares(J, lack, response_rank_threshold);
         const double now = lack.norm();
         double length = 1.0;
         bool gains = false;
-        for (int halving = 0; halving < most_halvings && !gains; ++halving, length *= 0.5) {
+        for (int halving = 0; halving < max_load_halvings && !gains; ++halving, length *= 0.5) {
             ahead = x - length * step;
             lack_of_rest(equation, ahead, there, J_there);
-            gains = there.norm() < (1.0 - least_gain * length) * now;
+            gains = there.norm() < (1.0 - min_residual_gain * length) * now;
         }
         if (!gains) return false;
         x = ahead;
@@ -183,20 +183,20 @@ bool hold_at_rest(const RestEquation& equation, VecX& x) {
 
 bool refine_rest(const RestEquation& equation, VecX& x) {
     double error = equation.error(x);
-    for (int it = 0; it < most_newton && error > solved; ++it) {
+    for (int it = 0; it < max_load_newton && error > load_equation_tolerance; ++it) {
         const VecX step = newton_step(equation, x, equation.residual(x));
         double length = 1.0, there = HUGE_VAL;
         VecX ahead;
-        for (int halving = 0; halving < most_halvings; ++halving, length *= 0.5) {
+        for (int halving = 0; halving < max_load_halvings; ++halving, length *= 0.5) {
             ahead = x - length * step;
             there = equation.error(ahead);
-            if (there < (1.0 - enough * length) * error) break;
+            if (there < (1.0 - load_newton_decrease * length) * error) break;
         }
         if (!(there < error)) break;
         x = ahead;
         error = there;
     }
-    return error <= rounding;
+    return error <= load_equation_stall_tolerance;
 }
 
 VecX onset_accelerations(const RestEquation& equation, const VecX& x) {
@@ -218,7 +218,7 @@ bool solve_rest(const RestEquation& equation, VecX& x) {
     if (!found) found = follow_path(equation, x = guess);
     if (!found) return false;
     const VecX at_limits = Turns(equation).next(x);  // slipping forces are exactly at their limits
-    if (equation.error(at_limits) <= solved + equation.error(x)) x = at_limits;
+    if (equation.error(at_limits) <= load_equation_tolerance + equation.error(x)) x = at_limits;
     return true;
 }
 

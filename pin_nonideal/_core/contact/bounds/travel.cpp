@@ -10,7 +10,7 @@ namespace {
 // Safety factor of the travel, for the moves of projections.
 constexpr double way_factor = 2.0;
 // Sliding joints get a margin before levers are recomputed: this fraction of the distance, plus this many steps.
-constexpr double room_ahead = 0.5, steps_ahead = 4.0;
+constexpr double room_ahead = 0.5, travel_steps_ahead = 4.0;
 // Factor that makes a floating-point sum an upper bound.
 constexpr double rounded_up = 1.0 + 0x1p-51;
 // Factor that makes a floating-point sum over all joints an upper bound.
@@ -129,7 +129,7 @@ void WayBound::set_levers(const Terms& terms, Ways& ways) const {
         const Body &own = terms.body[i], &before = terms.body[parent];
         double apart = (own.ref + own.p - before.ref - before.p).norm();
         if (slides(moved->kind)) {
-            const double room = room_ahead * apart + steps_ahead * (ways.slid_step[i] + ways.turned_step[i]);
+            const double room = room_ahead * apart + travel_steps_ahead * (ways.slid_step[i] + ways.turned_step[i]);
             ways.slid_until[i] = ways.joint[i] + room;
             apart += room;
         }

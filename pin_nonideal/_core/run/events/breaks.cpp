@@ -16,7 +16,7 @@ namespace pn {
 namespace {
 
 // Maximum change of a continuous rate, relative to 1 + the largest velocity.
-constexpr double rate_rounding = 1e-11;
+constexpr double break_rate_rounding = 1e-11;
 // Thresholds that start the search for a jump. `unexplained`: change of the rate beyond the integral of the
 // accelerations, relative to the rate. `uneven`: change of the acceleration, relative to the acceleration.
 constexpr double unexplained = 1e-4, uneven = 0.2;
@@ -106,7 +106,7 @@ bool Breaks::pass() {
     enter();
     const std::vector<double> after = rates(now_.t);
     system_.read(now_.y);
-    const double allowed = rate_rounding * (1.0 + system_.v.cwiseAbs().maxCoeff());
+    const double allowed = break_rate_rounding * (1.0 + system_.v.cwiseAbs().maxCoeff());
     bool jumps = false;
     for (size_t i = 0; i < motions_.size(); ++i) jumps |= std::abs(after[i] - before[i]) > allowed;
     if (jumps) {
@@ -152,7 +152,7 @@ void Breaks::jump(const std::vector<double>& before, const std::vector<double>& 
 
 void Breaks::tell(const std::vector<double>& before, const std::vector<double>& after, const VecX& v_minus,
                   const VecX& impulse) {
-    const double allowed = rate_rounding * (1.0 + v_minus.cwiseAbs().maxCoeff());
+    const double allowed = break_rate_rounding * (1.0 + v_minus.cwiseAbs().maxCoeff());
     for (size_t i = 0; i < motions_.size(); ++i) {
         if (!(std::abs(after[i] - before[i]) > allowed)) continue;
         const Block& block = p.blocks[motions_[i].block];

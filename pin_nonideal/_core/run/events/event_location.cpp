@@ -16,7 +16,7 @@ namespace pn {
 
 namespace {
 
-using EventKind = FoundEvent::Kind;
+using FoundKind = FoundEvent::Kind;
 
 // Speed below which slip in several directions has come to rest in fixed steps, relative to 1 + the largest velocity.
 // Fixed steps do not locate this rest.
@@ -34,7 +34,7 @@ constexpr int correction_passes = 12;
 // Maximum number of earlier gaps that replace a crossing. The repeated step differs slightly from its interpolant, so
 // gaps that close almost together can change their order.
 constexpr int most_closed_before = 4;
-constexpr double time_rounding = 2e-16, corrected_width = 1e-13;
+constexpr double event_time_rounding = 2e-16, event_end_tolerance = 1e-13;
 // Maximum move of the step's end along the rate there, relative to the step. Longer moves repeat the step. A move
 // neglects half of its square times the change of the rate per step. A flight can be a millionth of the tried step, and
 // a move over all of it would neglect the fall.
@@ -138,7 +138,7 @@ void EventLocator::correct_instant(const Crossing& crossing, double full) {
     const Watch& watch = crossing.watch;
     const bool of_gap = watch.kind == Watch::Kind::gap;
     const bool known_rate = of_gap || (watch.kind == Watch::Kind::slip && p.frictions[watch.index].dim == 1);
-    const double resolution = time_rounding * std::max(std::abs(stepper_.t0), full);
+    const double resolution = event_time_rounding * std::max(std::abs(stepper_.t0), full);
     double rate = crossing.slope / full;
     // Bracket of the instant. Without a bracket Newton's method could run to the step's end, past other events. Two
     // cases cause this: the motion differs from the interpolant, or other contacts hold the gap, so that its rate is
@@ -153,7 +153,7 @@ void EventLocator::correct_instant(const Crossing& crossing, double full) {
         double next = size - here / rate;
         if (!(next >= low && next <= high)) next = 0.5 * (low + high);
         const double change = next - size, before = here;
-        if (std::abs(change) <= resolution || (it > 0 && std::abs(change) < corrected_width * full)) return;
+        if (std::abs(change) <= resolution || (it > 0 && std::abs(change) < event_end_tolerance * full)) return;
         correct_end_to(next);
         size = next;
         here = margin_at_end(watch);
@@ -171,11 +171,11 @@ bool EventLocator::passes_by_rest(int e) const {
 }
 
 std::optional<FoundEvent> EventLocator::locate() {
-    const auto found = [&](EventKind kind, int index) {
+    const auto found = [&](FoundKind kind, int index) {
         return FoundEvent{kind, index, stepper_.t0 + stepper_.h};
     };
     for (auto e = w.now.slipping.rbegin(); e != w.now.slipping.rend(); ++e)
-        if (has_arrived(*e)) return found(EventKind::rest_or_limit, *e);
+        if (has_arrived(*e)) return found(FoundKind::rest_or_limit, *e);
     time_to_rest_.reset();
     std::optional<Crossing> crossing = search_.first();
     if (crossing) step_onto(*crossing);
@@ -190,10 +190,10 @@ std::optional<FoundEvent> EventLocator::locate() {
     const Watch& watch = crossing->watch;
     const bool reverses = watch.kind == Watch::Kind::slip && passes_by_rest(watch.index);
     if (const auto released = release_together()) return released;  // which may be earlier
-    if (watch.kind == Watch::Kind::gap) return found(EventKind::touch, watch.index);
-    if (watch.kind == Watch::Kind::load) return found(EventKind::lift, watch.index);
-    if (watch.kind == Watch::Kind::contact) return found(EventKind::pull, watch.index);
-    return found(reverses ? EventKind::reversal : EventKind::rest_or_limit, watch.index);
+    if (watch.kind == Watch::Kind::gap) return found(FoundKind::touch, watch.index);
+    if (watch.kind == Watch::Kind::load) return found(FoundKind::lift, watch.index);
+    if (watch.kind == Watch::Kind::contact) return found(FoundKind::pull, watch.index);
+    return found(reverses ? FoundKind::reversal : FoundKind::rest_or_limit, watch.index);
 }
 
 // Return the acceleration with which sticking elements begin to slip at a state of the step. Return nothing if forces
@@ -219,7 +219,7 @@ std::optional<double> EventLocator::release_rate(double t, const VecX& y, const 
         if (is_paradox) paradox = failure;
         rate = HUGE_VAL;
     }
-    const double noise = no_acceleration * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
+    const double noise = relative_acceleration_rounding * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
     set_modes(p, w, modes);
     w.state.slip_direction = directions;
     w.state.last_direction = last_directions;
@@ -258,7 +258,7 @@ std::optional<FoundEvent> EventLocator::lift_together() {
         if (const auto released = release_together()) return released;  // the release is earlier
     }
     end_step_at(high);
-    return FoundEvent{EventKind::lift, -1, stepper_.t0 + stepper_.h};
+    return FoundEvent{FoundKind::lift, -1, stepper_.t0 + stepper_.h};
 }
 
 // Return the part of the step at which its interpolant releases the sticking elements. `rate`: their slip acceleration
@@ -327,7 +327,7 @@ std::optional<FoundEvent> EventLocator::release_together() {
         end_step_at(std::min(part + later, 1.0) * full);
         if (release_rate_at_end(modes, asked) || part + later >= 1.0) break;
     }
-    return FoundEvent{EventKind::released_together, asked.at_rest.front(), stepper_.t0 + stepper_.h};
+    return FoundEvent{FoundKind::released_together, asked.at_rest.front(), stepper_.t0 + stepper_.h};
 }
 
 }  // namespace pn

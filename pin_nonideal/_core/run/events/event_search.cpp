@@ -19,7 +19,7 @@ namespace {
 // --- Candidates for a crossing. Speeds [rad/s or m/s] are relative to 1 + the largest speed of the scene.
 // Rounding tolerances relative to a friction limit: for a constant force, and for the force / limit ratio at the
 // stages.
-constexpr double limit_rounding = 1e-12, share_rounding = 1e-9;
+constexpr double release_limit_rounding = 1e-12, share_rounding = 1e-9;
 // Safety margins of the force / limit ratio between the stages. The first is a factor on the rise of a parabola above
 // three stages, the second a fraction of the ratio's range.
 constexpr double times_parabola = 3.0, range_between = 0.02;
@@ -31,15 +31,13 @@ constexpr double dip_part = 0.02;
 
 // --- The interpolant
 constexpr int location_grid = 24;  // grid intervals of a step at which a margin is sampled first
-constexpr double apart = 1.0 / location_grid;
-constexpr double beyond = 2.0;     // part of the step that means no crossing
+constexpr double location_spacing = 1.0 / location_grid;
 // A parabola through three points falls below the middle one by at most 1/8 of its second difference. Dips up to twice
 // that depth are searched.
 constexpr double parabola_part = 0.25;
 // `leap_part`: negative margin that counts as a jump, relative to the margin at the step's start. `leap_digits`:
 // relative time difference that separates two instants.
 constexpr double leap_part = 1e-3, leap_digits = 1e-15;
-constexpr double slope_part = 1e-4;  // step of the difference for the rate of a margin, relative to the step
 // Error of a force / limit ratio that comes from an interpolant of low order, relative to its change.
 constexpr double doubted_part = 1e-2;
 // Maximum evaluations that confirm an interpolated crossing, and tolerance of the correction relative to the step. The
@@ -68,7 +66,7 @@ double EventSearch::margin(const Watch& watch, double t, const VecX& y) {
     if (watch.kind == Watch::Kind::slip) return slip_along_mode(p, w, watch.index) + allowance(watch.index);
     system_.read(y);
     const HoldingForce held = holding_force(p, w, watch.index, t, system_.q, system_.v);
-    return held.limit * (1.0 + limit_rounding) - held.force.norm();
+    return held.limit * (1.0 + release_limit_rounding) - held.force.norm();
 }
 
 // --- Candidates for a crossing ---------------------------------------------------------------------------------------
@@ -98,7 +96,7 @@ bool EventSearch::may_reach_limit(int e) {
         rise = std::max({rise, rise_between(t0, share(k - 2), t1, share(k - 1), t2, share(k)),
                          rise_between(t0, -share(k - 2), t1, -share(k - 1), t2, -share(k))});
     }
-    return std::max(most, -least) + times_parabola * rise + range_between * range > 1.0 + limit_rounding;
+    return std::max(most, -least) + times_parabola * rise + range_between * range > 1.0 + release_limit_rounding;
 }
 
 // Check if a slipping element has reversed at the step's end, or may have done so inside.
@@ -244,7 +242,7 @@ double EventSearch::margin_inside(const Watch& watch, Source source, double part
     if (source == Source::shares && !of_element)
         return stepper_.interpolated_rate(part, system_.ns + 2 * system_.ne + watch.index);
     if (source == Source::shares) {
-        return 1.0 + limit_rounding - doubt_ - std::abs(interpolated_share(watch.index, part));
+        return 1.0 + release_limit_rounding - doubt_ - std::abs(interpolated_share(watch.index, part));
     }
     if (source == Source::velocities) {
         const int first = system_.nq + p.blocks[f->block].dof;
@@ -271,7 +269,7 @@ bool EventSearch::slows_down(int e, double rest) const {
 }
 
 // Return the part of the step at which a margin first falls below zero, searched on a grid and between its points.
-// Return `beyond` if it does not.
+// Return `no_crossing` if it does not.
 double EventSearch::first_crossing(const Watch& watch, Source source) {
     const auto margin_at = [&](double part) { return margin_inside(watch, source, part); };
     double g[location_grid + 1];
@@ -281,24 +279,24 @@ double EventSearch::first_crossing(const Watch& watch, Source source) {
     const double rest = slips ? rest_speed * (1.0 + speed) : 0.0;
     bool begins = g[0] <= rest;
     for (int k = 1; k <= location_grid; ++k) {
-        g[k] = margin_at(k * apart);
+        g[k] = margin_at(k * location_spacing);
         if (begins && g[k] < 0.0) {
             // Slip in several directions that has just begun may first turn. It has come to rest again only if it rose
             // before. Slip that decreases from the start came to rest at the end of the last step.
             const bool turns = slips && p.frictions[watch.index].dim > 1 && !slows_down(watch.index, rest);
-            const double part = k > 1 ? 0.0 : root_after_start(apart, g[1], turns ? rest : 0.0, margin_at);
+            const double part = k > 1 ? 0.0 : root_after_start(location_spacing, g[1], turns ? rest : 0.0, margin_at);
             if (part > 0.0 || !turns) return part;
             continue;
         }
         begins = false;
-        if (g[k] < 0.0) return root_between((k - 1) * apart, g[k - 1], k * apart, g[k], margin_at);
+        if (g[k] < 0.0) return root_between((k - 1) * location_spacing, g[k - 1], k * location_spacing, g[k], margin_at);
         if (k == 1 || g[k - 1] > g[k - 2] || g[k - 1] > g[k]) continue;
         if (g[k - 1] > parabola_part * (g[k - 2] - 2.0 * g[k - 1] + g[k])) continue;
         double value = 0.0;
-        const double dip = dip_between((k - 2) * apart, k * apart, margin_at, value);
-        if (value < 0.0) return root_between((k - 2) * apart, g[k - 2], dip, value, margin_at);
+        const double dip = dip_between((k - 2) * location_spacing, k * location_spacing, margin_at, value);
+        if (value < 0.0) return root_between((k - 2) * location_spacing, g[k - 2], dip, value, margin_at);
     }
-    return beyond;
+    return no_crossing;
 }
 
 // Confirm a crossing by Newton's method on the interpolated motion, from the crossing of the interpolated rates. Return
@@ -330,15 +328,15 @@ std::optional<Crossing> EventSearch::behind_leap(const Watch& watch, Source from
 Crossing EventSearch::cross(const Watch& watch, Source from) {
     if (watch.kind == Watch::Kind::gap) {
         const auto touch = gaps_.first_touch(watch.index);
-        return touch ? Crossing{watch, touch->part, touch->slope} : Crossing{watch, beyond, 0.0};
+        return touch ? Crossing{watch, touch->part, touch->slope} : Crossing{watch, no_crossing, 0.0};
     }
     if (from == Source::shares && watch.kind == Watch::Kind::stick) doubt_ = share_error(watch.index);
     const double part = first_crossing(watch, from);
-    if (part == beyond) return {watch, part, 0.0};
+    if (part == no_crossing) return {watch, part, 0.0};
     if (watch.kind == Watch::Kind::load)
         if (const auto crossing = behind_leap(watch, from, part)) return *crossing;
-    const double before = std::max(0.0, part - slope_part), after = before + slope_part;
-    return {watch, part, (margin_inside(watch, from, after) - margin_inside(watch, from, before)) / slope_part};
+    const double before = std::max(0.0, part - margin_slope_step), after = before + margin_slope_step;
+    return {watch, part, (margin_inside(watch, from, after) - margin_inside(watch, from, before)) / margin_slope_step};
 }
 
 // Confirm a crossing of the interpolated rates on the interpolated motion.
@@ -367,7 +365,7 @@ std::optional<Crossing> EventSearch::first() {
         auto& [earliest, sure] = *std::min_element(list.begin(), list.end(), [](const auto& one, const auto& other) {
             return one.first.part < other.first.part;
         });
-        if (earliest.part == beyond) break;
+        if (earliest.part == no_crossing) break;
         if (sure) return earliest;
         earliest = confirmed(earliest);
         sure = true;

@@ -17,7 +17,7 @@ namespace {
 // Minimum slip speed [rad/s or m/s] that defines a slip direction.
 constexpr double directed_slip = 1e-12;
 // Rounding tolerance of the limit of a sticking element, relative to the limit.
-constexpr double limit_rounding = 1e-9;
+constexpr double held_limit_rounding = 1e-9;
 
 bool hardly_moves(const System& system, int e) {
     const double slip = slip_velocity(system.w.now, system.p.frictions[e]).norm();
@@ -55,7 +55,7 @@ bool shares_load(System& system, double t, const std::vector<int>& resting, int 
     if (!p.needs_reactions && !w.now.rows.redundant) return shares;
     for (int e : resting)
         shares |= w.state.mode[e] == sticking &&
-                  (e == held || !holding_force(p, w, e, t, system.q, system.v).is_within(limit_rounding));
+                  (e == held || !holding_force(p, w, e, t, system.q, system.v).is_within(held_limit_rounding));
     return shares;
 }
 

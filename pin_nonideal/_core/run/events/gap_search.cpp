@@ -18,7 +18,7 @@ constexpr double between_stages = 2.0;
 constexpr int most_looks = 4000;
 // Safety factor on the travel of bodies, for the moves of projections.
 constexpr double travel_factor = 2.0;
-constexpr double rate_rounding = 1e-12;  // rounding of the rate change of a gap with constant rate, relative to the rates
+constexpr double gap_rate_rounding = 1e-12;  // rounding of the change of a constant rate, relative to the rates
 
 }  // namespace
 
@@ -99,7 +99,7 @@ bool GapSearch::stays_open(int gap, const Look& a, const Look& b, double bound) 
     }
     if (has_lowest_point(p, gap)) return stays_above(a.width, b.width, 0.5 * bound * length * length, least);
     const double change = b.rate - a.rate + bound * length;  // negative: no valid bound
-    if (change <= 0.0) return change >= -rate_rounding * (std::abs(a.rate) + std::abs(b.rate));
+    if (change <= 0.0) return change >= -gap_rate_rounding * (std::abs(a.rate) + std::abs(b.rate));
     const double meet = (a.width - b.width + b.rate * length + 0.5 * bound * length * length) / change;
     if (!(meet > 0.0 && meet < length)) return true;
     return a.width + meet * (a.rate - 0.5 * bound * meet) > least;

@@ -12,7 +12,7 @@ namespace pn {
 constexpr double steps_of_far = 2.0;
 // Factors on the travel since a far gap's last sample, and on the travel in one step. The gap is monitored again if
 // their sum can close it.
-constexpr double asked_again = 2.0, steps_ahead = 2.0;
+constexpr double asked_again = 2.0, watch_steps_ahead = 2.0;
 // Rounding of a difference of travels, relative to the travel so far.
 constexpr double way_rounding = 1e-15;
 // Minimum time [s] before a blocked gap is retried. Later it is retried after as long as it has been blocked.
@@ -103,7 +103,7 @@ void GapWatch::ask_far() {
             return gaps.width[i] > WayBound::change(pair, times * come + steps * ways.way_of_step(here, i),
                                                     times * turned + steps * here.turn_step[pair.second], gaps.apart[i]);
         };
-        if (is_open(asked_again, steps_ahead)) {
+        if (is_open(asked_again, watch_steps_ahead)) {
             gaps.ask = std::min(gaps.ask, here.scene + ways.least_way(pair, gaps.width[i] - come));
             continue;
         }
@@ -130,9 +130,9 @@ void GapWatch::step(const VecX& speed, double h) {
     unseen_.clear();
     Ways& here = gaps.ways;
     ways.step(w.now.terms, speed, h, here);
-    if (here.most + steps_ahead * here.most_step < gaps.ask) return;
+    if (here.most + watch_steps_ahead * here.most_step < gaps.ask) return;
     ways.sum_up(here);
-    if (!(here.scene + steps_ahead * here.scene_step < gaps.ask)) ask_far();
+    if (!(here.scene + watch_steps_ahead * here.scene_step < gaps.ask)) ask_far();
 }
 
 const std::vector<int>& GapWatch::follow(const VecX& speed, double h) {

@@ -22,7 +22,7 @@ constexpr double low_flight = 4e-12;
 // rest.
 constexpr int most_bounces = 10000;
 constexpr double hardly_shorter = 0.9;
-constexpr double never = std::numeric_limits<double>::infinity();
+constexpr double no_landing = std::numeric_limits<double>::infinity();
 
 struct Bouncing {
     System& system;
@@ -31,10 +31,10 @@ struct Bouncing {
     // Times until the first low gap lands, until the first other gap lands, and until a slip rests (infinite if none).
     // `leaves`: time until the last leaving gap is no longer low.
     struct Next {
-        double low = never, high = never, rest = never, leaves = 0.0;
+        double low = no_landing, high = no_landing, rest = no_landing, leaves = 0.0;
         int element = -1;  // element that comes to rest
         double time() const { return std::min(low, rest); }
-        bool stays_low() const { return (low < never || rest < leaves) && high > time(); }
+        bool stays_low() const { return (low < no_landing || rest < leaves) && high > time(); }
     };
     Next next(double t) const {
         const Program& p = system.p;
@@ -51,7 +51,7 @@ struct Bouncing {
             const double height = touches ? 0.0 : width;  // a touching gap lies on its plane up to rounding
             const double back = landing(height, rate, fall);
             const double most = height + (rise > 0.0 ? 0.5 * rise * rise / fall : 0.0);
-            const bool is_low = back < never && most <= lowest;
+            const bool is_low = back < no_landing && most <= lowest;
             double& first = is_low ? out.low : out.high;
             first = std::min(first, back);
             if (!is_low && height <= lowest) out.leaves = std::max(out.leaves, landing(lowest - height, -rate, -fall));
@@ -70,10 +70,10 @@ struct Bouncing {
     // does not.
     static double landing(double width, double rate, double fall) {
         const double square = rate * rate + 2.0 * fall * width;
-        if (!(square >= 0.0)) return never;
+        if (!(square >= 0.0)) return no_landing;
         const double root = std::sqrt(square);
         if (rate < 0.0) return 2.0 * width / (root - rate);
-        return fall > 0.0 ? (rate + root) / fall : never;
+        return fall > 0.0 ? (rate + root) / fall : no_landing;
     }
 };
 

@@ -12,10 +12,9 @@ namespace pn {
 namespace {
 
 constexpr int looks = 5;      // samples of each step
-constexpr double beyond = 2.0;
 constexpr int corrections = 12;
-// Relative to the step: tolerance of the corrected end, and difference step for the slope of a value.
-constexpr double corrected_width = 1e-14, slope_part = 1e-4;
+// Tolerance of the corrected end, relative to the step.
+constexpr double value_end_tolerance = 1e-14;
 // Maximum time difference of a friction event and a user event that coincide, relative to the step.
 constexpr double same_part = 1e-12;
 // Shortest step up to an event, in floating-point spacings of the time.
@@ -87,7 +86,7 @@ double ValueEvents::first_crossing(int k) {
         }
         before = part;
     }
-    return beyond;
+    return no_crossing;
 }
 
 void ValueEvents::end_step_at(double size) {
@@ -100,14 +99,14 @@ void ValueEvents::end_step_at(double size) {
 void ValueEvents::step_onto(int k, double part) {
     const double full = stepper_.h, t0 = stepper_.t0;
     const double least = start_spacings * (std::nextafter(std::abs(t0), HUGE_VAL) - std::abs(t0));
-    const double low = std::max(0.0, part - slope_part), high = std::min(1.0, part + slope_part);
+    const double low = std::max(0.0, part - margin_slope_step), high = std::min(1.0, part + margin_slope_step);
     double slope = (value_inside(k, high) - value_inside(k, low)) / ((high - low) * full);
     double size = std::max(part * full, least);
     end_step_at(size);
     double here = value(k, t0 + size, stepper_.y1);
     for (int i = 0; i < corrections && here != 0.0 && slope != 0.0; ++i) {
         const double next = std::clamp(size - here / slope, least, full), change = next - size, before = here;
-        if (std::abs(change) <= corrected_width * full || t0 + next == t0 + size) break;
+        if (std::abs(change) <= value_end_tolerance * full || t0 + next == t0 + size) break;
         end_step_at(size = next);
         here = value(k, t0 + size, stepper_.y1);
         slope = (here - before) / change;
@@ -146,7 +145,7 @@ bool ValueEvents::locate(bool ends_at_event) {
     const std::vector<double> side = side_;
     asked_before_ = false;
     int first = -1;
-    double part = beyond;
+    double part = no_crossing;
     for (int k = 0; k < size(); ++k) {
         const double crossing = first_crossing(k);
         if (crossing >= part) continue;

@@ -8,16 +8,16 @@ namespace pn {
 namespace {
 
 // Speed [rad/s or m/s] from which every decade is recorded. Smaller speeds are ordinary.
-constexpr double least_speed = 1.0, decade = 10.0;
+constexpr double min_recorded_speed = 1.0, decade = 10.0;
 // Decades in each half of a growth. Exponential growth takes equal time for both halves. Under a constant force, or in
 // a motion polynomial in time, the second half takes much longer. It takes much less near a singular position, or under
 // a force that grows with a power of the speed. Such runs end by themselves as their steps shrink.
 constexpr size_t half = 3;
 constexpr double as_fast = 0.8, much_faster = 100.0;
-// A chaotic motion with a source of energy grows by a power of time. Its last decade takes at least `many_steps` steps.
+// A chaotic motion with a source of energy grows by a power of time. Its last decade takes at least `min_decade_steps`.
 // Each decade takes longer than the one before, on average less than `longer` times as long. Under a constant force a
 // decade takes ten times as long, and near a singular position it is shorter.
-constexpr long many_steps = 1000;
+constexpr long min_decade_steps = 1000;
 constexpr double longer = 5.0;
 // Maximum growth in one fixed step that counts. Faster growth comes from the method: the step is too long, and the
 // motion overflows.
@@ -33,7 +33,7 @@ GrowthGuard::GrowthGuard(System& system, Progress& progress, const Options& opti
 void GrowthGuard::look() {
     const double speed = progress_.y.segment(system_.nq, system_.nv).cwiseAbs().maxCoeff();
     std::vector<double>& speeds = progress_.growth_speeds;
-    const double next = speeds.empty() ? least_speed : decade * speeds.back();
+    const double next = speeds.empty() ? min_recorded_speed : decade * speeds.back();
     if (!(speed >= next)) return;
     speeds.push_back(speed);
     progress_.growth_times.push_back(progress_.t);
@@ -57,7 +57,7 @@ bool GrowthGuard::is_costly() const {
     const std::vector<double>& times = progress_.growth_times;
     const std::vector<long>& steps = progress_.growth_steps;
     const size_t last = times.size() - 1;
-    if (last < half + 2 || steps[last] - steps[last - 1] < many_steps) return false;
+    if (last < half + 2 || steps[last] - steps[last - 1] < min_decade_steps) return false;
     const double before = times[last - 2] - times[last - 3], now = times[last] - times[last - 1];
     return before < now && now < longer * longer * before;
 }

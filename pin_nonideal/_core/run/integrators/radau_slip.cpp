@@ -27,9 +27,9 @@ constexpr double farthest_turn = 1.5;     // largest turn of a direction in the 
 // Convergence, relative to the tolerance: sum of the remaining changes, or the first change alone.
 constexpr double solved_part = 0.05, solved_at_once = 0.005;
 constexpr double diverging = 0.9, diverging_first = 3.0;  // ratio of two changes at which the iteration stops
-constexpr double rounding_part = 0.5;     // relative to the tolerance: smaller changes that no longer shrink are rounding
-constexpr double perturbation = 1e-6;     // step of a direction for its response: above the root of the rounding
-constexpr double rank_threshold = 1e-5;   // relative: for turns that slip at rest leaves open, and slip at rest itself
+constexpr double rounding_part = 0.5;  // relative to the tolerance: smaller changes that no longer shrink are rounding
+constexpr double perturbation = 1e-6;  // step of a direction for its response: above the root of the rounding
+constexpr double slip_rank_threshold = 1e-5;  // relative: for turns that slip at rest leaves open, and slip at rest itself
 
 }  // namespace
 
@@ -174,7 +174,7 @@ void Collocation::solve_turns() {
         u_[i] += A_[i] * moved;
         residual_.segment(i * m, m) = T_[i].transpose() * u_[i];
         for (size_t at = 0; at < elements_.size(); ++at) {
-            at_rest |= std::abs(sigma_(at, i)) <= rank_threshold * fastest[at];
+            at_rest |= std::abs(sigma_(at, i)) <= slip_rank_threshold * fastest[at];
             for (int k = 0; k < elements_[at].dim - 1; ++k) {
                 const int row = i * m + elements_[at].tangent + k;
                 K_(row, row) -= sigma_(at, i);
@@ -188,7 +188,7 @@ void Collocation::solve_turns() {
         turn_ = -turn_;
         return;
     }
-    turn_ = -least_squares(K_, residual_, rank_threshold);
+    turn_ = -least_squares(K_, residual_, slip_rank_threshold);
 }
 
 // Turn the directions, and update the accelerations.
@@ -304,7 +304,7 @@ double Collocation::error() {
             K(row, row) -= std::max(0.0, speed[at]);
         }
     const VecX across = P_[0] * error_.segment(nq, nv);
-    error_.segment(nq, nv) -= part * (Q_[0] * least_squares(K, across, rank_threshold));
+    error_.segment(nq, nv) -= part * (Q_[0] * least_squares(K, across, slip_rank_threshold));
     norm_.set_tolerances(step_.y0, step_.y1, step_.h);
     return norm_(error_, step_.y0);
 }

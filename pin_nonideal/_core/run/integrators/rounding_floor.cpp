@@ -14,7 +14,7 @@ namespace {
 // Number of steps from which rounding is measured, and steps between two measurements (seven evaluations each). Noise
 // that demands ever shorter steps causes such runs. The measured value is a bound that most runs stay far below, so
 // shorter runs ignore it.
-constexpr long many_steps = 20000, apart = 64;
+constexpr long min_measured_steps = 20000, steps_between_measurements = 64;
 // Safety factor on a measurement, which is only a sample. Part of the previous value that bounds the next one from
 // below.
 constexpr double sample_factor = 3.0, lasting_part = 0.5;
@@ -75,8 +75,8 @@ void RoundingFloor::measure() {
 }
 
 void RoundingFloor::look() {
-    if (raised_ == 0.0 || stepper_.collocates() || out_.steps < std::max(many_steps, progress_.next_look)) return;
-    progress_.next_look = out_.steps + apart;
+    if (raised_ == 0.0 || stepper_.collocates() || out_.steps < std::max(min_measured_steps, progress_.next_look)) return;
+    progress_.next_look = out_.steps + steps_between_measurements;
     measure();
 }
 

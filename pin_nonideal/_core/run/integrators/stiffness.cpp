@@ -31,7 +31,7 @@ constexpr double shorter_step = 1e-9, same_rate = 0.5;
 
 // Step count at which the remaining time is first estimated, doubled each time. A run is slow if `long_time` seconds of
 // wall time are left. It vibrates if `many_radians` are left and a step covers more than `part_of_period` radians.
-constexpr long first_look_ahead = 500, never = 1L << 62;
+constexpr long first_look_ahead = 500, no_look_ahead = 1L << 62;
 constexpr double long_time = 3.0, many_radians = 2e4, part_of_period = 0.1;
 
 }  // namespace
@@ -45,7 +45,7 @@ StiffnessGuard::StiffnessGuard(System& system, Stepper& stepper, Progress& progr
 void StiffnessGuard::forget() {
     begun_ = Clock::now();
     steps_ = 0;
-    next_look_ahead_ = options_.hint && options_.max_steps == 0 ? first_look_ahead : never;
+    next_look_ahead_ = options_.hint && options_.max_steps == 0 ? first_look_ahead : no_look_ahead;
 }
 
 double StiffnessGuard::FastestMode::rate() const { return std::hypot(decay, frequency); }
@@ -151,7 +151,7 @@ void StiffnessGuard::look_ahead() {
         mode.decays() ? radians > near_border * stepper_.method.stability && left < most_steps_ * size
                       : radians > part_of_period && mode.rate() * left > many_radians;
     if (!follows) return;
-    next_look_ahead_ = never;
+    next_look_ahead_ = no_look_ahead;
     options_.hint(at, mode.dof, mode.rate(), mode.decays());
 }
 

@@ -14,8 +14,6 @@
 
 namespace pn {
 
-// Floor of a friction limit [N or N m], which keeps force / limit finite for elements without load.
-constexpr double least_limit = 1e-300;
 // Maximum force / limit ratio of a contact. A contact whose load jumps to zero has opened.
 constexpr double most_share = 10.0;
 
@@ -74,7 +72,7 @@ void System::watch(double t, VecX& dy) {
         } else if (w.state.mode[e] == sticking && !w.state.indeterminate) {
             const auto [force, limit] = holding_force(p, w, e, t, q, v);
             // The force along one direction keeps its sign: it is smooth through zero.
-            share = (p.frictions[e].dim == 1 ? force[0] : force.norm()) / std::max(limit, least_limit);
+            share = (p.frictions[e].dim == 1 ? force[0] : force.norm()) / std::max(limit, min_scale);
             if (p.frictions[e].gap >= 0) share = std::clamp(share, -most_share, most_share);
         }
     }

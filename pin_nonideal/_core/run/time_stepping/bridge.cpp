@@ -12,7 +12,7 @@ namespace pn {
 namespace {
 
 // Shortest remainder of a step that becomes a step of its own, relative to the step.
-constexpr double least_part = 1e-9;
+constexpr double min_remainder = 1e-9;
 // Shortest part of a step while edges approach each other, relative to the step.
 constexpr double least_cut = 1e-3;
 
@@ -44,7 +44,7 @@ TimeStepping::TimeStepping(System& system, Progress& progress, GapWatch& watch, 
 double TimeStepping::end_of_step(double size, double stop, double t_end) const {
     double end = now_.t + size;
     bool met = false;
-    const double rounding = least_part * size;
+    const double rounding = min_remainder * size;
     const auto meet = [&](double time) {
         if (!(time > now_.t + rounding) || !(time < end + rounding)) return;
         end = met && time > end - rounding ? std::max(end, time) : time;
@@ -77,7 +77,7 @@ bool TimeStepping::asks_for_motion(double end, double t_end) const {
 void TimeStepping::take_part(double end, double t_end, double least) {
     double& t = now_.t;
     const double left = end - t, h = std::max(moreau_contacts_.allowed(t, left, now_.y), least);
-    const bool whole = h >= (1.0 - least_part) * left;
+    const bool whole = h >= (1.0 - min_remainder) * left;
     moreau_contacts_.step(t, whole ? left : h, now_.y, now_.moved_energy, now_.impact_energy);
     t = whole ? end : t + h;
     const MoreauContacts::Relaxed& relaxed = moreau_contacts_.relaxed();
@@ -131,7 +131,7 @@ void TimeStepping::take(double end, double t_end) {
 }
 
 void TimeStepping::step(double size, double stop, double t_end) {
-    torques_.enter(now_.t + least_part * size);
+    torques_.enter(now_.t + min_remainder * size);
     torques_.sample();
     double& t = now_.t;
     VecX& y = now_.y;

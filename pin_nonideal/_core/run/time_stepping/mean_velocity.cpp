@@ -9,8 +9,8 @@ namespace pn {
 constexpr double configuration_rounding = 1e-13;
 // Change by a further sweep that is not worth it. The second sweep makes the step second order, and fast motion takes
 // more of them, which keep its energy.
-constexpr double close = 1e-9;
-constexpr int most_moves = 4;
+constexpr double configuration_tolerance = 1e-9;
+constexpr int max_sweeps = 4;
 
 void MeanVelocity::FreeFlyer::turn_axes(VecX& v, const Eigen::Vector3d& angle) const {
     const double size = angle.norm();
@@ -55,7 +55,8 @@ bool MeanVelocity::move() {
     next_ = 0.5 * (start_ + end_);
     double change = 0.0;
     for (int k = 0; k < next_.size(); ++k) change = std::max(change, std::abs(next_[k] - value_[k]));
-    if (moves_ == most_moves || h_ * change <= (moves_ == 0 ? configuration_rounding : close)) return false;
+    const double allowed = moves_ == 0 ? configuration_rounding : configuration_tolerance;
+    if (moves_ == max_sweeps || h_ * change <= allowed) return false;
     value_ = next_;
     ++moves_;
     measure();

@@ -18,10 +18,9 @@ namespace pn {
 
 namespace {
 
-constexpr int load_passes = 60;           // maximum passes for load-dependent limits
-constexpr double load_tolerance = 1e-13;  // change of limits that counts as rounding, relative to the largest limit
-constexpr double limit_rounding = 1e-12;  // distance of a force at its limit, relative to the limit
-constexpr double rest_rounding = 1e-9;    // slip at the end that counts as none, relative to that without friction
+constexpr double element_load_tolerance = 1e-13;  // change of limits that counts as rounding, relative to the largest limit
+constexpr double box_force_rounding = 1e-12;  // distance of a force at its limit, relative to the limit
+constexpr double slip_rest_rounding = 1e-9;    // slip at the end that counts as none, relative to that without friction
 
 // Return all elements of a scene without unilateral contacts, else none. MoreauContacts treats other scenes.
 std::vector<int> all_elements(const System& system) {
@@ -146,18 +145,18 @@ void Moreau::solve_friction(double t) {
     for (const Friction& friction : p.frictions)
         for (int k = 0; k < friction.dim; ++k) near_[at++] = w.state.percussion[p.blocks[friction.block].row + k];
     force_.setZero(problem_.rows);
-    for (int pass = 0; pass < load_passes; ++pass) {
+    for (int pass = 0; pass < max_load_passes; ++pass) {
         // Limits that depend on no load need no motion.
         if (pass == 0 || p.needs_reactions) apply_forces();
         const double change = update_limits(t);
         const double largest = system_.ne > 0 ? std::max(0.0, limit_.size.maxCoeff()) : 0.0;
-        if (pass > 0 && (change <= load_tolerance * largest || !p.needs_reactions)) return;
+        if (pass > 0 && (change <= element_load_tolerance * largest || !p.needs_reactions)) return;
         if (!even_) force_ = friction_program(problem_.W, problem_.alpha0, problem_.dims, limit_);
         else if (problem_.rows > 0 && boxes_) box_.solve(problem_.W, problem_.alpha0, limit_.size, &near_, force_);
         else force_ = friction_program(problem_.W, problem_.alpha0, problem_.dims, limit_.size, &near_);
         near_ = force_;
         force_limit_ = limit_;
-        if (pass + 1 == load_passes) throw Failure(Failure::Kind::not_converged, t, problem_.elements);
+        if (pass + 1 == max_load_passes) throw Failure(Failure::Kind::not_converged, t, problem_.elements);
     }
 }
 
@@ -169,7 +168,7 @@ void Moreau::end_velocity() {
     problem_.acceleration(p, w, force_, a_friction_);
     a_friction_ += a_free_;
     mean_.end(a_friction_, v1_);
-    const double still = rest_rate(v1_), rounding = rest_rounding * problem_.alpha0.lpNorm<Eigen::Infinity>();
+    const double still = rest_rate(v1_), rounding = slip_rest_rounding * problem_.alpha0.lpNorm<Eigen::Infinity>();
     for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e) {
         const int dim = problem_.dims[e];
         w.state.percussion.segment(p.blocks[p.frictions[e].block].row, dim) = force_.segment(at, dim);
@@ -177,7 +176,7 @@ void Moreau::end_velocity() {
         if (dim == 1) shifted_[0] -= force_limit_.middle[at];
         const double slip = alpha_.segment(at, dim).norm();
         const bool rests = h_ * slip <= still && slip <= rounding;
-        const bool held = shifted_.norm() < force_limit_[e] * (1.0 - limit_rounding) || rests;
+        const bool held = shifted_.norm() < force_limit_[e] * (1.0 - box_force_rounding) || rests;
         modes_[e] = held ? sticking : dim > 1 || alpha_[at] > 0.0 ? slip_plus : slip_minus;
         const Block& block = p.blocks[p.frictions[e].block];
         if (held && block.dof >= 0) v1_.segment(block.dof, block.total).setZero();

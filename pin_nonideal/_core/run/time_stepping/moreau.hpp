@@ -18,6 +18,9 @@
 
 namespace pn {
 
+// Maximum passes for load-dependent limits.
+constexpr int max_load_passes = 60;
+
 class Moreau {
 public:
     explicit Moreau(System& system);

@@ -22,14 +22,12 @@ namespace pn {
 
 namespace {
 
-constexpr int load_passes = 60;           // maximum passes for load-dependent limits
-constexpr double load_tolerance = 1e-12;  // change of limits that counts as rounding, relative to the largest limit
+constexpr double contact_load_tolerance = 1e-12;  // change of limits that counts as rounding, relative to the largest limit
 // Maximum ratio of two changes of limits from passes that converge. Slower limits follow force components that the
 // cones leave open, such as the direction of slow slip.
-constexpr double contracting = 0.5;
-constexpr double limit_rounding = 1e-9;   // distance of a force at its limit, relative to the limit
-constexpr double width_rounding = 1e-12;   // uncertainty of a gap at rest, relative to the scene's size
-constexpr double least_response = 1e-13;  // minimum response of a row under the constraints, relative to its free response
+constexpr double max_load_contraction = 0.5;
+constexpr double cone_force_rounding = 1e-9;  // distance of a force at its limit, relative to the limit
+constexpr double width_rounding = 1e-12;  // uncertainty of a gap at rest, relative to the scene's size
 // Accepted residual relative to the velocities. A step of a turning body can have no exact solution if corners share
 // its load. Also the accepted error of a limit, relative to the forces. The statistics report both.
 constexpr double most_miss = 1e-7;
@@ -318,7 +316,7 @@ void MoreauContacts::respond() {
     }
     if (scaled_) gram(response_, n, W_);
     for (int i = 0; i < n; ++i)
-        if (W_(i, i) <= least_response * free_response_[i]) W_(i, i) = 0.0;
+        if (W_(i, i) <= min_constrained_response * free_response_[i]) W_(i, i) = 0.0;
     for (int i = 0; i < n; ++i)
         for (int j = 0; j < i; ++j) {
             const bool held = W_(i, i) == 0.0 || W_(j, j) == 0.0;
@@ -393,8 +391,8 @@ bool MoreauContacts::limits_settle(double t) {
         cones_[e].bound = std::max(0.0, limit);
         parts_[e].middle = limits.middle();
     }
-    const bool settles = change <= load_tolerance * largest ||
-                         (change > contracting * last_change_ &&
+    const bool settles = change <= contact_load_tolerance * largest ||
+                         (change > max_load_contraction * last_change_ &&
                           change <= most_miss * f_.head(static_cast<int>(rows_.size())).cwiseAbs().maxCoeff());
     last_change_ = change;
     return settles;
@@ -456,7 +454,7 @@ bool MoreauContacts::moves() {
     const int n = static_cast<int>(rows_.size());
     measure_end();
     if (separate_) return !trees_.rests(v1_);
-    return w1_.head(n).cwiseAbs().maxCoeff() > limit_rounding * w0_.head(n).cwiseAbs().maxCoeff();
+    return w1_.head(n).cwiseAbs().maxCoeff() > cone_force_rounding * w0_.head(n).cwiseAbs().maxCoeff();
 }
 
 // Rest goes on if forces within all cones hold it. Returns whether they do, with these forces in place of others. The
@@ -465,7 +463,7 @@ bool MoreauContacts::keep_rest(bool solved) {
     const int n = static_cast<int>(rows_.size());
     const auto W = W_.topLeftCorner(n, n);
     const bool moves = (w1_.head(n) + W * f_.head(n)).cwiseAbs().maxCoeff() >
-                       limit_rounding * w1_.head(n).cwiseAbs().maxCoeff();
+                       cone_force_rounding * w1_.head(n).cwiseAbs().maxCoeff();
     return (!solved || moves) && solver_.hold(W, w1_.head(n), cones_, f_.head(n));
 }
 
@@ -476,7 +474,7 @@ void MoreauContacts::solve(double t) {
     for (int pass = 0; n > 0; ++pass) {
         if (loads || pass > 0) apply();
         if (limits_settle(t) && pass > 0) break;
-        if (pass == load_passes) throw Failure(Failure::Kind::not_converged, t);
+        if (pass == max_load_passes) throw Failure(Failure::Kind::not_converged, t);
         if (!solve_laws()) throw Failure(Failure::Kind::not_converged, t);
         ++w.counters.iterations;
     }
@@ -511,7 +509,7 @@ void MoreauContacts::end_velocity() {
         std::fill(modes_.begin(), modes_.end(), unloaded);
     }
     if (n == 0) return;
-    const double still = rest_rate(v1_), clear = limit_rounding * f_.head(n).cwiseAbs().maxCoeff();
+    const double still = rest_rate(v1_), clear = cone_force_rounding * f_.head(n).cwiseAbs().maxCoeff();
     w1_.head(n) *= h_;
     for (size_t e = 0, at = 0; e < parts_.size(); at += cones_[e].dim, ++e) {
         const Part& part = parts_[e];

@@ -4,9 +4,6 @@
 
 namespace pn {
 
-// Acceleration of a tree at rest that counts as rounding, relative to the accelerations that cancel in it.
-constexpr double canceled = 1e-9;
-
 SeparateTrees::SeparateTrees(const Program& p) : blocks_(p) {}
 
 // Check if the scene can be solved tree by tree now: no constraints act, and the inertia of every tree is a matrix.
@@ -81,7 +78,8 @@ bool SeparateTrees::rests(const VecX& a) {
     measure_balance();
     for (size_t n = 0; n < balanced_.size(); ++n) {
         const BlockNode& node = solver_.problem.nodes[n];
-        if (!(a.segment(node.first, node.size).cwiseAbs().maxCoeff() <= canceled * balanced_[n])) return false;
+        const double left = a.segment(node.first, node.size).cwiseAbs().maxCoeff();
+        if (!(left <= tree_acceleration_rounding * balanced_[n])) return false;
     }
     return true;
 }
@@ -91,8 +89,8 @@ void SeparateTrees::keep_rest(double h, const VecX& v0, VecX& v1) {
     for (size_t n = 0; n < balanced_.size(); ++n) {
         const BlockNode& node = solver_.problem.nodes[n];
         if ((v0.segment(node.first, node.size).array() != 0.0).any()) continue;
-        if (v1.segment(node.first, node.size).cwiseAbs().maxCoeff() <= canceled * h * balanced_[n])
-            v1.segment(node.first, node.size).setZero();
+        const double left = v1.segment(node.first, node.size).cwiseAbs().maxCoeff();
+        if (left <= tree_acceleration_rounding * h * balanced_[n]) v1.segment(node.first, node.size).setZero();
     }
 }
 
