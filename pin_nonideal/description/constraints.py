@@ -336,7 +336,7 @@ class Rolling:
 
 @dataclass(frozen=True)
 class UserConstraint:
-    """Any constraint A(q, v, t) a = b(q, v, t) as a Python function: Eq. (3).
+    """A constraint A(q, v, t) a = b(q, v, t) as a Python function: Eq. (3).
 
     Holonomic: residual is phi(q, t) and rate is A v + phi_t. Nonholonomic: no residual, and rate is the
     velocity constraint itself. d residual/dt = rate and d rate/dt = A a - b are checked once by differences.

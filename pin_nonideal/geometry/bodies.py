@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from pin_nonideal.errors import InputError, short_repr
-from pin_nonideal.types import GeometryModel, GeometryObject, Model, Placement
+from pin_nonideal.types import Array, GeometryModel, GeometryObject, Model, Placement
 from pin_nonideal.validation import array, positive, text
 
 __all__ = ["free_body", "placement", "shape_color"]
@@ -97,7 +95,7 @@ def placement(what: str, place: Placement | ArrayLike | None) -> Placement:
     return pin.SE3(np.eye(3), np.array(array(what, place, (3,))))
 
 
-def shape_color(what: str, color: ArrayLike | None) -> Any:
+def shape_color(what: str, color: ArrayLike | None) -> Array | None:
     """Return red, green, blue and opacity, (4,), or None.
 
     Args:
@@ -117,7 +115,7 @@ def shape_color(what: str, color: ArrayLike | None) -> Any:
     return np.array([*given, 1.0][:4])
 
 
-def _inertia(who: str, shape: Any, density: float | None, mass: float | None) -> Any:
+def _inertia(who: str, shape: object, density: float | None, mass: float | None) -> pin.Inertia:
     """Return the inertia of a homogeneous shape in its own axes, a pinocchio.Inertia.
 
     Raises:

@@ -209,7 +209,7 @@ def ground_contacts(
     ]
 
 
-def _check_models(who: str, model: Any, collision_model: Any) -> None:
+def _check_models(who: str, model: object, collision_model: object) -> None:
     for what, value, kind in (
         ("model", model, pin.Model),
         ("collision_model", collision_model, pin.GeometryModel),
@@ -218,7 +218,7 @@ def _check_models(who: str, model: Any, collision_model: Any) -> None:
             raise InputError(f"{who}: {what} must be a pinocchio.{kind.__name__}; got {short_repr(value)}")
 
 
-def _rubbing(who: str, mu: object, static_ratio: Any, restitution: object) -> dict[str, Any]:
+def _rubbing(who: str, mu: object, static_ratio: object, restitution: object) -> dict[str, Any]:
     """Return the checked coefficients of contacts by name."""
     return {
         "mu": nonnegative(f"{who}: mu", mu),
@@ -227,7 +227,9 @@ def _rubbing(who: str, mu: object, static_ratio: Any, restitution: object) -> di
     }
 
 
-def _shapes_of_links(who: str, links: Any, model: Model, objects: Sequence[Any]) -> dict[int, str]:
+def _shapes_of_links(
+    who: str, links: object, model: Model, objects: Sequence[GeometryObject]
+) -> dict[int, str]:
     """Return the names of links by the indices of their shapes.
 
     Raises:
@@ -250,7 +252,7 @@ def _shapes_of_links(who: str, links: Any, model: Model, objects: Sequence[Any])
     return found
 
 
-def _carriers(model: Model, item: Any) -> Iterator[str]:
+def _carriers(model: Model, item: GeometryObject) -> Iterator[str]:
     """Yield the names of the joint and of the link that carry a geometry object."""
     yield str(model.names[item.parentJoint])
     if item.parentFrame < model.nframes:

@@ -46,9 +46,9 @@ def example_robots() -> list[tuple[str, str]]:
     return [(name, kind.urdf_filename) for name, kind in kinds if not _is_sdf(kind)]
 
 
-def _is_sdf(kind: Any) -> bool:
+def _is_sdf(kind: type) -> bool:
     """Check if a robot of example-robot-data is an SDF file."""
-    return bool(kind.sdf_filename) and not kind.urdf_filename
+    return bool(getattr(kind, "sdf_filename", "")) and not getattr(kind, "urdf_filename", "")
 
 
 def example_robot(name: str, others: list[str]) -> RobotFile:

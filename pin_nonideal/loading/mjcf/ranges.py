@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -117,5 +117,5 @@ def read_ranges(tree: Tree, tendons: list[Tendon | None]) -> list[UserContact]:
     return contacts
 
 
-def _contact(bound: Any, name: str) -> UserContact:
+def _contact(bound: TendonBound | BallBound, name: str) -> UserContact:
     return UserContact(bound, bound.gap, bound.rate, name=name)

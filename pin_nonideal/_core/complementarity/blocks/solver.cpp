@@ -45,7 +45,7 @@ bool BlockSolver::attempt(int island, VecX& f) {
     return least_ <= accepted;
 }
 
-// Reduce a compliance of all elements to zero, from no forces. Each problem on the way has a solution compliance_path_tolerance to that of
+// Reduce a compliance of all elements to zero, from no forces. Each problem on the way has a solution close to that of
 // the last one, so the path ends at one solution of several.
 bool BlockSolver::stiffen(int island, VecX& f) {
     for (int i : islands_[island].elements) f.segment(problem.elements[i].row, problem.elements[i].dim()).setZero();
