@@ -177,7 +177,7 @@ def balls_in_box(count: int) -> ContactScene:
 
 
 def wall(rows: int, columns: int) -> ContactScene:
-    """Return a wall of bricks, each on two others."""
+    """Return a wall of bricks, each on two others; those at the open side of a row tip over."""
     size = (0.4, 0.2, 0.2)
     at: list[tuple[float, int]] = []
     bodies = []
@@ -192,4 +192,4 @@ def wall(rows: int, columns: int) -> ContactScene:
         for j, (other, below) in enumerate(at)
         if below == row - 1 and abs(x - other) < 0.9 * size[0]
     ]
-    return ContactScene(f"a wall of {rows * columns} bricks", bodies, pairs=pairs, rests=True)
+    return ContactScene(f"a wall of {rows * columns} bricks", bodies, pairs=pairs)

@@ -35,7 +35,7 @@ double BlockSolver::newton(int island, BlockNewton::Search search, double compli
     return newton_.solve(problem, islands_[island], factors_[island], search, compliance, f, x_, w_);
 }
 
-// Solve from forces that are compliance_path_tolerance to a solution, which f becomes. Return true if it is one.
+// Solve from forces that are close to a solution, which f becomes. Return true if it is one.
 bool BlockSolver::attempt(int island, VecX& f) {
     const double error = newton(island, BlockNewton::Search::patient, 0.0, f);
     if (error < least_) {
