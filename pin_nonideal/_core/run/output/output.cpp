@@ -59,9 +59,9 @@ void Output::end_step(bool asked) {
     now();
 }
 
-void Output::end_time_step() {
+void Output::end_time_step(double rounding) {
     const double t = progress_.t;
-    const bool on_grid = options_.output_dt > 0.0 && next() <= t + same_time(t);
+    const bool on_grid = options_.output_dt > 0.0 && next() <= t + std::max(rounding, same_time(t));
     progress_.samples += on_grid;
     if (options_.output_dt == 0.0 || on_grid || t >= options_.end()) now();
 }

@@ -21,8 +21,8 @@ public:
     void now();
     // Record a sample at the end of a step without mode changes, if one is due or `asked` is true.
     void end_step(bool asked);
-    // Record a sample at the end of a step of time stepping if one is due. The end may lie slightly off the grid.
-    void end_time_step();
+    // Record a sample at the end of a step of time stepping if one is due, up to the rounding of the end.
+    void end_time_step(double rounding);
     // Record samples of the grid inside the step just taken, and one at the time `between`.
     void inside_step(std::optional<double> between);
     // Record the interpolant of the step just taken, if dense output is on. A step of time stepping from another state

@@ -44,18 +44,17 @@ TimeStepping::TimeStepping(System& system, Progress& progress, GapWatch& watch, 
 double TimeStepping::end_of_step(double size, double stop, double t_end) const {
     double end = now_.t + size;
     bool met = false;
-    const double rounding = min_remainder * size;
     const auto meet = [&](double time) {
-        if (!(time > now_.t + rounding) || !(time < end + rounding)) return;
-        end = met && time > end - rounding ? std::max(end, time) : time;
+        if (!(time > now_.t + rounding_) || !(time < end + rounding_)) return;
+        end = met && time > end - rounding_ ? std::max(end, time) : time;
         met = true;
     };
-    const double jump = torques_.next_stop(now_.t + rounding, t_end);
+    const double jump = torques_.next_stop(now_.t + rounding_, t_end);
     meet(jump);
     meet(torques_.next_stop(jump, t_end));
     // A sample that differs by rounding is taken at the end of the step, which it does not change.
-    if (options_.output_dt > 0.0 && output_.next() < end - rounding) meet(output_.next());
-    if (stop < end + rounding) end = stop;
+    if (options_.output_dt > 0.0 && output_.next() < end - rounding_) meet(output_.next());
+    if (stop < end + rounding_) end = stop;
     return end;
 }
 
@@ -67,7 +66,8 @@ bool TimeStepping::rests() const {
 // Check if accelerations and forces are needed at the step's end: by a sample, by the end of the run, or by slip. Slip
 // needs them if its direction or limit depends on them.
 bool TimeStepping::asks_for_motion(double end, double t_end) const {
-    if (asked_always_ || end >= t_end || end >= options_.end() || output_.next() <= end + same_time(end)) return true;
+    if (asked_always_ || end >= t_end || end >= options_.end() || output_.next() <= end + rounding_)
+        return true;
     return system_.ng == 0 && std::any_of(w.now.slipping.begin(), w.now.slipping.end(), [&](int e) {
         return p.frictions[e].dim > 1 || p.frictions[e].reaction != Reaction::none;
     });
@@ -131,7 +131,8 @@ void TimeStepping::take(double end, double t_end) {
 }
 
 void TimeStepping::step(double size, double stop, double t_end) {
-    torques_.enter(now_.t + min_remainder * size);
+    rounding_ = std::max(min_remainder * size, same_time(now_.t));
+    torques_.enter(now_.t + rounding_);
     torques_.sample();
     double& t = now_.t;
     VecX& y = now_.y;
@@ -156,7 +157,7 @@ void TimeStepping::step(double size, double stop, double t_end) {
     value_events_.look_at_end(t, y);
     value_events_.tell(t, out_.events);
     if (!value_events_.found().empty()) output_.now();
-    output_.end_time_step();
+    output_.end_time_step(rounding_);
 }
 
 }  // namespace pn

@@ -42,6 +42,7 @@ private:
     const bool lasts_;     // a state that a step leaves unchanged stays unchanged
     bool relaxes_ = false;  // the last step missed the laws of contact
     bool stands_ = false;  // the last step left the state unchanged
+    double rounding_ = 0.0;  // difference of two times that are one end of a step
     const bool asked_always_;  // accelerations are needed at every step's end
     VecX y_from_;
     Modes before_, before_step_;
