@@ -146,3 +146,14 @@ def test_a_stack_at_rest_does_not_move():
     run = pn.simulate(scene, 1.0, q=q.ravel(), method="moreau", dt=DT, output_dt=0.1)
     assert np.abs(run.q - run.q[0]).max() < 1e-14
     assert not run.v.any()
+
+
+def test_samples_of_a_long_run_are_due_on_time():
+    """Sums of steps drift off the grid of samples by rounding, which no sample may wait for."""
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "slide")
+    model.appendBodyToJoint(joint, pin.Inertia.FromSphere(2.0, 0.1), pin.SE3.Identity())
+    run = pn.simulate(pn.Scene(model, v0=[1.0]), 100.0, method="moreau", dt=DT, output_dt=0.03)
+    grid = np.append(0.03 * np.arange(3334), 100.0)
+    assert len(run.t) == len(grid)
+    assert np.abs(run.t - grid).max() < 1e-10
