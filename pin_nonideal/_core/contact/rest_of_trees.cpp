@@ -9,6 +9,8 @@ namespace pn {
 
 // Error of the forces that counts as rounding.
 constexpr double tree_rest_tolerance = 1e-10;
+// Largest force, relative to the load of all trees. Larger forces only squeeze, and their rounding holds the load.
+constexpr double max_force_ratio = 1e4;
 
 bool rest_on_trees(const Program& p, Workspace& w, const std::vector<int>& gaps, const std::vector<int>& others,
                    const std::vector<ConeElement>& cones) {
@@ -30,12 +32,19 @@ bool rest_on_trees(const Program& p, Workspace& w, const std::vector<int>& gaps,
     if (!solver.pose()) return false;
     VecX f = solver.problem.offset;
     if (!(solver.solve(f) <= tree_rest_tolerance)) return false;
-    double rest = 0.0, moves = 0.0;
+    double rest = 0.0, moves = 0.0, weight = 0.0;
     for (const BlockNode& node : solver.problem.nodes) {
-        rest = std::max(rest, w.now.a.segment(node.first, node.size).cwiseAbs().maxCoeff());
+        const auto a = w.now.a.segment(node.first, node.size);
+        rest = std::max(rest, a.cwiseAbs().maxCoeff());
         moves = std::max(moves, solver.x().segment(node.first, node.size).cwiseAbs().maxCoeff());
+        const ConstBlockMap M(solver.problem.M.data() + node.M, node.size, node.size);
+        for (int i = 0; i < node.size; ++i) {
+            double sum = 0.0;
+            for (int k = 0; k < node.size; ++k) sum += M(i, k) * a[k];
+            weight += std::abs(sum);
+        }
     }
-    return moves <= tree_acceleration_rounding * rest;
+    return moves <= tree_acceleration_rounding * rest && f.cwiseAbs().maxCoeff() <= max_force_ratio * weight;
 }
 
 }  // namespace pn
