@@ -18,8 +18,6 @@ ROUNDING = 1e-8  # part of the weight: least squares of nearly dependent rows
 
 # The search for modes ends without a motion, although the cones allow one (docs/reference/limits.md).
 NO_MOTION = {(wedged.pile_of_balls, 132)}
-# Corners whose box `Scene.solve` holds at rest although no admissible forces do.
-FALSE_REST = {(wedged.box_in_corner, 964)}
 
 
 @pytest.fixture(autouse=True)
@@ -27,8 +25,6 @@ def _known(request):
     arguments = request.node.callspec.params
     if (arguments["family"], arguments["seed"]) in NO_MOTION:
         request.applymarker(pytest.mark.xfail(raises=pn.FrictionParadoxError, strict=True))
-    if (arguments["family"], arguments["seed"]) in FALSE_REST and request.function is test_solve:
-        request.applymarker(pytest.mark.xfail(raises=AssertionError, strict=True))
 
 
 families = pytest.mark.parametrize("family", wedged.FAMILIES, ids=lambda family: family.__name__)

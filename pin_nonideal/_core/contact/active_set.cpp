@@ -38,16 +38,9 @@ bool goes_its_way(const Program& p, Workspace& w, const VecX& v) {
         if (!slips(w.state.mode[e])) continue;
         const Friction& f = p.frictions[e];
         if (f.dim == 1 || f.gap < 0 || is_open(p, w, e) || !at_rest(p, w, e, v)) continue;
-        const Block& block = p.blocks[f.block];
-        multiply(block, w.now.A, w.now.a, w.scratch.r);
-        double size = 0.0, along = 0.0;
-        for (int k = 0; k < f.dim; ++k) {
-            const double begins = w.scratch.r[block.row + k] - w.now.b[block.row + k];
-            size += begins * begins;
-            along += begins * w.state.slip_direction[e][k];
-        }
-        size = std::sqrt(size);
-        if (size > least && along < (1.0 - astray) * size) return false;
+        const Vec3 begins = slip_acceleration(p, w, f);
+        const double size = begins.norm();
+        if (size > least && begins.dot(w.state.slip_direction[e]) < (1.0 - astray) * size) return false;
     }
     return true;
 }
@@ -86,11 +79,29 @@ struct Search {
             return std::nullopt;
         }
         if (aligned && !goes_its_way(p, w, v)) return std::nullopt;
+        if (together && together->slides() && all_stay()) return std::nullopt;
         Choice next = choice;
         int change = pulling_contact(p, w);
         if (change < 0) change = approaching(choice);
         if (change >= 0) next[change] = !next[change];
         return next;
+    }
+
+    // Check if no contact begins to move. A joint answer that slides shows that no forces within the cones hold all
+    // contacts, although the loads of a redundant set do not show it.
+    bool all_stay() {
+        for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
+            if (!rest[i]) continue;
+            evaluate_gap(p, w, t, v, i);
+            const double rounding = acceleration_rounding(p, w, i);
+            if (std::abs(gap_acceleration(p, w, i)) > rounding) return false;
+            const int e = p.gaps[i].sliding;
+            if (e < 0) continue;
+            if (!at_rest(p, w, e, v)) return false;
+            evaluate_block(p, w, t, v, p.frictions[e].block);
+            if (slip_acceleration(p, w, p.frictions[e]).norm() > rounding) return false;
+        }
+        return true;
     }
 
     // Return the open contact with the fastest relative approach acceleration, or -1.
@@ -197,33 +208,40 @@ void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, con
         w.state = before;
         return resting_motion(p, w, t, q, v, question);
     };
-    const auto close = [&](const Choice& start, const RestingMotion* answer) {
+    std::optional<RestingMotion> answer;
+    std::optional<Failure> failure;  // of the first active set without a motion
+    const auto seek = [&](const Choice& start, const RestingMotion* answer, bool aligned) {
         Choice first = start;
         if (question.opening >= 0) first[question.opening] = 0;
-        Search search{p, w, t, v, question.rest, find_modes, answer, true, {}, {}};
-        if (search.walk(first) || search.enumerate()) return;
-        search.aligned = false;
-        search.tried.clear();
-        if (search.walk(first) || search.enumerate()) return;
-        if (search.failure) throw *search.failure;
+        Search search{p, w, t, v, question.rest, find_modes, answer, aligned, {}, {}};
+        if (search.walk(first) || search.enumerate()) return true;
+        if (!failure) failure = search.failure;
+        return false;
+    };
+    const auto close = [&](const Choice& start, const RestingMotion* answer) {
+        if (seek(start, answer, true) || seek(start, answer, false)) return;
+        if (failure) throw *failure;
         throw Failure(Failure::Kind::not_converged, t);
     };
-    // Load shares of slipping contacts follow friction, unlike those of the cone problem.
-    const auto decides_alone = [&](RestingMotion near) {
-        near.is_near = true;
-        try {
-            close(near.closed, &near);
-            return true;
-        } catch (const Failure& failure) {
-            if (failure.kind != Failure::Kind::not_converged && failure.kind != Failure::Kind::paradox) throw;
-        }
+    const auto restart = [&] {
+        failure.reset();
         set_closed(p, w, before.closed);
         set_modes(p, w, before.mode);
         w.state = before;
+    };
+    // Load shares of slipping contacts follow friction, unlike those of the cone problem. If friction of unloaded
+    // contacts spoils the shares, the loaded contacts alone determine the motion.
+    const auto decides_alone = [&](RestingMotion near) {
+        near.is_near = true;
+        if (seek(near.closed, &near, true)) return true;
+        restart();
+        near.is_near = false;
+        near.closed = near.loaded;
+        if (near.loaded != answer->closed && seek(near.closed, &near, true)) return true;
+        restart();
         return false;
     };
     const bool many = std::count(question.rest.begin(), question.rest.end(), char(1)) >= may_share;
-    std::optional<RestingMotion> answer;
     if (many && question.breaking.empty()) {
         answer = together();
         if (answer && answer->closed == question.rest && !answer->slides()) return close(answer->closed, &*answer);

@@ -253,6 +253,7 @@ struct RestingProblem {
             if (i < rows.gaps.size()) {
                 const int gap = rows.gaps[i];
                 out.closed[gap] = a[first[i]] <= none * in_play();
+                out.loaded[gap] = out.closed[gap] && f[first[i]] > none * f.cwiseAbs().maxCoeff();
                 if (e < 0 || !out.closed[gap]) continue;
                 if (slides[i]) {
                     const Vec3 u = slip_velocity(w.now, p.frictions[e]);
@@ -337,11 +338,12 @@ bool with_problem(const Program& p, Workspace& w, double t, const VecX& q, const
 
 std::optional<RestingMotion> resting_motion(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
                                             const ClosingQuestion& question) {
-    RestingMotion out{std::vector<char>(p.gaps.size(), 0), std::vector<Mode>(p.frictions.size(), unloaded),
+    const std::vector<char> open(p.gaps.size(), 0);
+    RestingMotion out{open, open, std::vector<Mode>(p.frictions.size(), unloaded),
                       std::vector<Vec3>(p.frictions.size(), Vec3::Zero()), {}};
     out.friction = out.direction;
     const auto rest = [&](const std::vector<int>& others) {
-        out.closed = question.rest;
+        out.closed = out.loaded = question.rest;
         for (size_t i = 0; i < p.gaps.size(); ++i)
             if (question.rest[i] && p.gaps[i].sliding >= 0) out.modes[p.gaps[i].sliding] = sticking;
         for (int e : others) out.modes[e] = sticking;

@@ -59,8 +59,7 @@ double slip_along_mode(const Program& p, const Workspace& w, int e) {
     return f.dim == 1 ? w.state.mode[e] * u[0] : u.dot(w.state.slip_direction[e]);
 }
 
-// Slip accelerations of an element in the current motion.
-static Vec3 slip_acceleration(const Program& p, Workspace& w, const Friction& f) {
+Vec3 slip_acceleration(const Program& p, Workspace& w, const Friction& f) {
     const Block& block = p.blocks[f.block];
     Vec3 rate = Vec3::Zero();
     if (block.dof >= 0) {

@@ -13,6 +13,8 @@ constexpr double directed_speed = 1e-9;
 
 // Slip velocity along an element's directions, from the rows last evaluated.
 Vec3 slip_velocity(const Evaluation& now, const Friction& f);
+// Slip accelerations of an element in the current motion, along its directions.
+Vec3 slip_acceleration(const Program& p, Workspace& w, const Friction& f);
 // Slip speed along the direction of the element's mode, and its rate in the current motion.
 double slip_along_mode(const Program& p, const Workspace& w, int element);
 double slip_rate_along_mode(const Program& p, Workspace& w, int element);
