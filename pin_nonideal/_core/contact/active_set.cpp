@@ -208,7 +208,6 @@ void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, con
         w.state = before;
         return resting_motion(p, w, t, q, v, question);
     };
-    std::optional<RestingMotion> answer;
     std::optional<Failure> failure;  // of the first active set without a motion
     const auto seek = [&](const Choice& start, const RestingMotion* answer, bool aligned) {
         Choice first = start;
@@ -235,13 +234,15 @@ void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, con
         near.is_near = true;
         if (seek(near.closed, &near, true)) return true;
         restart();
+        if (near.loaded == near.closed) return false;
         near.is_near = false;
         near.closed = near.loaded;
-        if (near.loaded != answer->closed && seek(near.closed, &near, true)) return true;
+        if (seek(near.closed, &near, true)) return true;
         restart();
         return false;
     };
     const bool many = std::count(question.rest.begin(), question.rest.end(), char(1)) >= may_share;
+    std::optional<RestingMotion> answer;
     if (many && question.breaking.empty()) {
         answer = together();
         if (answer && answer->closed == question.rest && !answer->slides()) return close(answer->closed, &*answer);

@@ -66,6 +66,7 @@ Simulation::Simulation(const Program& program, Workspace& workspace, const Optio
 
 void Simulation::start(const VecX& q0, const VecX& v0) {
     t = options.t0;
+    stands = false;
     y.setZero();
     y.head(system.nq) = q0;
     y.segment(system.nq, system.nv) = v0;
@@ -79,8 +80,12 @@ void Simulation::start(const VecX& q0, const VecX& v0) {
         set_closed(p, w, std::vector<char>(p.gaps.size(), 0));
         landing.strike(true);
     }
-    switch_modes(system, t, y, rate, std::nullopt);
-    landing.remember_gaps();
+    if (options.method.scheme == Method::Scheme::moreau && system.ng > 0) {
+        time_stepping.begin(options.dt);
+    } else {
+        switch_modes(system, t, y, rate, std::nullopt);
+        landing.remember_gaps();
+    }
     output.now();
     notices.pulls(std::nullopt);
     notices.several(false);
@@ -96,7 +101,6 @@ void Simulation::start(const VecX& q0, const VecX& v0) {
 
 void Simulation::run() {
     const bool in_time = options.method.scheme == Method::Scheme::moreau;
-    time_stepping.forget();
     while (!done() && between_steps()) {
         if (in_time) {
             time_stepping.step(options.dt, t_end, t_end);

@@ -17,6 +17,7 @@ void SteppedRun::begin(const VecX& q0, const VecX& v0, double period, bool only)
 }
 
 void SteppedRun::advance(double period) {
+    stands = false;  // torques may have changed
     t_end = options.t0 + static_cast<double>(++periods_) * period;
     run();
 }

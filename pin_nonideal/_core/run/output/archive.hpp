@@ -2,6 +2,7 @@
 // buffer keeps its size, so bytes of another scene and damaged bytes are rejected.
 #pragma once
 
+#include <cstdint>
 #include <cstring>
 #include <stdexcept>
 #include <string>
@@ -15,7 +16,15 @@ namespace pn {
 class Archive {
 public:
     Archive() = default;  // writes
-    explicit Archive(const std::string& state) : bytes(state), reads(true) {}
+    // Reads what `seal` has completed.
+    explicit Archive(const std::string& state) : bytes(state), reads(true) {
+        std::uint64_t written;
+        require(bytes.size() >= sizeof written);
+        const size_t n = bytes.size() - sizeof written;
+        std::memcpy(&written, bytes.data() + n, sizeof written);
+        bytes.resize(n);
+        require(written == checksum());
+    }
 
     std::string bytes;
 
@@ -37,11 +46,22 @@ public:
         if (!fits) throw std::invalid_argument("the state does not fit the scene");
     }
     void end() const { require(at == bytes.size()); }
+    // Append the checksum, by which a reader rejects damaged bytes.
+    void seal() {
+        const std::uint64_t sum = checksum();
+        bytes.append(reinterpret_cast<const char*>(&sum), sizeof sum);
+    }
 
 private:
     bool reads = false;
     size_t at = 0;
 
+    // FNV-1a of all bytes.
+    std::uint64_t checksum() const {
+        std::uint64_t sum = 0xcbf29ce484222325;
+        for (unsigned char byte : bytes) sum = (sum ^ byte) * 0x100000001b3;
+        return sum;
+    }
     void raw(void* data, size_t n) {
         if (n == 0) return;
         if (!reads) {

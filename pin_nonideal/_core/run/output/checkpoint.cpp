@@ -46,10 +46,11 @@ static void fields(Archive& a, GapState& x) {
 static void fields(Archive& a, Progress& x) {
     auto& [t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, found_break, recent_events,
            last_changes, sides, bridged_time, bridged_end, slip_at_start, pulls, gaps, left, impact_energy, several,
-           stiff_steps, quiet_steps, rounding, next_look, growth_times, growth_speeds, growth_steps, turning_steps] = x;
+           stiff_steps, quiet_steps, rounding, next_look, growth_times, growth_speeds, growth_steps, stands,
+           evaluated, turning_steps] = x;
     a(t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, found_break, sides, bridged_time,
       bridged_end, slip_at_start, pulls, left, impact_energy, several, stiff_steps, quiet_steps, rounding, next_look,
-      turning_steps);
+      stands, evaluated, turning_steps);
     fields(a, gaps);
     a.list(recent_events);
     a.list(growth_times);
@@ -98,6 +99,7 @@ static void archive(Archive& a, Workspace& w, Progress& progress, Recording& out
 std::string to_bytes(Workspace& w, Progress& progress, Recording& out) {
     Archive a;
     archive(a, w, progress, out);
+    a.seal();
     return a.bytes;
 }
 
@@ -120,6 +122,10 @@ static void evaluate_anew(System& system, const Progress& progress) {
     system.read(progress.configured_y);
     configure(p, w, progress.configured_t, system.q, system.v);
     update_kinematics(p, w, progress.configured_t, system.q, system.v);
+    if (progress.stands && progress.evaluated) {  // the next step reads its motion
+        VecX rate = progress.rate;
+        system.evaluate_step_end(progress.t, progress.y, rate, true);
+    }
     w.state = state;
     w.counters = counters;
 }

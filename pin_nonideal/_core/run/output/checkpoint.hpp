@@ -36,6 +36,8 @@ struct Progress {
     // Decades of the largest speed: time, value and number of steps when it was reached.
     std::vector<double> growth_times, growth_speeds;
     std::vector<long> growth_steps;
+    // Time stepping: the last step left the state unchanged; accelerations and forces are those at its end.
+    bool stands = false, evaluated = false;
     int turning_steps = 0;  // consecutive stiff steps with turning slip, negative: not counted yet
 };
 

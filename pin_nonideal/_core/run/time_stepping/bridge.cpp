@@ -5,6 +5,7 @@
 
 #include "dynamics/acceleration.hpp"
 #include "dynamics/step_start.hpp"
+#include "friction/stick_slip.hpp"
 #include "run/events/events.hpp"
 
 namespace pn {
@@ -87,7 +88,7 @@ void TimeStepping::take_part(double end, double t_end, double least) {
     }
     relaxes_ = relaxed.block >= 0;
     const bool goes_through = options_.method.scheme == Method::Scheme::moreau;
-    const bool asks = whole && asks_for_motion(end, t_end);
+    const bool asks = now_.evaluated = whole && asks_for_motion(end, t_end);
     if (moreau_contacts_.project(t, now_.y, now_.moved_energy)) {
         if (asks) system_.evaluate_step_end(t, now_.y, now_.rate, goes_through);
         return;
@@ -96,13 +97,23 @@ void TimeStepping::take_part(double end, double t_end, double least) {
     now_.moved_energy += system_.moved_energy;
 }
 
-void TimeStepping::take(double end, double t_end) {
-    double& t = now_.t;
-    if (system_.ng > 0) {
-        const double least = least_cut * (end - t);
-        while (t < end) take_part(end, t_end, least);
-        return;
+// A step that starts and ends at rest with the same contacts and modes leaves the state unchanged.
+void TimeStepping::take_with_contacts(double end, double t_end) {
+    const double least = least_cut * (end - now_.t);
+    const bool may_stand = lasts_ && (system_.velocity(now_.y).array() == 0.0).all();
+    if (may_stand) {
+        y_from_ = now_.y;
+        before_step_ = w.state.mode;
+        closed_before_step_ = w.state.closed;
     }
+    while (now_.t < end) take_part(end, t_end, least);
+    now_.stands = may_stand && !relaxes_ && now_.y == y_from_ && same_bytes<Mode>(before_step_, w.state.mode) &&
+              same_bytes(closed_before_step_, w.state.closed);
+}
+
+void TimeStepping::take(double end, double t_end) {
+    if (system_.ng > 0) return take_with_contacts(end, t_end);
+    double& t = now_.t;
     VecX &y = now_.y, &y_from = y_from_;
     const bool rested = rests();
     Modes& before = before_step_;
@@ -127,7 +138,27 @@ void TimeStepping::take(double end, double t_end) {
     system_.read_law_states(y);
     begin_step(p, w, t, system_.q, system_.v);
     system_.rate_of_evaluation(t, y, now_.rate);
-    stands_ = y == y_from;
+    now_.evaluated = true;
+    now_.stands = y == y_from;
+}
+
+// Elements at rest have the modes of the end of a first step. It solves its laws at far less cost than accelerations.
+void TimeStepping::begin(double size) {
+    system_.read(now_.y);
+    std::vector<char> closed = system_.touching.at(p, w, now_.t, system_.q, system_.v, true).rest;
+    set_closed(p, w, closed);
+    moreau_contacts_.forget();
+    VecX y = now_.y;
+    double moved_energy = 0.0, impact_energy = 0.0;
+    moreau_contacts_.step(now_.t, size, y, moved_energy, impact_energy);
+    for (size_t i = 0; i < closed.size(); ++i) closed[i] = closed[i] && w.state.closed[i];
+    const std::vector<Mode> modes = w.state.mode;
+    set_closed(p, w, closed);
+    system_.read(now_.y);
+    ModeQuestion first = first_question(p, w, now_.t, system_.q, system_.v);
+    for (int e : first.at_rest) first.modes[e] = modes[e];
+    set_contacts(p, w, closed, first.modes);
+    system_.evaluate_step_end(now_.t, now_.y, now_.rate, options_.method.scheme == Method::Scheme::moreau);
 }
 
 void TimeStepping::step(double size, double stop, double t_end) {
@@ -144,7 +175,7 @@ void TimeStepping::step(double size, double stop, double t_end) {
         open_before_ = !watched;
     }
     const VecX y_from = options_.record.dense ? y : VecX();
-    if (!stands_) take(end, t_end);
+    if (!now_.stands || (!now_.evaluated && asks_for_motion(end, t_end))) take(end, t_end);
     t = end;
     ++out_.steps;
     output_.configured_now();

@@ -15,14 +15,15 @@ public:
     TimeStepping(System& system, Progress& progress, GapWatch& watch, const Options& options, Torques& torques,
                  Output& output, Notices& notices, ValueEvents& value_events, Recording& out);
 
+    // Set the closed contacts and the modes at the start of a run with unilateral contacts, and evaluate its motion.
+    void begin(double size);
     // Take one step of this size, not beyond `stop` or the end of the run.
     void step(double size, double stop, double t_end);
-    // Mark the state as changing, because torques may have changed since the last step.
-    void forget() { stands_ = false; }
 
 private:
     bool rests() const;
     void take(double end, double t_end);
+    void take_with_contacts(double end, double t_end);
     void take_part(double end, double t_end, double least);
     bool asks_for_motion(double end, double t_end) const;
     double end_of_step(double size, double stop, double t_end) const;
@@ -41,12 +42,11 @@ private:
     MoreauContacts moreau_contacts_;
     const bool lasts_;     // a state that a step leaves unchanged stays unchanged
     bool relaxes_ = false;  // the last step missed the laws of contact
-    bool stands_ = false;  // the last step left the state unchanged
     double rounding_ = 0.0;  // difference of two times that are one end of a step
     const bool asked_always_;  // accelerations are needed at every step's end
     VecX y_from_;
     Modes before_, before_step_;
-    std::vector<char> closed_before_;
+    std::vector<char> closed_before_, closed_before_step_;
     bool open_before_ = false;  // the stored modes have no closed contact and no active element
 };
 

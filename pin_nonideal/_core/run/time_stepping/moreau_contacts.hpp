@@ -22,6 +22,8 @@ class MoreauContacts {
 public:
     MoreauContacts(System& system, GapWatch& watch);
 
+    // Forget the gaps of earlier steps. The next step measures all of them.
+    void forget() { q_looked_.resize(0); }
     // Return the longest step from y at t, up to h. Approaching edges and rims may penetrate by half of their rounding.
     // If they already penetrate, the middle of the step may reach half of the remaining rounding. Deeper edges and rims
     // have no defined normal, and may pass through each other.
