@@ -286,7 +286,8 @@ def axis_triad(axis: Vector3) -> tuple[Vector3, Vector3, Vector3]:
     start[(int(np.argmax(np.abs(n))) + 1) % 3] = 1.0
     t1 = start - (start @ n) * n
     t1 /= math.sqrt(float(t1 @ t1))
-    t2 = np.cross(n, t1)
+    (x, y, z), (a, b, c) = _triple(n), _triple(t1)
+    t2 = np.array([y * c - z * b, z * a - x * c, x * b - y * a])  # n x t1
     return (_triple(t1), _triple(t2), _triple(n))
 
 

@@ -52,6 +52,8 @@ class Resolver:
     def __init__(self, model: Model, q0: Array) -> None:
         self.model, self.q0 = model, q0
         self._placements = joint_placements(model, q0)
+        self._frames: dict[str, Frame] = {}
+        self._segments: dict[tuple[object, ...], tuple[Frame, float]] = {}  # shared by many contacts of a shape
 
     def frame_id(self, name: str, who: str) -> int:
         """Return the index of a frame; a joint's name selects the frame of the joint."""
@@ -62,9 +64,11 @@ class Resolver:
 
     def frame(self, name: str, who: str) -> Frame:
         """Return a frame, or the frame of a joint, in the form of the core."""
-        if not self.model.existJointName(name):
-            self.frame_id(name, who)  # raises if there is no such frame
-        return placed_on(*frame_on_joint(self.model, name))
+        if name not in self._frames:
+            if not self.model.existJointName(name):
+                self.frame_id(name, who)  # raises if there is no such frame
+            self._frames[name] = placed_on(*frame_on_joint(self.model, name))
+        return self._frames[name]
 
     def plane(self, name: str | None, who: str) -> Frame:
         """Return the frame of a plane: the world frame if the name is None."""
@@ -129,9 +133,17 @@ class Resolver:
     def capsules(self, c: SphereContact | CapsuleContact, who: str) -> tuple[Frame, Frame, float, float]:
         """Return frames at the segment centers, z along the segments, and the half lengths [m]."""
         (first, half1), (second, half2) = (
-            along(frame, ends, who) for frame, ends in zip(self._two_bodies(c, who), segments(c), strict=True)
+            self._segment(frame, ends, who)
+            for frame, ends in zip(self._two_bodies(c, who), segments(c), strict=True)
         )
         return first, second, half1, half2
+
+    def _segment(self, frame: Frame, ends: Array, who: str) -> tuple[Frame, float]:
+        joint, R, p = frame
+        key = (joint, *R, *p, ends.tobytes())
+        if key not in self._segments:
+            self._segments[key] = along(frame, ends, who)
+        return self._segments[key]
 
     def box(self, c: BoxContact, who: str) -> tuple[Frame, Frame, list[float]]:
         """Return frames at the centers of sphere and box, and half edges minus the rounding radius [m]."""
