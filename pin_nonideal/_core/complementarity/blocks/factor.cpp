@@ -113,12 +113,12 @@ void BlockFactor::order(const BlockProblem& p, const Island& island) {
 }
 
 // Add J_a^T K to a block, with K = G J_b.
-void BlockFactor::add_block(double* H, const double* Ja, const double* K, int dim, int na, int nb) {
+static PN_INLINE void add_block(double* H, const double* Ja, const double* K, int dim, int na, int nb) {
     if (na == 6 && nb == 6) add_transpose_product<6>(H, Ja, K, dim, 6, 6);
     else add_transpose_product(H, Ja, K, dim, na, nb);
 }
 
-void BlockFactor::assemble(const BlockProblem& p, const Island& island, const std::vector<double>& G) {
+PN_WIDE void BlockFactor::assemble(const BlockProblem& p, const Island& island, const std::vector<double>& G) {
     H_.resize(std::max(H_.size(), size_));
     std::fill(H_.begin(), H_.begin() + size_, 0.0);
     for (const Position& position : positions_) {
@@ -158,7 +158,7 @@ bool BlockFactor::factor(const BlockProblem& p, const Island& island, const std:
     return symmetric ? eliminate_symmetric() : eliminate_general();
 }
 
-bool BlockFactor::eliminate_symmetric() {
+PN_WIDE bool BlockFactor::eliminate_symmetric() {
     for (const Position& k : positions_) {
         double* D = &H_[k.diagonal];
         if (!cholesky(D, k.size)) return false;
@@ -179,7 +179,7 @@ bool BlockFactor::eliminate_symmetric() {
     return true;
 }
 
-bool BlockFactor::eliminate_general() {
+PN_WIDE bool BlockFactor::eliminate_general() {
     for (const Position& k : positions_) {
         double* D = &H_[k.diagonal];
         int* exchanges = &exchanges_[k.exchanges];
@@ -200,7 +200,7 @@ bool BlockFactor::eliminate_general() {
     return true;
 }
 
-void BlockFactor::solve(VecX& x) const {
+PN_WIDE void BlockFactor::solve(VecX& x) const {
     for (const Position& k : positions_) {
         double* b = x.data() + k.first;
         const double* D = &H_[k.diagonal];

@@ -46,7 +46,6 @@ private:
     int& entry(int row, int column) { return entries_[row * static_cast<int>(positions_.size()) + column]; }
     int entry(int row, int column) const { return entries_[row * static_cast<int>(positions_.size()) + column]; }
     void assemble(const BlockProblem& p, const Island& island, const std::vector<double>& G);
-    void add_block(double* H, const double* Ja, const double* K, int dim, int na, int nb);
     bool eliminate_symmetric();
     bool eliminate_general();
 

@@ -9,7 +9,7 @@
 namespace pn {
 
 // A := its lower Cholesky factor. Returns false if a pivot is not positive.
-inline bool cholesky(double* A, int n) {
+PN_INLINE bool cholesky(double* A, int n) {
     for (int j = 0; j < n; ++j) {
         double pivot = A[j * n + j];
         for (int k = 0; k < j; ++k) pivot -= A[j * n + k] * A[j * n + k];
@@ -26,18 +26,39 @@ inline bool cholesky(double* A, int n) {
 }
 
 // x := L^-1 x and x := L^-T x.
-inline void solve_lower(const double* L, int n, double* x) {
+template <int N = 0>
+PN_INLINE void solve_lower(const double* L, int n, double* x) {
+    if (N) n = N;
     for (int i = 0; i < n; ++i) {
         double sum = x[i];
         for (int k = 0; k < i; ++k) sum -= L[i * n + k] * x[k];
         x[i] = sum / L[i * n + i];
     }
 }
-inline void solve_lower_transpose(const double* L, int n, double* x) {
+template <int N = 0>
+PN_INLINE void solve_lower_transpose(const double* L, int n, double* x) {
+    if (N) n = N;
     for (int i = n - 1; i >= 0; --i) {
         x[i] /= L[i * n + i];
         for (int k = 0; k < i; ++k) x[k] -= L[i * n + k] * x[i];
     }
+}
+
+// y += A x and y += A^T x, with A (m, n).
+template <int N = 0>
+PN_INLINE void add_product(const double* A, int m, int n, const double* x, double* y) {
+    if (N) n = N;
+    for (int k = 0; k < m; ++k, A += n) {
+        double sum = 0.0;
+        for (int i = 0; i < n; ++i) sum += A[i] * x[i];
+        y[k] += sum;
+    }
+}
+template <int N = 0>
+PN_INLINE void add_transpose(const double* A, int m, int n, const double* x, double* y) {
+    if (N) n = N;
+    for (int k = 0; k < m; ++k, A += n)
+        for (int i = 0; i < n; ++i) y[i] += A[i] * x[k];
 }
 
 // X := L^-1 X for X of n rows and m columns.
@@ -89,7 +110,7 @@ PN_INLINE void add_transpose_product(double* C, const double* A, const double* B
 }
 
 // Factor A = P L U in place with exchanges of rows. Returns false if a pivot is zero.
-inline bool eliminate(double* A, int* exchanges, int n) {
+PN_INLINE bool eliminate(double* A, int* exchanges, int n) {
     for (int c = 0; c < n; ++c) {
         int best = c;
         for (int i = c + 1; i < n; ++i)

@@ -42,13 +42,20 @@ bool BlockProblem::factor() {
     return true;
 }
 
-void BlockProblem::solve_mass(int n, VecX& x) const {
+PN_WIDE void BlockProblem::solve_mass(int n, VecX& x) const {
     const BlockNode& node = nodes[n];
-    solve_lower(L_.data() + node.M, node.size, x.data() + node.first);
-    solve_lower_transpose(L_.data() + node.M, node.size, x.data() + node.first);
+    const double* L = L_.data() + node.M;
+    double* at = x.data() + node.first;
+    if (node.size == 6) {
+        solve_lower<6>(L, 6, at);
+        solve_lower_transpose<6>(L, 6, at);
+    } else {
+        solve_lower(L, node.size, at);
+        solve_lower_transpose(L, node.size, at);
+    }
 }
 
-void BlockProblem::respond(const BlockElement& e, const VecX& x, VecX& w) const {
+PN_WIDE void BlockProblem::respond(const BlockElement& e, const VecX& x, VecX& w) const {
     if (e.column >= 0) {
         w[e.row] = J[e.J[0] + e.column] * x[nodes[e.node[0]].first + e.column];
         return;
@@ -56,28 +63,23 @@ void BlockProblem::respond(const BlockElement& e, const VecX& x, VecX& w) const 
     for (int k = 0; k < e.dim(); ++k) w[e.row + k] = 0.0;
     for (int side = 0; side < 2 && e.node[side] >= 0; ++side) {
         const BlockNode& node = nodes[e.node[side]];
-        const double *row = J.data() + e.J[side], *at = x.data() + node.first;
-        for (int k = 0; k < e.dim(); ++k, row += node.size) {
-            double sum = 0.0;
-            for (int i = 0; i < node.size; ++i) sum += row[i] * at[i];
-            w[e.row + k] += sum;
-        }
+        const double *block = J.data() + e.J[side], *at = x.data() + node.first;
+        if (node.size == 6) add_product<6>(block, e.dim(), 6, at, w.data() + e.row);
+        else add_product(block, e.dim(), node.size, at, w.data() + e.row);
     }
 }
 
-void BlockProblem::push(const BlockElement& e, const VecX& f, VecX& x) const {
+PN_WIDE void BlockProblem::push(const BlockElement& e, const VecX& f, VecX& x) const {
     if (e.column >= 0) {
         x[nodes[e.node[0]].first + e.column] += J[e.J[0] + e.column] * f[e.row];
         return;
     }
     for (int side = 0; side < 2 && e.node[side] >= 0; ++side) {
         const BlockNode& node = nodes[e.node[side]];
-        const double* row = J.data() + e.J[side];
+        const double* block = J.data() + e.J[side];
         double* at = x.data() + node.first;
-        for (int k = 0; k < e.dim(); ++k, row += node.size) {
-            const double force = f[e.row + k];
-            for (int i = 0; i < node.size; ++i) at[i] += row[i] * force;
-        }
+        if (node.size == 6) add_transpose<6>(block, e.dim(), 6, f.data() + e.row, at);
+        else add_transpose(block, e.dim(), node.size, f.data() + e.row, at);
     }
 }
 

@@ -35,7 +35,7 @@ bool turn(const Matrix3d& J, const Vector3d& w0, const Vector3d& tau, double h, 
 
 }  // namespace
 
-FreeFlight::FreeFlight(const Program& p, const JointDrives& drives) {
+FreeFlight::FreeFlight(const Program& p, const JointDrives& drives) : flight_(p.mechanism.nv, -1) {
     const Mechanism& m = p.mechanism;
     std::vector<char> parents(m.joints.size(), 0), joined(m.nv, 0);
     for (const Joint& joint : m.joints) parents[joint.parent] = 1;
@@ -54,6 +54,7 @@ FreeFlight::FreeFlight(const Program& p, const JointDrives& drives) {
         bool driven = false;
         for (int dof = joint.iv; dof < joint.iv + 6; ++dof) driven |= drives.acts_on(dof);
         if (driven || !(m.armature.segment(joint.iv, 6).array() == 0.0).all()) continue;
+        flight_[joint.iv] = static_cast<int>(flights_.size());
         flights_.push_back({static_cast<int>(i), joint.iv, true, {}});
     }
 }
@@ -63,8 +64,8 @@ void FreeFlight::begin() {
 }
 
 void FreeFlight::touch(const Block& block) {
-    for (Flight& flight : flights_)
-        if (std::find(block.support.begin(), block.support.end(), flight.dof) != block.support.end()) flight.free = false;
+    for (int dof : block.support)
+        if (flight_[dof] >= 0) flights_[flight_[dof]].free = false;
 }
 
 void FreeFlight::move(const Program& p, const Workspace& w, double h, const double* q0, const VecX& v0, const VecX& mean,

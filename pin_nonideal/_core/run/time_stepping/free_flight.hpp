@@ -33,6 +33,7 @@ private:
     };
 
     std::vector<Flight> flights_;
+    std::vector<int> flight_;  // flight by its first dof, else -1
 };
 
 }  // namespace pn

@@ -412,7 +412,7 @@ bool MoreauContacts::solve_laws() {
     guess_ = f_.head(n);
     const double error = separate_ ? trees_.solve(cones_, middle_, f_) : HUGE_VAL;
     bool solved = error <= most_miss;
-    const bool starts = v0_.cwiseAbs().maxCoeff() <= rest_speed;
+    const bool starts = v0_.cwiseAbs().maxCoeff() <= rest_speed && !(unheld_.size() > 0 && unheld_ == q0_);
     if (solved && !(starts && moves())) return true;
     respond();
     if (!solved) {
@@ -464,7 +464,10 @@ bool MoreauContacts::keep_rest(bool solved) {
     const auto W = W_.topLeftCorner(n, n);
     const bool moves = (w1_.head(n) + W * f_.head(n)).cwiseAbs().maxCoeff() >
                        cone_force_rounding * w1_.head(n).cwiseAbs().maxCoeff();
-    return (!solved || moves) && solver_.hold(W, w1_.head(n), cones_, f_.head(n));
+    if (solved && !moves) return false;
+    const bool holds = solver_.hold(W, w1_.head(n), cones_, f_.head(n));
+    if (!holds) unheld_ = q0_;  // the next sweeps and the step after the start need not ask again
+    return holds;
 }
 
 void MoreauContacts::solve(double t) {

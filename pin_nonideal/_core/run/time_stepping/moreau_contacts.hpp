@@ -22,8 +22,11 @@ class MoreauContacts {
 public:
     MoreauContacts(System& system, GapWatch& watch);
 
-    // Forget the gaps of earlier steps. The next step measures all of them.
-    void forget() { q_looked_.resize(0); }
+    // Forget the gaps and the rest of earlier steps.
+    void forget() {
+        q_looked_.resize(0);
+        unheld_.resize(0);
+    }
     // Return the longest step from y at t, up to h. Approaching edges and rims may penetrate by half of their rounding.
     // If they already penetrate, the middle of the step may reach half of the remaining rounding. Deeper edges and rims
     // have no defined normal, and may pass through each other.
@@ -103,7 +106,7 @@ private:
     std::vector<ConeElement> cones_;
     bool scaled_ = true;   // the response is a_s = R^T a
     bool presses_ = true;  // percussions of the last step may be nonzero
-    VecX q_mid_, q_looked_, v0_, v1_, a_free_, lam_free_, w0_, w1_, f_, power_;
+    VecX q_mid_, q_looked_, unheld_, v0_, v1_, a_free_, lam_free_, w0_, w1_, f_, power_;
     VecX offset_, middle_, free_response_, guess_, relaxed_f_;
     SeparateTrees trees_;
     ContactProjection projection_;
