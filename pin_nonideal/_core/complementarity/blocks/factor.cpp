@@ -114,7 +114,8 @@ void BlockFactor::order(const BlockProblem& p, const Island& island) {
 
 // Add J_a^T K to a block, with K = G J_b.
 static PN_INLINE void add_block(double* H, const double* Ja, const double* K, int dim, int na, int nb) {
-    if (na == 6 && nb == 6) add_transpose_product<6>(H, Ja, K, dim, 6, 6);
+    if (na == 6 && nb == 6 && dim == 3) add_transpose_product<6>(H, Ja, K, 3, 6, 6);
+    else if (na == 6 && nb == 6) add_transpose_product<6>(H, Ja, K, dim, 6, 6);
     else add_transpose_product(H, Ja, K, dim, na, nb);
 }
 
@@ -139,15 +140,22 @@ PN_WIDE void BlockFactor::assemble(const BlockProblem& p, const Island& island, 
         for (int side = 0; side < sides; ++side) {  // columns of this side's node
             const int column = place_[e.node[side]], n = positions_[column].size;
             const double* J = p.J.data() + e.J[side];
-            K_.assign(d * n, 0.0);
-            for (int r = 0; r < d; ++r)
-                for (int s = 0; s < d; ++s)
-                    for (int k = 0; k < n; ++k) K_[r * n + k] += g[r * d + s] * J[s * n + k];
-            add_block(&H_[positions_[column].diagonal], J, K_.data(), d, n, n);
+            double K6[18];
+            double* K = K6;
+            if (n == 6 && d == 3) {
+                multiply_three<6>(g, J, K);
+            } else {
+                K_.assign(d * n, 0.0);
+                K = K_.data();
+                for (int r = 0; r < d; ++r)
+                    for (int s = 0; s < d; ++s)
+                        for (int k = 0; k < n; ++k) K[r * n + k] += g[r * d + s] * J[s * n + k];
+            }
+            add_block(&H_[positions_[column].diagonal], J, K, d, n, n);
             if (sides == 1) continue;
             const int row = place_[e.node[1 - side]], m = positions_[row].size;
             if (row < column || !symmetric_)
-                add_block(&H_[entry(row, column)], p.J.data() + e.J[1 - side], K_.data(), d, m, n);
+                add_block(&H_[entry(row, column)], p.J.data() + e.J[1 - side], K, d, m, n);
         }
     }
 }

@@ -8,14 +8,13 @@
 
 namespace pn {
 
-// A := its lower Cholesky factor. Returns false if a pivot is not positive.
+// A := its lower Cholesky factor, with inverses on the diagonal. Returns false if a pivot is not positive.
 PN_INLINE bool cholesky(double* A, int n) {
     for (int j = 0; j < n; ++j) {
         double pivot = A[j * n + j];
         for (int k = 0; k < j; ++k) pivot -= A[j * n + k] * A[j * n + k];
         if (!(pivot > 0.0) || !(pivot < HUGE_VAL)) return false;
-        A[j * n + j] = std::sqrt(pivot);
-        const double inverse = 1.0 / A[j * n + j];
+        const double inverse = A[j * n + j] = 1.0 / std::sqrt(pivot);
         for (int i = j + 1; i < n; ++i) {
             double sum = A[i * n + j];
             for (int k = 0; k < j; ++k) sum -= A[i * n + k] * A[j * n + k];
@@ -32,14 +31,14 @@ PN_INLINE void solve_lower(const double* L, int n, double* x) {
     for (int i = 0; i < n; ++i) {
         double sum = x[i];
         for (int k = 0; k < i; ++k) sum -= L[i * n + k] * x[k];
-        x[i] = sum / L[i * n + i];
+        x[i] = sum * L[i * n + i];
     }
 }
 template <int N = 0>
 PN_INLINE void solve_lower_transpose(const double* L, int n, double* x) {
     if (N) n = N;
     for (int i = n - 1; i >= 0; --i) {
-        x[i] /= L[i * n + i];
+        x[i] *= L[i * n + i];
         for (int k = 0; k < i; ++k) x[k] -= L[i * n + k] * x[i];
     }
 }
@@ -70,8 +69,7 @@ PN_INLINE void solve_lower_columns(const double* L, int n, double* X, int m) {
             const double a = L[i * n + l];
             for (int c = 0; c < m; ++c) X[i * m + c] -= a * X[l * m + c];
         }
-        const double inverse = 1.0 / L[i * n + i];
-        for (int c = 0; c < m; ++c) X[i * m + c] *= inverse;
+        for (int c = 0; c < m; ++c) X[i * m + c] *= L[i * n + i];
     }
 }
 
@@ -95,6 +93,14 @@ PN_INLINE void subtract_transpose_product(double* C, const double* A, const doub
             const double a = A[l * m + i];
             for (int j = 0; j < n; ++j) C[i * n + j] -= a * B[l * n + j];
         }
+}
+
+// K := G J, with G (3, 3) and J (3, N).
+template <int N>
+PN_INLINE void multiply_three(const double* G, const double* J, double* K) {
+    for (int r = 0; r < 3; ++r)
+        for (int k = 0; k < N; ++k)
+            K[r * N + k] = G[3 * r] * J[k] + G[3 * r + 1] * J[N + k] + G[3 * r + 2] * J[2 * N + k];
 }
 
 // C += A^T B, with A (k, m) and B (k, n).

@@ -24,6 +24,7 @@ void BlockNewton::pose(const BlockProblem& p) {
     root_rho_.assign(p.rows, 0.0);
     G_.assign(9 * p.elements.size(), 0.0);
     piece_.assign(p.elements.size(), Piece::unknown);
+    there_.resize(p.elements.size());
     for (VecX* x : {&y_, &e_, &z_, &df_, &dw_, &f_try_, &w_try_, &f_best_}) x->resize(p.rows);
     dx_.resize(p.free.size());
     for (const BlockElement& e : p.elements) {
@@ -109,7 +110,7 @@ double BlockNewton::evaluate(const BlockProblem& p, const Island& island, const 
     for (int i : island.elements) {
         const BlockElement& e = p.elements[i];
         for (int r = e.row; r < e.row + e.dim(); ++r) y_[r] = (1.0 - compliance_) * f[r] - rho_[r] * w[r];
-        const Projection there = projection(e, y_.data() + e.row);
+        const Projection& there = there_[i] = projection(e, y_.data() + e.row);
         double error = 0.0, size = unit_;
         for (int k = 0; k < e.dim(); ++k) {
             const int r = e.row + k;
@@ -152,7 +153,7 @@ bool BlockNewton::linearize(const BlockProblem& p, const Island& island, double 
     symmetric = true;
     for (int i : island.elements) {
         const BlockElement& e = p.elements[i];
-        const Projection there = projection(e, y_.data() + e.row);
+        const Projection& there = there_[i];
         changes |= there.piece != piece_[i] || (there.piece == Piece::slips && e.dim() > 1);
         symmetric &= there.piece != Piece::slips || !e.head() || e.cone.bound == 0.0;
         piece_[i] = there.piece;
@@ -170,7 +171,7 @@ bool BlockNewton::linearize(const BlockProblem& p, const Island& island, double 
             for (int k = head; k < n; ++k) G[k * n + k] = rho_[e.row + k] / yielding;
             continue;
         }
-        const Projection there = projection(e, y_.data() + e.row);
+        const Projection& there = there_[i];
         const double turn = there.ratio / (1.0 - (1.0 - yielding) * there.ratio);
         for (int k = head; k < n; ++k) {
             if (head) G[k * n] = e.cone.bound * there.t[k] * rho_[e.row] / yielding;
@@ -194,7 +195,7 @@ void BlockNewton::local_step(const BlockProblem& p, const Island& island, double
         if (head) z[0] = sticks || slips ? error[0] / yielding : error[0];
         for (int k = head; k < n; ++k) z[k] = sticks ? error[k] / yielding : error[k];
         if (slips) {
-            const Projection there = projection(e, y_.data() + e.row);
+            const Projection& there = there_[i];
             double along = 0.0;
             for (int k = head; k < n; ++k) along += there.t[k] * error[k];
             const double pushed = head ? e.cone.bound * (1.0 - yielding) * z[0] : 0.0;
@@ -227,9 +228,10 @@ void BlockNewton::find_step(const BlockProblem& p, const Island& island, const B
     for (int i : island.elements) p.respond(p.elements[i], dx_, dw_);
 }
 
-// Find the longest of some steps that reduces the squared error enough. Return false if none does.
+// Find the longest of some steps that reduces the squared error enough, with its error and their squared length. Return
+// false if none does.
 bool BlockNewton::shorten(const BlockProblem& p, const Island& island, const VecX& f, const VecX& w, double bound,
-                          int most_halvings, double& length) {
+                          int most_halvings, double& length, double& error, double& merit) {
     length = 1.0;
     for (int halving = 0; halving <= most_halvings; ++halving, length *= 0.5) {
         for (int i : island.elements) {
@@ -239,9 +241,8 @@ bool BlockNewton::shorten(const BlockProblem& p, const Island& island, const Vec
                 w_try_[r] = w[r] + length * dw_[r];
             }
         }
-        double there;
-        evaluate(p, island, f_try_, w_try_, there);
-        if (there <= (1.0 - decrease * length) * bound) return true;
+        error = evaluate(p, island, f_try_, w_try_, merit);
+        if (merit <= (1.0 - decrease * length) * bound) return true;
     }
     length = 1.0;
     return false;
@@ -279,23 +280,32 @@ double BlockNewton::solve(const BlockProblem& p, const Island& island, BlockFact
         }
         find_step(p, island, factor, factored);
         double length;
+        const double before = error, merit_before = merit;
         const double bound = bold ? merit : std::max({recent[0], recent[1], recent[2], recent[3]});
-        const bool accepted = shorten(p, island, f, w, bound, bold ? 2 : 6, length);
+        const bool accepted = shorten(p, island, f, w, bound, bold ? 2 : 6, length, error, merit);
         if (!accepted && bold && refusals < most_refusals && weight < kept_from * most_proximal) {
+            error = evaluate(p, island, f, w, merit);
             weight = step == 0 ? cautious() : std::min(most_proximal, more_proximal * weight);
             ++refusals;
             factored = 0.0;
-            evaluate(p, island, f, w, merit);
             continue;
         }
         if (!accepted) {
-            if (++unguarded > most_unguarded) break;
+            if (++unguarded > most_unguarded) {
+                error = before;
+                break;
+            }
             refusals = 0;
         }
-        each_row([&](int r) { f[r] += length * df_[r]; });
-        move(p, island, f, x, w);
-        const double before = error, merit_before = merit;
-        error = evaluate(p, island, f, w, merit);
+        // The sum of the steps' changes of w has rounding of its own, which is removed near the solution.
+        each_row([&](int r) {
+            f[r] += length * df_[r];
+            w[r] += length * dw_[r];
+        });
+        if (!accepted || error <= block_newton_stall_tolerance) {
+            move(p, island, f, x, w);
+            error = evaluate(p, island, f, w, merit);
+        }
         recent[step % 4] = merit;
         if (!(merit < HUGE_VAL)) break;
         if (accepted && length == 1.0) {
@@ -309,10 +319,8 @@ double BlockNewton::solve(const BlockProblem& p, const Island& island, BlockFact
         }
         if (least < block_newton_stall_tolerance && error > stagnant * before && ++stagnant_steps > 1) break;
     }
-    if (error > least || !(error < HUGE_VAL)) {
-        each_row([&](int r) { f[r] = f_best_[r]; });
-        move(p, island, f, x, w);
-    }
+    if (error > least || !(error < HUGE_VAL)) each_row([&](int r) { f[r] = f_best_[r]; });
+    move(p, island, f, x, w);
     return least;
 }
 

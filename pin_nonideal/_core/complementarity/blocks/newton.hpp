@@ -68,11 +68,12 @@ private:
     void local_step(const BlockProblem& p, const Island& island, double d, VecX& dx);
     void find_step(const BlockProblem& p, const Island& island, const BlockFactor& factor, double d);
     bool shorten(const BlockProblem& p, const Island& island, const VecX& f, const VecX& w, double bound,
-                 int most_halvings, double& length);
+                 int most_halvings, double& length, double& error, double& merit);
 
     Parameters parameters_;
     std::vector<double> rho_, root_rho_, G_;
     std::vector<Piece> piece_;
+    std::vector<Projection> there_;  // at the last evaluation
     VecX y_, e_, z_, df_, dx_, dw_, f_try_, w_try_, f_best_;
     double compliance_ = 0.0;
     double unit_ = 0.0;  // largest free velocity of the island, in units of the square root of an energy
