@@ -7,6 +7,8 @@ namespace pn {
 namespace {
 
 constexpr double accepted = 1e-9;          // error of a solution. Newton stops at rounding, far below in most problems
+// Error that is not worth the path of compliances, which costs a hundred Newton steps.
+constexpr double tolerated = 1e-8;
 constexpr double compliance_path_tolerance = 1e-6;             // error on the path of compliances
 constexpr double first_block_compliance = 1.0, min_block_compliance = 1e-7;  // relative to an element's own response
 constexpr double first_factor = 0.1, last_factor = 0.95;           // ratio of successive compliances
@@ -74,7 +76,7 @@ double BlockSolver::solve(int island, VecX& f) {
     least_ = newton(island, BlockNewton::Search::bold, 0.0, f);
     if (least_ <= accepted) return least_;
     best_ = f;
-    if (!attempt(island, f)) stiffen(island, f);
+    if (!attempt(island, f) && least_ > tolerated) stiffen(island, f);
     f = best_;
     newton_.move(problem, islands_[island], f, x_, w_);
     return least_;
