@@ -53,7 +53,7 @@ class Resolver:
         self.model, self.q0 = model, q0
         self._placements = joint_placements(model, q0)
         self._frames: dict[str, Frame] = {}
-        self._segments: dict[tuple[object, ...], tuple[Frame, float]] = {}  # shared by many contacts of a shape
+        self._segments: dict[tuple[object, ...], tuple[Frame, float]] = {}  # shared by contacts
 
     def frame_id(self, name: str, who: str) -> int:
         """Return the index of a frame; a joint's name selects the frame of the joint."""
