@@ -18,25 +18,40 @@ std::vector<int> dependent_rows(const RowSystem& s) {
     return dependent;
 }
 
+// Return the given rows of B, as columns.
+static MatX columns_of(const std::vector<Block>& blocks, const std::vector<double>& B, const RowSystem& s,
+                       const std::vector<int>& rows) {
+    std::vector<int> column(s.scale.size(), -1);
+    for (size_t k = 0; k < rows.size(); ++k) column[rows[k]] = static_cast<int>(k);
+    MatX out = MatX::Zero(s.Q.rows(), static_cast<Eigen::Index>(rows.size()));
+    for (int i : s.blocks) {
+        const Block& block = blocks[i];
+        const double* entry = B.data() + block.offset;
+        for (int dof : block.support)
+            for (size_t k = 0; k < block.kept.size(); ++k, ++entry)
+                if (column[block.row + k] >= 0) out(dof, column[block.row + k]) = *entry;
+    }
+    return out;
+}
+
 MatX dependence(const std::vector<Block>& blocks, const std::vector<double>& B, RowSystem& s,
                 const std::vector<int>& dependent) {
-    const int d = static_cast<int>(dependent.size());
     const std::vector<int>& rows = s.envelope.row_at;
-    MatX W = MatX::Zero(d, s.envelope.size());
-    const Eigen::Index all = s.scale.size();
-    VecX column(s.Q.rows()), unit = VecX::Zero(all), products = unit, weights = unit;
-    for (int k = 0; k < d; ++k) {
-        column.setZero();
-        unit[dependent[k]] = 1.0;
-        for (int i : s.blocks) add_transpose(blocks[i], B, unit, column);
-        unit[dependent[k]] = 0.0;
-        const double least = dependent_row_rounding * column.norm();
-        for (int pass = 0; pass < most_passes && column.norm() > least; ++pass) {
-            for (int i : s.blocks) multiply(blocks[i], B, column, products);
-            solve_rows(s, products, weights);
-            for (size_t l = 0; l < rows.size(); ++l) W(k, l) += weights[rows[l]];
-            for (int i : s.blocks) add_transpose(blocks[i], B, -weights, column);
+    const MatX used = columns_of(blocks, B, s, rows);
+    MatX rest = columns_of(blocks, B, s, dependent);
+    const VecX least = dependent_row_rounding * rest.colwise().norm().transpose();
+    MatX W = MatX::Zero(rest.cols(), used.cols()), weights(used.cols(), rest.cols());
+    VecX product = VecX::Zero(s.scale.size()), weight = product;
+    for (int pass = 0; pass < most_passes; ++pass) {
+        if ((rest.colwise().norm().transpose().array() <= least.array()).all()) break;
+        weights.noalias() = used.transpose() * rest;
+        for (Eigen::Index k = 0; k < rest.cols(); ++k) {
+            for (size_t l = 0; l < rows.size(); ++l) product[rows[l]] = weights(l, k);
+            solve_rows(s, product, weight);
+            for (size_t l = 0; l < rows.size(); ++l) weights(l, k) = weight[rows[l]];
         }
+        W += weights.transpose();
+        rest.noalias() -= used * weights;
     }
     return W;
 }
