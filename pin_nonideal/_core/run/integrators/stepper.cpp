@@ -44,7 +44,17 @@ void Stepper::take(double t, double size) {
         collocates_ = state.seeks_directions = false;
         state.last_direction = state.slip_direction;
     }
+    if (std::holds_alternative<RungeKutta>(scheme_) && system_.stands(y0, start_rate())) return stand();
     with_scheme(scheme_, [&](auto& scheme) { scheme.advance(system_); });
+}
+
+// All stages of a step at rest are its start.
+void Stepper::stand() {
+    const VecX& rate = start_rate();
+    for (int i = 1; i < stages; ++i) rates[i].head(active) = rate.head(active);
+    y1.head(active) = y0.head(active) + h * rate.head(active);
+    const RowSystem& rows = system_.w.now.rows;
+    if (!rows.blocks.empty()) system_.smallest_pivot = std::min(system_.smallest_pivot, rows.distance);
 }
 
 void Stepper::take_again(double size) {

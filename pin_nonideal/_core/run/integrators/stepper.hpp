@@ -58,6 +58,8 @@ public:
     const std::vector<Look>& looks() const { return collocates_ ? collocation_looks_ : looks_; }
 
 private:
+    void stand();
+
     System& system_;
     ErrorNorm& norm_;
     std::variant<std::monostate, RungeKutta, SemiImplicitEuler, OutsideStep> scheme_;

@@ -23,6 +23,11 @@ System::System(const Program& program, Workspace& workspace, bool with_energy)
       ng(static_cast<int>(p.gaps.size())), ns(nq + nv + nz + nw), ny(ns + 2 * ne + ng),
       q(VecX::Zero(nq)), v(VecX::Zero(nv)), q_before_(q) {}
 
+bool System::stands(const VecX& y, const VecX& dy) const {
+    const bool in_time = p.asks_functions || p.moves_in_time || std::holds_alternative<TorqueTable>(p.actuation);
+    return !in_time && (velocity(y).array() == 0.0).all() && (dy.head(ns).array() == 0.0).all();
+}
+
 void System::read(const VecX& y) {
     std::copy_n(y.data(), nq, q.data());
     std::copy_n(y.data() + nq, nv, v.data());

@@ -42,6 +42,8 @@ struct System {
         if (!w.now.touching.empty()) return ny;
         return w.now.loaded.empty() ? ns : ns + 2 * (w.now.loaded.back() + 1);
     }
+    // Check if y stays the same in a step that starts with this rate: nothing moves, and nothing depends on time.
+    bool stands(const VecX& y, const VecX& dy) const;
     // Copy q and v from y, or to y.
     void read(const VecX& y);
     void write(VecX& y) const;
