@@ -138,15 +138,15 @@ def stack(count: int) -> ContactScene:
     return ContactScene(f"stack of {count} boxes", bodies, pairs=pairs, rests=True)
 
 
-def sliding_stack(count: int) -> ContactScene:
-    """Return a stack of boxes that slides on the ground for the whole run."""
-    edge, speed, mu = 0.2, 2.5, 0.2
+def sliding(count: int) -> ContactScene:
+    """Return boxes side by side that slide and turn on the ground for the whole run."""
+    edge = 0.2
     bodies = [
-        Body((edge,) * 3, (0.003 * k, 0.0, edge * (k + 0.5)), v0=(speed, 0.0, 0.0, 0.0, 0.0, 0.0))
+        Body((edge,) * 3, (0.0, 0.4 * k, 0.5 * edge), v0=(3.0 + 0.1 * k, 0.0, 0.0, 0.0, 0.0, 0.5 * k))
         for k in range(count)
     ]
     pairs = [(k + 1, k) for k in range(count - 1)]
-    return ContactScene(f"stack of {count} boxes that slides", bodies, mu=mu, pairs=pairs)
+    return ContactScene(f"{count} boxes that slide", bodies, mu=0.25, pairs=pairs)
 
 
 def heavy_on_light(ratio: float) -> ContactScene:

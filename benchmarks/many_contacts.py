@@ -10,12 +10,12 @@ import numpy as np
 import pin_nonideal as pn
 
 from . import timing
-from .contact_scenes import ContactScene, balls_in_box, dominoes, heavy_on_light, mujocos, ours, sliding_stack, stack, wall
+from .contact_scenes import ContactScene, balls_in_box, dominoes, heavy_on_light, mujocos, ours, sliding, stack, wall
 
 STEP = 1e-3  # [s]
 SCENES = (
     *(stack(count) for count in (3, 5, 10, 20)),
-    sliding_stack(5),
+    sliding(10),
     *(heavy_on_light(ratio) for ratio in (1e2, 1e6)),
     dominoes(10),
     wall(5, 4),

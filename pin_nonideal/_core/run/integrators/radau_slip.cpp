@@ -310,9 +310,10 @@ double Collocation::error() {
 }
 
 void Collocation::interpolate(double part, VecX& y) const {
-    y.setZero();
+    auto state = y.head(step_.states);
+    state.setZero();
     with_weights(part, [&](int k, double weight) {
-        y += weight * (k == 0 ? step_.y0 : k == stages ? step_.y1 : Y_[k - 1]);
+        state += weight * (k == 0 ? step_.y0 : k == stages ? step_.y1 : Y_[k - 1]).head(step_.states);
     });
     take_directions_at(part);
 }

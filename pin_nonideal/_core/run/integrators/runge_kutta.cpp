@@ -76,7 +76,7 @@ void RungeKutta::sum_terms() {
 }
 
 void RungeKutta::interpolate(double part, VecX& y) const {
-    const int n = step_.active;
+    const int n = step_.states;
     auto sum = y.head(n);
     sum.setZero();
     for (int i = static_cast<int>(coefficients_.size()) - 1; i >= 0; --i) {

@@ -32,7 +32,8 @@ public:
     // Store data from the projection of an accepted step's end, for methods that use it.
     void learn();
 
-    // Interpolant over the step, which needs the rate at the step's end. Leaves the workspace at other states.
+    // Interpolant of the states over the step, which needs the rate at the step's end. Leaves the workspace at other
+    // states.
     void make_interpolant();
     void interpolate(double part, VecX& y) const;
     // Return one entry of the interpolant, or its rate. Unit lengths are not restored.
