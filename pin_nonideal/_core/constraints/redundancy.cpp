@@ -67,42 +67,63 @@ void DescribedRows::finish(int kept) {
         if (row.kept >= 0) row.part = row.factor / weight[row.kept];
 }
 
+// Return the load sharing of the rows in use, which is computed if they have changed.
+static LoadSharing& load_sharing(const std::vector<Block>& blocks, const std::vector<double>& B, const DescribedRows& all,
+                                 RowSystem& s) {
+    LoadSharing& sharing = s.sharing;
+    std::vector<double> entries;
+    for (int i : s.blocks) {
+        const auto first = B.begin() + blocks[i].offset;
+        entries.insert(entries.end(), first, first + blocks[i].support.size() * blocks[i].kept.size());
+    }
+    if (sharing.orthogonal == s.orthogonal && sharing.active == s.active && sharing.required == s.required &&
+        sharing.entries == entries)
+        return sharing;
+    sharing = {std::move(entries), s.active, s.required, s.orthogonal, dependent_rows(s), {}, {}, {}};
+    const std::vector<int>& rows = s.envelope.row_at;
+    sharing.W = dependence(blocks, B, s, sharing.dependent);
+    // With weights g and x + W^T y = lam, sum(x^2/g) + sum(y^2/g) is minimal if (1/g + W (1/g) W^T) y = W (1/g) lam.
+    VecX inverse(rows.size());
+    for (size_t l = 0; l < rows.size(); ++l) inverse[l] = 1.0 / all.weight[rows[l]];
+    const MatX weighted = sharing.W * inverse.asDiagonal();
+    MatX S = weighted * sharing.W.transpose();
+    for (size_t k = 0; k < sharing.dependent.size(); ++k) S(k, k) += 1.0 / all.weight[sharing.dependent[k]];
+    sharing.taken = solve_semidefinite(S, weighted);
+    return sharing;
+}
+
 void share_multipliers(const std::vector<Block>& blocks, const std::vector<double>& B,
                        const DescribedRows& all, RowSystem& s, const VecX& lam, VecX& shared) {
     shared = lam;
-    const std::vector<int> dependent = dependent_rows(s);
-    if (dependent.empty()) return;
-    // With weights g and x + W^T y = lam, sum(x^2/g) + sum(y^2/g) is minimal if (1/g + W (1/g) W^T) y = W (1/g) lam.
-    const MatX W = dependence(blocks, B, s, dependent);
+    if (!s.redundant) return;
+    const LoadSharing& sharing = load_sharing(blocks, B, all, s);
     const std::vector<int>& rows = s.envelope.row_at;
-    VecX inverse(rows.size()), own(rows.size());
-    for (size_t l = 0; l < rows.size(); ++l) {
-        inverse[l] = 1.0 / all.weight[rows[l]];
-        own[l] = inverse[l] * lam[rows[l]];
-    }
-    MatX S = W * inverse.asDiagonal() * W.transpose();
-    for (size_t k = 0; k < dependent.size(); ++k) S(k, k) += 1.0 / all.weight[dependent[k]];
-    const VecX y = solve_semidefinite(S, W * own), taken = W.transpose() * y;
-    for (size_t l = 0; l < rows.size(); ++l) shared[rows[l]] -= taken[l];
-    for (size_t k = 0; k < dependent.size(); ++k) shared[dependent[k]] = y[k];
+    VecX own(rows.size());
+    for (size_t l = 0; l < rows.size(); ++l) own[l] = lam[rows[l]];
+    const VecX y = sharing.taken * own;
+    own.noalias() -= sharing.W.transpose() * y;
+    for (size_t l = 0; l < rows.size(); ++l) shared[rows[l]] = own[l];
+    for (size_t k = 0; k < sharing.dependent.size(); ++k) shared[sharing.dependent[k]] = y[k];
 }
 
-MatX free_multipliers(const std::vector<Block>& blocks, const std::vector<double>& B,
-                      const DescribedRows& all, RowSystem& s) {
-    const std::vector<int> dependent = dependent_rows(s);
+const MatX& free_multipliers(const std::vector<Block>& blocks, const std::vector<double>& B,
+                             const DescribedRows& all, RowSystem& s) {
+    LoadSharing& sharing = load_sharing(blocks, B, all, s);
+    if (sharing.has_free) return sharing.free;
+    sharing.has_free = true;
     const std::vector<int>& rows = s.envelope.row_at;
-    MatX used = -dependence(blocks, B, s, dependent).transpose();
-    for (size_t k = 0; k < dependent.size(); ++k)
-        used(s.envelope.position[dependent[k]], static_cast<Eigen::Index>(k)) = 1.0;
+    MatX used = -sharing.W.transpose();
+    for (size_t k = 0; k < sharing.dependent.size(); ++k)
+        used(s.envelope.position[sharing.dependent[k]], static_cast<Eigen::Index>(k)) = 1.0;
     VecX inverse(rows.size());
     for (size_t l = 0; l < rows.size(); ++l) inverse[l] = 1.0 / all.weight[rows[l]];
     const MatX S = used.transpose() * inverse.asDiagonal() * used;
     Cholesky factor;
     factor.compute(S);
     used = factor.solve_lower(used.transpose()).transpose();
-    MatX free = MatX::Zero(s.scale.size(), used.cols());
-    for (size_t l = 0; l < rows.size(); ++l) free.row(rows[l]) = used.row(static_cast<Eigen::Index>(l));
-    return free;
+    sharing.free = MatX::Zero(s.scale.size(), used.cols());
+    for (size_t l = 0; l < rows.size(); ++l) sharing.free.row(rows[l]) = used.row(static_cast<Eigen::Index>(l));
+    return sharing.free;
 }
 
 }  // namespace pn

@@ -37,7 +37,7 @@ void share_multipliers(const std::vector<Block>& blocks, const std::vector<doubl
 
 // Return a basis of the multipliers by kept row that together exert no force. It is orthonormal in the norm of the
 // described rows.
-MatX free_multipliers(const std::vector<Block>& blocks, const std::vector<double>& B,
-                      const DescribedRows& all, RowSystem& s);
+const MatX& free_multipliers(const std::vector<Block>& blocks, const std::vector<double>& B,
+                             const DescribedRows& all, RowSystem& s);
 
 }  // namespace pn

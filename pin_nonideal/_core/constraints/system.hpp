@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "constraints/layout.hpp"
+#include "constraints/load_sharing.hpp"
 
 namespace pn {
 
@@ -41,6 +42,7 @@ struct RowSystem : RowChoice {
     MatX Q;
     VecX tau, work;
     std::vector<int> columns;
+    LoadSharing sharing;
 
     void allocate(const RowLayout& layout, int blocks, int nv);
     // Select the blocks with a required row, which are `among` some blocks, and use all required rows.

@@ -82,7 +82,7 @@ static void press_all(const Program& p, Workspace& w, Reactions& r) {
         r.unloaded.assign(p.gaps.size(), 0);
         if (!pulls) return;
     }
-    const MatX free = free_multipliers(p.blocks, now.B, p.described, w.now.rows);
+    const MatX& free = free_multipliers(p.blocks, now.B, p.described, w.now.rows);
     MatX Z(gaps.size(), free.cols());
     VecX N(gaps.size());
     std::vector<char> held(gaps.size());

@@ -65,7 +65,7 @@ bool all_stick(const Program& p, const Workspace& w) {
 ReportedLoads::ReportedLoads(const Program& p, Workspace& w) : w_(w) {
     if (p.gaps.empty() || !w.now.rows.redundant || !all_stick(p, w)) return;
     const VecX lam = reactions(p, w).lam;
-    const MatX free = free_multipliers(p.blocks, w.now.B, p.described, w.now.rows);
+    const MatX& free = free_multipliers(p.blocks, w.now.B, p.described, w.now.rows);
     const Shares shares(p, w, lam, free);
     if (!shares.outside || !shares.known) return;
 

@@ -44,7 +44,7 @@ MatX orthogonal_complement(const MatX& A, double threshold) {
     return MatX(factor.householderQ() * MatX::Identity(n, n)).rightCols(n - factor.rank());
 }
 
-VecX solve_semidefinite(const MatX& S, const VecX& b) { return S.ldlt().solve(b); }
+MatX solve_semidefinite(const MatX& S, const MatX& B) { return S.ldlt().solve(B); }
 
 Spectrum symmetric_spectrum(const MatX& S) {
     const Eigen::SelfAdjointEigenSolver<MatX> eigen(S);

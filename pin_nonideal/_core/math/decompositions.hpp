@@ -54,8 +54,8 @@ VecX basic_least_squares(const MatX& A, const VecX& b);
 // the largest count as zero.
 MatX orthogonal_complement(const MatX& A, double threshold);
 
-// Solve S x = b for a symmetric positive semidefinite S, by L D L^T with pivoting.
-VecX solve_semidefinite(const MatX& S, const VecX& b);
+// Solve S X = B for a symmetric positive semidefinite S, by L D L^T with pivoting.
+MatX solve_semidefinite(const MatX& S, const MatX& B);
 
 // Eigenvalues in ascending order and unit eigenvectors (columns) of a symmetric matrix.
 struct Spectrum {
