@@ -72,6 +72,8 @@ def run_decoupled(
 ) -> core.Outcome | None:
     """Run each component separately and merge the results; None if a component fails.
 
+    An interrupt leaves no samples, since the components have not reached a common time.
+
     Args:
         scene: the whole scene.
         parts: components of the scene.
@@ -85,11 +87,10 @@ def run_decoupled(
         own = _options_of(part, options, len(v0))
         own_tick = _after(tick, k, len(parts), options)
         outcome = run_together(part.scene, q0[part.q], v0[part.v], own, tick=own_tick)
-        stopped = outcome.stopped
-        if isinstance(stopped, core.CoreFailure):
+        if isinstance(outcome.stopped, KeyboardInterrupt):
+            return merge_outcomes(scene, [], [], options, outcome.stopped)
+        if outcome.stopped is not None:
             return None
-        if stopped is not None:
-            return merge_outcomes(scene, [], [], options, stopped)
         outcomes.append(outcome)
     return merge_outcomes(scene, parts, outcomes, options)
 
@@ -98,6 +99,8 @@ def rollout_decoupled(
     scene: Scene, parts: Sequence[Component], q0: Array, v0: Array, options: RunOptions, threads: int
 ) -> list[core.Outcome | None]:
     """Return the result of `run_decoupled` for each of many states, on several threads.
+
+    After an interrupt only the interrupted run has an outcome, without samples; the others are None.
 
     Args:
         scene: the whole scene.
@@ -112,7 +115,12 @@ def rollout_decoupled(
         states = (np.ascontiguousarray(q0[:, part.q]), np.ascontiguousarray(v0[:, part.v]))
         own = _options_of(part, options, v0.shape[1])
         program = compiled_scene(part.scene).program
-        of_parts.append(core.rollout(program, *states, own, threads, [], np.zeros((len(q0), 0))))
+        outcomes_of_part = core.rollout(program, *states, own, threads, [], np.zeros((len(q0), 0)))
+        for k, outcome in enumerate(outcomes_of_part):
+            if outcome is not None and isinstance(outcome.stopped, KeyboardInterrupt):
+                interrupted = merge_outcomes(scene, [], [], options, outcome.stopped)
+                return [interrupted if i == k else None for i in range(len(q0))]
+        of_parts.append(outcomes_of_part)
     results: list[core.Outcome | None] = []
     for k, outcomes in enumerate(zip(*of_parts, strict=True)):
         if all(one is not None and one.stopped is None for one in outcomes):

@@ -108,7 +108,7 @@ def _motion(scene: Scene, parts: Sequence[Component], dense: Sequence[DenseOutpu
             directions[part.elements] = own.transpose(1, 2, 0)
         before = np.concatenate([[0.0], one.moved])[step]
         moved += before + at * (one.moved[step] - before)
-    return states.T, modes.T, directions.reshape(-1, t.size).T, sought.T, moved
+    return states.T, modes.T, directions.reshape(3 * len(directions), t.size).T, sought.T, moved
 
 
 def _samples(

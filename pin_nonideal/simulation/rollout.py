@@ -176,8 +176,9 @@ def _arrays(
     for i, error in made.failures.items():
         if isinstance(error, RunError):
             error.index = i
-    if made.failures and not keep:
-        error = made.failures[min(made.failures)]
+    interrupted = [error for error in made.failures.values() if isinstance(error, RunInterrupted)]
+    if interrupted or (made.failures and not keep):
+        error = interrupted[0] if interrupted else made.failures[min(made.failures)]
         if isinstance(error, RunError):
             error.results = [made]
         raise error

@@ -76,15 +76,19 @@ def run_arrays(
     n, compiled = len(q0), compiled_scene(scene)
     parts = [] if numbers.names else decoupled_components(scene, options)
     if parts:
-        outcomes = [
-            one for one in rollout_decoupled(scene, parts, q0, v0, options, threads) if one is not None
-        ]
-        return _of_outcomes(scene, outcomes)
+        outcomes = rollout_decoupled(scene, parts, q0, v0, options, threads)
+        complete = [outcome for outcome in outcomes if outcome is not None]
+        if len(complete) < len(outcomes):
+            raise RunInterrupted("the runs were interrupted")
+        return _of_outcomes(scene, complete)
     numbers_of_runs = np.ascontiguousarray(numbers.values)
     program = compiled.program_of_runs(options.t0, by_thread=True)[0]
-    t, q, v, samples, violation, steps, stopped = core.rollout_arrays(
-        program, q0, v0, options, threads, numbers.names, numbers_of_runs
-    )
+    try:
+        t, q, v, samples, violation, steps, stopped = core.rollout_arrays(
+            program, q0, v0, options, threads, numbers.names, numbers_of_runs
+        )
+    except KeyboardInterrupt:
+        raise RunInterrupted("the runs were interrupted") from None
     most = t.size // n if n else 0
     made = RunArrays(
         t.reshape(n, most),

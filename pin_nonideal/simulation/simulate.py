@@ -110,7 +110,8 @@ def simulate(
         WallTimeError: `max_wall` is exceeded.
         RunError: the run stopped early; its `trajectory` holds the samples before the stop.
         ImpactEnergyError: an impact gained energy, and `strict` is True.
-        RunInterrupted: Ctrl-C was pressed; its `trajectory` holds the samples before the stop.
+        RunInterrupted: Ctrl-C was pressed; its `trajectory` holds the samples before the stop. It is empty if
+            decoupled mechanisms ran one after another.
     """
     if not isinstance(scene, Scene):
         raise InputError(f"simulate: scene must be a Scene; got {type(scene).__name__}")
@@ -171,6 +172,8 @@ def simulate(
                 hint=hint,
             )
             stopped = outcome.stopped
+        if tick is not None and len(outcome.t):
+            tick(float(outcome.t[-1]))  # the core shows the time only at intervals
     return finish(scene, outcome, stopped, options, time.perf_counter() - begin, [*notes, *hints])
 
 

@@ -87,6 +87,72 @@ def test_rollout_gives_the_bits_of_simulate() -> None:
         assert (run.v == alone.v).all()
 
 
+def test_arrays_have_the_bits_of_simulate() -> None:
+    scene, q = pendulums([0, 1, 2], LOADED)
+    starts = q + np.linspace(0.0, 1.0, 4)[:, None]
+    runs = pn.rollout(scene, starts, np.zeros_like(starts), 0.5, jobs=2, as_arrays=True)
+    assert repr(runs) == f"<RunArrays: 4 runs of up to {runs.samples.max()} samples, 0 failed>"
+    assert runs.samples.min() < runs.samples.max()
+    for i, start in enumerate(starts):
+        alone, n = pn.simulate(scene, 0.5, q=start), runs.samples[i]
+        assert n == len(alone)
+        assert runs.steps[i] == alone.stats.steps
+        assert (runs.t[i, :n] == alone.t).all()
+        assert (runs.q[i, :n] == alone.q).all()
+        assert (runs.v[i, :n] == alone.v).all()
+        assert np.isnan(runs.t[i, n:]).all()
+        assert (runs.last[0][i] == alone.q[-1]).all()
+    assert len(pn.rollout(scene, starts[:0], starts[:0], 0.5, as_arrays=True)) == 0
+
+
+class Drive:
+    """The angle t of one joint, by a function that raises `error` after half a second of a run."""
+
+    def __init__(self) -> None:
+        self.error: BaseException | None = None
+
+    def __call__(self, t: float) -> tuple[float, float, float]:
+        if self.error is not None and t > 0.5:
+            raise self.error
+        return t, 1.0, 0.0
+
+    def pendulums(self, error: BaseException) -> tuple[pn.Scene, np.ndarray]:
+        motion = pn.PrescribedMotion("joint0 of 1", self, name="drive")
+        scene, q = pendulums([0, 1, 2], COULOMB, constraints=[motion])
+        assert len(components(scene)) == 3
+        self.error = error
+        return scene, scene.project(q)[0]
+
+
+def test_a_failing_function_keeps_the_samples_of_all_mechanisms() -> None:
+    scene, q = Drive().pendulums(ValueError("no data"))
+    for call in (pn.simulate, lambda *_, **start: pn.rollout(scene, start["q"][None], None, 1.0)):
+        with pytest.raises(
+            pn.UserFunctionError, match='"drive": function of time raised ValueError: no data'
+        ):
+            call(scene, 1.0, q=q)
+    with pytest.raises(pn.UserFunctionError) as caught:
+        pn.simulate(scene, 1.0, q=q)
+    assert 0.0 < caught.value.trajectory.t[-1] <= 0.5
+    assert caught.value.trajectory.q.shape[1] == 6
+    runs = pn.rollout(scene, np.tile(q, (2, 1)), None, 1.0, as_arrays=True, failures="keep")
+    assert [type(runs.failures[k]) for k in range(2)] == [pn.UserFunctionError] * 2
+    assert [runs.failures[k].index for k in range(2)] == [0, 1]
+
+
+def test_an_interrupt_ends_the_runs_of_all_mechanisms() -> None:
+    scene, q = Drive().pendulums(KeyboardInterrupt())
+    with pytest.raises(pn.RunInterrupted, match="the run was interrupted at t = 0 s") as caught:
+        pn.simulate(scene, 1.0, q=q)
+    assert len(caught.value.trajectory) == 0
+    with pytest.raises(pn.RunInterrupted) as caught:
+        pn.rollout(scene, np.tile(q, (3, 1)), None, 1.0, failures="keep")
+    assert caught.value.index == 0
+    assert caught.value.results[1:] == [None, None]
+    with pytest.raises(pn.RunInterrupted, match="the runs were interrupted"):
+        pn.rollout(scene, np.tile(q, (3, 1)), None, 1.0, as_arrays=True, failures="keep")
+
+
 @pytest.mark.parametrize(
     ("said", "groups"),
     [

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
+
+from ..support.refusals import refuses
 
 ROBOTS = (
     "four_bar",
@@ -102,6 +105,56 @@ def test_stepper_takes_torques() -> None:
         scene.stepper(0.01, dt=0.003)
 
 
+def pushed(limit: float) -> pn.Scene:
+    """A block of 1 kg on a rail with friction of 1 N; its torque function raises from `limit` seconds on."""
+    model = pin.Model()
+    block = model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "slide")
+    model.appendBodyToJoint(block, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
+
+    def torque(t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        if t >= limit:
+            raise ValueError("no torque from here on")
+        return np.full(1, 3.0)
+
+    return pn.Scene(model, laws=[pn.JointFriction("slide", coulomb=1.0)], actuation=torque)
+
+
+def test_a_stepper_shows_its_state() -> None:
+    """Under 3 N the block has x = t^2; under half a newton it sticks."""
+    stepper = pushed(np.inf).stepper(0.1, method="rk4", dt=0.1)
+    stepper.step()
+    assert repr(stepper) == "<Stepper at t = 0.1 s>"
+    assert stepper.q == pytest.approx([0.01], rel=1e-12)
+    assert stepper.v == pytest.approx([0.2], rel=1e-12)
+    assert stepper.modes.tolist() == [1]
+    stepper.reset(np.zeros(1), np.zeros(1), t=2.0, tau=[0.5])
+    assert stepper.t == 2.0
+    assert stepper.modes.tolist() == [0]
+    stepper.step()
+    assert (stepper.q == 0.0).all()
+
+
+def test_a_stepper_that_has_stopped_begins_anew() -> None:
+    stepper = pushed(0.15).stepper(0.1, method="rk4", dt=0.1)
+    stepper.step()
+    with pytest.raises(pn.UserFunctionError, match="no torque from here on"):
+        stepper.step()
+    assert repr(stepper) == "<Stepper stopped>"
+    for use in (stepper.step, lambda: stepper.q, lambda: stepper.v, lambda: stepper.t):
+        with refuses("Stepper: the run has stopped; begin anew with reset(q, v)", pn.InputError):
+            use()
+    stepper.reset(np.zeros(1), np.zeros(1))
+    stepper.step({"slide": 2.0})  # a torque by name acts in place of the function
+    assert stepper.q == pytest.approx([0.005], rel=1e-12)
+
+
+@pytest.mark.parametrize("tau", [[1e308], {"slide": 1e308}])
+def test_a_stepper_names_a_motion_that_overflows(tau: list[float] | dict[str, float]) -> None:
+    stepper = pushed(np.inf).stepper(1e10, method="rk4", dt=1e10)
+    with pytest.raises(pn.NonFiniteError, match="not finite"):
+        stepper.step(tau)
+
+
 @pytest.mark.parametrize("method", ["rk4", "dop853"])
 @pytest.mark.parametrize("threads", [1, 2])
 def test_arrays_are_the_samples_of_simulate(scene: pn.Scene, method: str, threads: int) -> None:
@@ -138,6 +191,34 @@ def test_arrays_keep_failures_apart() -> None:
     assert stopped.value.index == 1
     with pytest.raises(pn.InputError, match="states alone"):
         pn.rollout(scene, np.tile(q, (3, 1)), speeds, 0.2, record="a", as_arrays=True)
+
+
+def test_arrays_name_runs_off_their_constraints(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With no room for rounding, every closed loop counts as open."""
+    monkeypatch.setattr("pin_nonideal.simulation.rollout_arrays.LEFT", 0.0)
+    scene = pn.load("four_bar")
+    q, v = scene.initial_state()
+    runs = pn.rollout(scene, np.tile(q, (2, 1)), np.tile(v, (2, 1)), 0.1, as_arrays=True, failures="keep")
+    assert set(runs.failures) == {0, 1}
+    assert isinstance(runs.failures[1], pn.LoopClosureError)
+    assert str(runs.failures[1]).startswith(f"run 1 has left its constraints: gap {runs.violation[1]:.1e} (m")
+
+
+def test_arrays_are_interrupted_as_lists_are() -> None:
+    interrupts: list[float] = []
+
+    def torque(t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        if t > 0.1:
+            interrupts.append(t)
+            raise KeyboardInterrupt
+        return np.zeros(1)
+
+    model = pushed(np.inf).model
+    scene = pn.Scene(model, actuation=torque)
+    for arrays in (False, True):
+        with pytest.raises(pn.RunInterrupted):
+            pn.rollout(scene, np.zeros((2, 1)), None, 1.0, as_arrays=arrays, failures="keep")
+    assert interrupts
 
 
 def test_a_loop_of_many_steps_goes_on() -> None:

@@ -93,6 +93,19 @@ def test_small_steps_end_where_a_mechanism_locks(method):
     assert caught.value.trajectory.violation.max() < OPEN
 
 
+@pytest.mark.parametrize("method", ["dop853", "Radau"])
+def test_a_run_off_its_constraints_is_refused(method, monkeypatch):
+    """With no room for rounding, the first sample of a closed loop that is not exact counts as open."""
+    scene = pn.load("four_bar")
+    residual = pn.simulate(scene, 0.2, method=method).violation
+    first = int((residual > 0.0).argmax())
+    monkeypatch.setattr("pin_nonideal.simulation.results.LEFT", 0.0)
+    with refuses('loop "loop" has opened by t = ', LoopClosureError) as caught:
+        pn.simulate(scene, 0.2, method=method)
+    assert caught.value.gaps == {"loop": pytest.approx(residual[first], abs=1e-15)}
+    assert len(caught.value.trajectory) == first
+
+
 def test_a_model_that_cannot_move():
     with refuses('simulate: "post" has no joint that moves; there is nothing to simulate', InputError):
         pn.simulate(pn.Scene(pin.Model(), name="post"), 1.0)
