@@ -138,6 +138,30 @@ TOLD_FILES = {
         'springs, damping or friction of tendons that wrap "tendon_0"',
         "tendon",
     ),
+    "drive of a wrapping tendon": (
+        """<tendon><spatial name="t"><site site="a"/><geom geom="g"/><site site="b"/></spatial></tendon>
+        <actuator><motor tendon="t"/></actuator>""",
+        'actuators on tendons that wrap "actuator_0"',
+        "tendon",
+    ),
+    "equality of a wrapping tendon": (
+        """<tendon><spatial name="t"><site site="a"/><geom geom="g"/><site site="b"/></spatial></tendon>
+        <equality><tendon name="taut" tendon1="t"/></equality>""",
+        'equality "taut" of tendons that wrap',
+        "tendon",
+    ),
+    "elastic flex": (
+        """<worldbody><flexcomp name="string" type="grid" count="3 1 1" spacing="0.1 0.1 0.1" mass="1"
+        dim="1"><edge stiffness="10"/></flexcomp></worldbody>""",
+        "elasticity of 1 flexes",
+        "flex",
+    ),
+    "equality of a flex": (
+        """<worldbody><flexcomp name="cloth" type="grid" count="3 3 1" spacing="0.1 0.1 0.1" mass="1" dim="2">
+        <edge equality="true"/></flexcomp></worldbody>""",
+        'equality "flex 1" of a flex',
+        "flex",
+    ),
     "tendon armature": (
         '<tendon><fixed armature="0.2"><joint joint="j" coef="1"/></fixed></tendon>',
         'armature of tendons "tendon_0", which no mass matrix of a tree holds',
@@ -208,6 +232,31 @@ def test_notes_of_what_plays_no_part(tmp_path):
         "contacts between geoms (1 pairs) are not carried over",
     ):
         assert words in notes
+
+
+def test_notes_of_bodies_and_drives_that_play_no_part(tmp_path):
+    extra = """<worldbody><body name="hand" mocap="true"><geom size="0.1" pos="0 0 5"/></body></worldbody>
+        <actuator><adhesion name="suction" body="body" ctrlrange="0 1" gain="1"/></actuator>"""
+    rigid = """<worldbody><flexcomp name="net" type="grid" count="3 3 1" spacing="0.1 0.1 0.1" dim="2"
+        rigid="true"/></worldbody>"""
+    notes = pn.load(write(tmp_path, extra + rigid)).notes
+    assert "flexes play no part: their contacts are not carried over" in notes
+    assert 'mocap bodies "hand" are held where they start' in notes
+    assert 'adhesion actuators "suction" pull on contacts, which are not carried over' in notes
+
+
+def test_a_file_without_contacts_has_no_note_of_them(tmp_path):
+    flag = '<option><flag contact="disable"/></option>'
+    assert any("contacts between geoms" in note for note in pn.load(write(tmp_path)).notes)
+    assert not any("contacts between geoms" in note for note in pn.load(write(tmp_path, option=flag)).notes)
+
+
+def test_fields_of_a_newer_mujoco_are_noted(tmp_path, monkeypatch):
+    monkeypatch.setattr(
+        "pin_nonideal.loading.mjcf.unsupported.is_listed", lambda field: field != "jnt_margin"
+    )
+    (note,) = [note for note in pn.load(write(tmp_path)).notes if "not known here" in note]
+    assert note.endswith("has fields that are not known here and may matter: jnt_margin")
 
 
 def test_unknown_allowance_is_refused(tmp_path):

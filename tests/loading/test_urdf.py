@@ -344,6 +344,19 @@ COSMETIC = {
         link("x") + '<material name="dim"><color rgba="0.5 0.5"/></material>',
         'colors that are not four numbers from 0 to 1 are left out, of materials "dim"',
     ),
+    "color of three numbers": (
+        link("x") + '<material name="red"><color rgba="1 0 0"/></material>',
+        None,
+    ),
+    "color that is no number": (
+        link("x") + '<material name="dim"><color rgba="dark red"/></material>',
+        'colors that are not four numbers from 0 to 1 are left out, of materials "dim"',
+    ),
+    "shape of nothing": (
+        link("x", inside="<visual/>"),
+        'shapes of size zero are left out, in links "x"',
+    ),
+    "attribute of another tool": (link("x").replace('name="x"', 'name="x" gz:layer="2"'), None),
     "shape of size zero": (
         link("x", inside=shape("box", 'size="0 0 0"')),
         'shapes of size zero are left out, in links "x"',
@@ -414,6 +427,51 @@ def test_links_without_inertia_take_that_of_their_shapes_when_a_density_is_given
     assert 'inertias of links "x" are those of their shapes at 500 kg/m^3' in scene.notes
     with refuses("density must be positive; got -1", pn.InputError):
         pn.load(tmp_path, density=-1.0)
+
+
+CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+FACES = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]  # of a tetrahedron, counterclockwise from outside
+
+
+def obj(corners, faces):
+    lines = ["v " + " ".join(map(str, corner)) for corner in corners]
+    return "\n".join([*lines, *("f " + " ".join(str(i + 1) for i in face) for face in faces)])
+
+
+def with_density(path, geometry):
+    text = robot(*ARM, BARE.format(geometry), joint("j", "base", "x"))
+    return pn.load(folder(path, urdf=text), density=1000.0)
+
+
+def test_a_sphere_has_the_mass_of_its_volume(tmp_path):
+    model = with_density(tmp_path, '<sphere radius="0.2"/>').model
+    inertia = model.inertias[model.getJointId("j")]
+    mass = 1000.0 * 4.0 / 3.0 * np.pi * 0.2**3
+    assert inertia.mass == pytest.approx(mass, rel=1e-14)
+    np.testing.assert_allclose(inertia.inertia, 0.4 * mass * 0.04 * np.eye(3), atol=1e-12 * mass)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_closed_mesh_has_the_mass_of_its_volume(tmp_path, turned):
+    """A tetrahedron of edges 1, 1, 2 from its corner: volume 1/3, center (1/4, 1/4, 1/2), either way out."""
+    faces = [face[::-1] for face in FACES] if turned else FACES
+    (tmp_path / "wedge.obj").write_text(obj(CORNERS, faces))
+    scene = with_density(tmp_path, '<mesh filename="wedge.obj" scale="1 1 2"/>')
+    inertia = scene.model.inertias[scene.model.getJointId("j")]
+    assert inertia.mass == pytest.approx(1000.0 / 3.0, rel=1e-12)
+    place = pin.SE3(pin.rpy.rpyToMatrix(0.2, 0.1, 0.3), np.array([0.1, 0.2, 0.3]))
+    np.testing.assert_allclose(inertia.lever, place.act(np.array([0.25, 0.25, 0.5])), atol=1e-12)
+    assert not any("bounding boxes" in note for note in scene.notes)
+
+
+def test_an_open_mesh_has_the_mass_of_its_box(tmp_path):
+    (tmp_path / "sheet.obj").write_text(obj(CORNERS, FACES[:3]))
+    scene = with_density(tmp_path, '<mesh filename="sheet.obj" scale="0.1 0.2 0.3"/>')
+    inertia = scene.model.inertias[scene.model.getJointId("j")]
+    assert inertia.mass == pytest.approx(1000.0 * 0.006, rel=1e-12)
+    moments = np.linalg.eigvalsh(inertia.inertia)
+    np.testing.assert_allclose(moments, 6.0 / 12.0 * np.array([0.05, 0.10, 0.13]), rtol=1e-12)
+    assert 'meshes that are not closed count as their bounding boxes, in links "x"' in scene.notes
 
 
 def test_infinite_bounds_are_none(tmp_path):

@@ -99,14 +99,14 @@ def _triangles(vertices: Array, faces: Array, *, solid: bool) -> CollisionGeomet
 
 
 def _height_field(m: MjModel, data: int, *, solid: bool) -> CollisionGeometry:
-    """Return a height field as the triangles of its surface."""
+    """Return a height field as the triangles of its surface, with MuJoCo's diagonals."""
     rows, columns = int(m.hfield_nrow[data]), int(m.hfield_ncol[data])
     start, (x, y, height, _) = int(m.hfield_adr[data]), m.hfield_size[data]
     z = height * np.array(m.hfield_data[start : start + rows * columns], dtype=float)
     across, along = np.meshgrid(np.linspace(-x, x, columns), np.linspace(-y, y, rows))
     corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
-    lower = np.column_stack([corner, corner + 1, corner + columns])
-    upper = np.column_stack([corner + 1, corner + columns + 1, corner + columns])
+    lower = np.column_stack([corner, corner + 1, corner + columns + 1])
+    upper = np.column_stack([corner, corner + columns + 1, corner + columns])
     return _triangles(
         np.column_stack([across.ravel(), along.ravel(), z]), np.vstack([lower, upper]), solid=solid
     )
