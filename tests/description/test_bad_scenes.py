@@ -103,6 +103,18 @@ MISFITS = {
         "UserContact; "
         "got KnifeEdge(frame='j0 tip', axis=(0.0, 1.0, 0.0), name=None)",
     ),
+    "contact within one body": (
+        {"contacts": [PointContact("j0 tip", plane="same", name="toe")]},
+        'PointContact "toe": frame and plane are on the same body, which cannot touch itself',
+    ),
+    "spheres on one body": (
+        {"contacts": [pn.SphereContact("j0 tip", "same", 0.1, name="toe")]},
+        'SphereContact "toe": frame1 and frame2 are on the same body, which cannot touch itself',
+    ),
+    "stop beyond that of the model": (
+        {"contacts": [pn.JointLimit("j0", lower=1.0, name="stop")]},
+        'JointLimit "stop": lower must be below upper; got 1 and 0.5',
+    ),
     "force": ({"forces": [3]}, "a force must be SpringDamper, JointSpring, Wrench or UserForce; got 3"),
     "same names": (
         {"constraints": [pn.PointAnchor("j0 tip", name="a"), pn.PointAnchor("j1 tip", name="a")]},
@@ -153,6 +165,7 @@ MISFITS = {
 def test_what_does_not_fit_the_model(case):
     keywords, message = MISFITS[case]
     model = MODEL.copy()
+    model.upperPositionLimit[0] = 0.5
     model.addFrame(model.frames[model.getFrameId("j0 tip")])
     frame = model.frames[model.getFrameId("j0 tip")]
     model.addFrame(pin.Frame("same", frame.parentJoint, 0, frame.placement, pin.FrameType.OP_FRAME), False)

@@ -302,6 +302,22 @@ REFUSED = {
         lambda: SpringDamper("a", "b"),
         "SpringDamper: stiffness or damping must be positive; both are zero, so leave the force out",
     ),
+    "spring of one frame": (
+        lambda: SpringDamper("a", "a", stiffness=1),
+        'SpringDamper: frame1 and frame2 must differ; both are "a"',
+    ),
+    "joint spring without stiffness": (
+        lambda: JointSpring("j", 0),
+        "JointSpring: stiffness or damping must be positive; both are zero, so leave the force out",
+    ),
+    "rolling on itself": (
+        lambda: Rolling("a", 0.1, plane="a"),
+        'Rolling: frame and plane must differ; both are "a"',
+    ),
+    "bounce of a closed contact": (
+        lambda: PointContact("a", restitution=0.5, unilateral=False),
+        "PointContact: restitution is of a contact that may open; leave it or unilateral=False out",
+    ),
     "negative stiffness": (
         lambda: JointSpring("j", -1),
         "JointSpring: stiffness must not be negative; got -1",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -9,6 +11,7 @@ import pytest
 import pin_nonideal as pn
 from pin_nonideal.errors import InputError, SingularMassError, UnknownNameError
 from pin_nonideal.loading.edit.model import ball_chains, edit_joints
+from pin_nonideal.loading.library.example_robots import example_names, example_robots
 from pin_nonideal.loading.urdf.inertia import mass_diagnosis
 from pin_nonideal.loading.urdf.reader import read_urdf
 
@@ -98,6 +101,51 @@ def test_example_robot_data_couples_mimic_joints():
         ("panda_finger_joint2", "panda_finger_joint1", 1.0)
     ]
     assert {law.joint: law.viscous for law in scene.laws}["panda_finger_joint1"] == 0.3 + 0.3
+
+
+def test_example_robot_data_with_a_loader_of_its_own(monkeypatch):
+    """A robot whose class loads it by itself is the same robot."""
+    from example_robot_data import robots_loader
+
+    class Own(robots_loader.DoublePendulumLoader):
+        def __init__(self, verbose=False):
+            super().__init__(verbose)
+
+    monkeypatch.setitem(robots_loader.ROBOTS, "own", Own)
+    own, listed = pn.load("own"), pn.load("double_pendulum")
+    assert own.model == listed.model
+    np.testing.assert_array_equal(own.q0, listed.q0)
+    assert own.visual_model.ngeoms == listed.visual_model.ngeoms > 0
+
+
+def test_example_robot_data_that_cannot_be_read(monkeypatch):
+    """Its own errors are named, and a file whose mimic joints cannot be read is a note."""
+    from example_robot_data import robots_loader
+
+    class Broken(robots_loader.DoublePendulumLoader):
+        def __init__(self, verbose=False):
+            raise RuntimeError("no mesh\nhere")
+
+    monkeypatch.setitem(robots_loader.ROBOTS, "broken", Broken)
+    with refuses('example-robot-data cannot load "broken": no mesh here'):
+        pn.load("broken")
+
+    def unreadable(path):
+        raise pn.LoadingError("a mimic joint follows nothing")
+
+    monkeypatch.setattr("pin_nonideal.loading.library.example_robots.read_mimics", unreadable)
+    notes = pn.load("double_pendulum").notes
+    assert "mimic joints are left free: a mimic joint follows nothing" in notes
+
+
+def test_without_example_robot_data_its_robots_are_named_missing(monkeypatch):
+    monkeypatch.setitem(sys.modules, "example_robot_data", None)
+    with refuses('robot "panda" may be one of example-robot-data, which cannot be imported'):
+        pn.load("panda")
+    with refuses("pip install example-robot-data-loaders"):
+        example_robots()
+    assert example_names() == ()
+    assert pn.load("four_bar").model.nv == 3
 
 
 def test_example_robot_data_by_name():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -124,11 +125,59 @@ def test_a_plane_of_its_own_and_a_robot_that_stands():
     np.testing.assert_allclose(again.q0, scene.q0, atol=1e-12)
 
 
+def test_a_tilted_plane_and_a_convex_mesh():
+    """The lowest corner of a tetrahedron comes to lie in the plane of a frame on the world."""
+    corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    mesh = coal.BVHModelOBBRSS()
+    mesh.beginModel(4, 4)
+    mesh.addVertices(corners)
+    mesh.addTriangles(np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], dtype=np.uint64))
+    mesh.endModel()
+    mesh.buildConvexHull(True, "Qt")
+    model, shapes = one_body(mesh.convex, np.eye(3))
+    tilt = pin.SE3(pin.rpy.rpyToMatrix(0.3, -0.2, 0.1), np.array([0.1, 0.2, 0.5]))
+    model.addFrame(pin.Frame("slope", 0, 0, tilt, pin.FrameType.OP_FRAME), False)
+    q0 = np.concatenate([[0.0, 0.0, 3.0], pin.Quaternion(0.8, 0.0, 0.6, 0.0).coeffs()])
+    scene = pn.Scene(model, collision_model=shapes, q0=q0).put_on_ground("slope")
+    data = model.createData()
+    pin.forwardKinematics(model, data, scene.q0)
+    heights = [tilt.actInv(data.oMi[1].act(corner))[2] for corner in corners]
+    assert min(heights) == pytest.approx(0.0, abs=1e-12)
+
+
+def scene_of_shapes(shapes):
+    return pn.Scene(one_body(coal.Sphere(0.1), np.eye(3))[0], collision_model=shapes)
+
+
+def on_the_ground():
+    shapes = pin.GeometryModel()
+    shapes.addGeometryObject(pin.GeometryObject("floor", 0, pin.SE3.Identity(), coal.Sphere(0.1)))
+    return shapes
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [
         (lambda: pn.load("four_bar").put_on_ground(), "put_on_ground: model"),
         (lambda: pn.load("solo12").put_on_ground("nowhere"), 'put_on_ground: no frame "nowhere"'),
+        (
+            lambda: pn.load("solo12").put_on_ground("FL_FOOT"),
+            'put_on_ground: plane "FL_FOOT" must be a frame on the world; it is on a moving body',
+        ),
+        (
+            lambda: scene_of_shapes(None).put_on_ground(),
+            'put_on_ground: model "" has no collision shapes; give collision_model=',
+        ),
+        (
+            lambda: scene_of_shapes(on_the_ground()).put_on_ground(),
+            'no collision shape of model "" is on a moving body',
+        ),
+        (
+            lambda: scene_of_shapes(
+                one_body(coal.Halfspace(np.eye(3)[2], 0.0), np.eye(3))[1]
+            ).put_on_ground(),
+            'shape "shape" is a Halfspace, which has no lowest point here; remove it',
+        ),
     ],
 )
 def test_put_on_ground_says_what_it_needs(make, message):

@@ -21,6 +21,7 @@ import pytest
 import pin_nonideal as pn
 from pin_nonideal.sweeps import sweep as sweeping
 from pin_nonideal.sweeps.pack import read_records
+from pin_nonideal.sweeps.store import append_records
 
 from ..support.refusals import refuses
 from ..support.same_run import assert_same_run
@@ -97,6 +98,7 @@ def test_what_is_missing_is_done_and_what_is_there_is_not_done_again(tmp_path):
     before = packs(store)
     assert pn.Sweep(store).missing == [5]
     assert pn.Sweep(store).records[:5] == kept.records[:5]
+    assert pn.Sweep(store)._repr_html_().count(">missing<") == 1
     with refuses("run 5 of the sweep in", pn.LoadingError):
         pn.Sweep(store)[5]
     again = pn.sweep(pendulum, GRID, 0.1, jobs=1, store=store, measure=amplitude)
@@ -227,6 +229,24 @@ class Damped:
 
     def __call__(self, **parameters):
         return pendulum(damping=self.damping, **parameters)
+
+
+def test_files_that_cannot_be_read_or_written_are_named(tmp_path):
+    """A folder in place of a file stands for every error of the system."""
+    runs = pn.sweep(pendulum, GRID[:2], 0.1, jobs=1, store=tmp_path / "runs")
+    for file in runs.folder.glob("*.runs"):
+        file.unlink()
+        file.mkdir()
+    with refuses(f'cannot read run 0 from "{runs.folder}', pn.LoadingError):
+        runs[0]
+    index = runs.folder / "index.jsonl"
+    index.unlink()
+    index.mkdir()
+    with refuses(f'cannot write "{index}": ', pn.OutputError):
+        append_records(runs.folder, [{"run": 1}])
+    (tmp_path / "file").write_text("")
+    with refuses(f'cannot write the sweep to "{tmp_path / "file"}": ', pn.OutputError):
+        pn.sweep(pendulum, GRID[:1], 0.1, jobs=1, store=tmp_path / "file")
 
 
 def test_makers_are_told_apart_by_what_they_hold(tmp_path):

@@ -9,6 +9,7 @@ import json
 import os
 import pickle
 import re
+import sys
 import zipfile
 
 import numpy as np
@@ -17,6 +18,7 @@ import pytest
 
 import pin_nonideal as pn
 from pin_nonideal.errors import InputError, LoadingError, OutputError
+from pin_nonideal.trajectory.records import Event
 
 from ..support.mechanisms import body, empty
 from ..support.refusals import refuses
@@ -101,6 +103,32 @@ def test_recorded_acceleration_of_laws_with_states():
         now = float(sampled.z[k, 0])
         expected = frozen.acceleration(sampled.q[k], sampled.v[k])
         np.testing.assert_allclose(sampled.a[k], expected, rtol=1e-9, atol=1e-9)
+
+
+def test_what_needs_the_scene_says_so(run, tmp_path):
+    dense = pn.simulate(run.scene, 0.1, record="dense")
+    lost = pn.Trajectory.load(dense.save(tmp_path / "run.npz"), scene=None)
+    with refuses("at(t) needs the scene of the run, which this one has lost", InputError):
+        lost.at(0.05)
+    with refuses('frame("coupler_tip") needs the scene of the run, which this one has lost', InputError):
+        lost.frame("coupler_tip")
+    with refuses('at(t) needs a run with record="dense"', InputError):
+        run.at(0.05)
+
+
+def test_events_are_equal_by_their_values():
+    """Equal events have one hash, and an event equals nothing else."""
+    one, same = (Event(0.5, "impact", "foot", impulse=np.array([1.0, 0.2, 0.0])) for _ in range(2))
+    assert one == same
+    assert len({one, same}) == 1
+    assert one != dataclasses.replace(one, impulse=np.array([1.0, 0.3, 0.0]))
+    assert one != (0.5, "impact", "foot")
+
+
+def test_tables_of_pandas_say_what_to_install(run, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with refuses("to_dataframe needs pandas, which cannot be imported", InputError):
+        run.to_dataframe()
 
 
 def test_words(run):
