@@ -9,27 +9,20 @@ from numpy.typing import ArrayLike
 
 from pin_nonideal.compilation.report import report
 from pin_nonideal.compilation.summary import Description, describe
-from pin_nonideal.description.actuation import Actuation
-from pin_nonideal.description.constraints import Constraint
-from pin_nonideal.description.contacts import Contact
-from pin_nonideal.description.forces import Force
-from pin_nonideal.description.laws import Law
 from pin_nonideal.equation import Solution
-from pin_nonideal.geometry.from_model import GeometryContact
 from pin_nonideal.states.report import ProjectionReport
 from pin_nonideal.types import Array, State
 from pin_nonideal.validation import choice, number
 
-from .base import SceneBase, compiled_scene, scene_origin, scene_states, with_origin
-from .copying import rebuilt
-from .editing import UNCHANGED, Unchanged, on_ground, parts_of_replacement
+from .base import compiled_scene, scene_origin, scene_states, with_origin
+from .editable import EditableScene
 from .stepping import Stepper
 from .text import html_summary, notes_of
 
 __all__ = ["Scene", "compiled_scene", "scene_origin", "scene_states", "with_origin"]
 
 
-class Scene(SceneBase):
+class Scene(EditableScene):
     """A Pinocchio model with constraints, laws, contacts, forces and actuation.
 
     The constructor checks all descriptions and removes rows that can never act.
@@ -337,80 +330,6 @@ class Scene(SceneBase):
             RunError: no motion exists from the initial state.
         """
         return self._stepper.stepper(period, q, v, t0, tau, method, dt, rtol, atol)
-
-    # --- new scenes -----------------------------------------------------------------------------------------
-
-    def replace(
-        self,
-        *,
-        constraints: Sequence[Constraint] | None = None,
-        laws: Sequence[Law] | None = None,
-        contacts: Sequence[Contact | GeometryContact] | None = None,
-        forces: Sequence[Force] | None = None,
-        add_constraints: Sequence[Constraint] = (),
-        add_laws: Sequence[Law] = (),
-        add_contacts: Sequence[Contact | GeometryContact] = (),
-        add_forces: Sequence[Force] = (),
-        remove: Sequence[str] = (),
-        actuation: Actuation | Unchanged | None = UNCHANGED,
-        q0: State | None = None,
-        v0: State | None = None,
-        name: str | None = None,
-    ) -> Scene:
-        """Return a new scene with some parts replaced, added or removed. The present scene does not change.
-
-        The new scene has the same model, shapes, notes, source, licence and named entries of the initial
-        state. `resume` and `Trajectory.load` cannot create it from the robot's file; pass the scene to them.
-
-        Args:
-            constraints: all constraints of the new scene; the present ones when None.
-            laws: all laws; the present ones when None.
-            contacts: all contacts; the present ones when None.
-            forces: all forces; the present ones when None.
-            add_constraints: constraints in addition.
-            add_laws: laws in addition.
-            add_contacts: contacts in addition.
-            add_forces: forces in addition.
-            remove: names of present constraints, laws, contacts and forces to leave out.
-            actuation: actuation of the new scene, None for no actuation; unchanged if left out.
-            q0: initial configuration, (nq,) or by joint name (the others as now); the present one when None.
-            v0: initial velocity, (nv,) or by joint name (the others as now); the present one when None.
-            name: name of the new scene; the present name when None.
-
-        Returns:
-            The new Scene.
-
-        Raises:
-            InputError, UnknownNameError: something does not fit the model, or nothing has a name in `remove`.
-        """
-        lists = {"constraints": constraints, "laws": laws, "contacts": contacts, "forces": forces}
-        added = {
-            "constraints": add_constraints,
-            "laws": add_laws,
-            "contacts": add_contacts,
-            "forces": add_forces,
-        }
-        given = {"actuation": actuation, "q0": q0, "v0": v0, "name": name}
-        parts = parts_of_replacement(self._parts(), self._compiled, self._states, lists, added, remove, given)
-        return rebuilt(type(self), parts)  # type: ignore[no-any-return]
-
-    def put_on_ground(self, plane: str | None = None) -> Scene:
-        """Return a new scene with its floating robot moved along a normal until a collision shape touches.
-
-        The initial configuration is taken with loops closed. All floating bodies move by the same distance.
-
-        Args:
-            plane: name of a frame on the world, whose z axis is the normal; None for the ground z = 0.
-
-        Returns:
-            The new Scene.
-
-        Raises:
-            InputError: there is no floating base, no collision shape, or the plane moves.
-            UnknownNameError: there is no such frame.
-        """
-        q, _ = self.initial_state()
-        return self.replace(q0=on_ground(self.model, self.collision_model, q, plane))
 
     # --- text -----------------------------------------------------------------------------------------------
 

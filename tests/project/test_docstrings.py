@@ -48,16 +48,24 @@ BUILT = {
     for name, thing in CLASSES.items()
     if name not in DATACLASSES and "__init__" in vars(thing) and not issubclass(thing, BaseException)
 }
+
+
+def members(thing: type) -> dict[str, Any]:
+    """Members of a class and of its bases in this package."""
+    own = [base for base in reversed(thing.__mro__) if base.__module__.startswith("pin_nonideal.")]
+    return {name: member for base in own for name, member in vars(base).items()}
+
+
 METHODS = {
     f"{class_name}.{name}": getattr(member, "__func__", member)
     for class_name, thing in CLASSES.items()
-    for name, member in vars(thing).items()
+    for name, member in members(thing).items()
     if not name.startswith("_") and inspect.isfunction(getattr(member, "__func__", member))
 }
 PROPERTIES = {
     f"{class_name}.{name}": member
     for class_name, thing in CLASSES.items()
-    for name, member in vars(thing).items()
+    for name, member in members(thing).items()
     if not name.startswith("_") and isinstance(member, property)
 }
 
