@@ -154,8 +154,8 @@ def _remove_left_over(target: Path) -> None:
     beginning = _part(target, 0).removesuffix("0.")
     pattern = re.compile(re.escape(beginning) + r"(\d+)\..*" + re.escape(PART))
     for entry in list(os.scandir(target.parent)):
-        found = pattern.fullmatch(entry.name)
-        if found is not None and not _is_running(int(found[1])):
+        match = pattern.fullmatch(entry.name)
+        if match is not None and not _is_running(int(match[1])):
             Path(entry.path).unlink(missing_ok=True)
 
 

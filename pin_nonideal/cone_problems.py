@@ -139,17 +139,17 @@ def _bounds(name: str, values: Array) -> Array:
 
 def _contacts(rows: int, mu: Array, dims: ArrayLike | None) -> tuple[list[int], Array]:
     """Return the number of rows and the coefficient of each contact; `rows` is the total number of rows."""
-    given = None if dims is None else array("dims", dims, (None,) * _depth(dims))
-    if given is not None and given.ndim == 1:
-        count = len(given)
+    sizes = None if dims is None else array("dims", dims, (None,) * _depth(dims))
+    if sizes is not None and sizes.ndim == 1:
+        count = len(sizes)
     elif mu.ndim == 1 and len(mu) > 0:
         count = len(mu)
     else:
-        count = rows // (LARGEST if given is None else max(int(given), 1)) if rows > 0 else 0
-    if given is None:
-        given = np.asarray(rows // count if count else LARGEST)
-    each = [int(d) for d in np.broadcast_to(given, (count,))]
-    if sum(each) != rows or any(not 1 <= d <= LARGEST for d in each) or (given != given.astype(int)).any():
+        count = rows // (LARGEST if sizes is None else max(int(sizes), 1)) if rows > 0 else 0
+    if sizes is None:
+        sizes = np.asarray(rows // count if count else LARGEST)
+    each = [int(d) for d in np.broadcast_to(sizes, (count,))]
+    if sum(each) != rows or any(not 1 <= d <= LARGEST for d in each) or (sizes != sizes.astype(int)).any():
         raise InputError(
             f"dims must be 1, 2 or 3 a contact and add up to the {rows} rows of contacts in w0, got {each};"
             " pass dims, or as many coefficients mu as there are contacts"

@@ -28,23 +28,24 @@ def load_core() -> ModuleType:
         ImportError: the core is missing, does not load, or was built for another minor version of `pin`.
     """
     # Pinocchio is imported first, since it registers the conversion of Python models that the core needs.
-    found = str(pinocchio.__version__)
+    installed = str(pinocchio.__version__)
     try:
         core = importlib.import_module("pin_nonideal._core")
     except ModuleNotFoundError:
         raise ImportError(_missing()) from None
     except ImportError as error:
         raise ImportError(
-            f"the compiled core of pin_nonideal does not load beside Pinocchio {found} ({error}); {_again()}"
+            f"the compiled core of pin_nonideal does not load beside Pinocchio {installed} ({error}); "
+            f"{_again()}"
         ) from error
     # A source folder named _core imports as an empty namespace package when nothing is compiled.
     if getattr(core, "__file__", None) is None:
         raise ImportError(_missing())
     built = str(core.pinocchio_version)
-    if built.split(".")[:2] != found.split(".")[:2]:
+    if built.split(".")[:2] != installed.split(".")[:2]:
         raise ImportError(
             f"the compiled core of pin_nonideal was built for Pinocchio {built}, and "
-            f"Pinocchio {found} is installed; {_again()}"
+            f"Pinocchio {installed} is installed; {_again()}"
         )
     return core
 

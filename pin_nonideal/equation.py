@@ -253,8 +253,8 @@ def checked_problem(
         raise InputError(f"M must have shape (n, n) with n >= 1, got {M.shape}; pass the mass matrix")
     n = M.shape[0]
     if (A is None) != (b is None):
-        given, absent = ("A", "b") if b is None else ("b", "A")
-        raise InputError(f"A and b must come together, got {given} without {absent}; pass {absent} as well")
+        present, absent = ("A", "b") if b is None else ("b", "A")
+        raise InputError(f"A and b must come together, got {present} without {absent}; pass {absent} as well")
     F = _numbers("F", F)
     A = np.zeros((0, n)) if A is None else _numbers("A", A)
     b = np.zeros(0) if b is None else _numbers("b", b)

@@ -191,8 +191,8 @@ def floats(
     `copy`, an array of floats is not copied.
     """
     try:
-        given = np.asarray(value)
-        result = np.array(given, dtype=float, copy=copy or None) if given.dtype.kind in kinds else None
+        source = np.asarray(value)
+        result = np.array(source, dtype=float, copy=copy or None) if source.dtype.kind in kinds else None
     except (TypeError, ValueError):  # rows of unequal length, or objects that are no numbers
         result = None
     if result is None or (result.size <= FEW and math.isfinite(sum(result.ravel().tolist()))):
@@ -220,11 +220,11 @@ def array(what: str, value: object, shape: Sequence[int | None], copy: bool = Tr
     if result is not None and where is None and result.shape == shape:
         result.setflags(write=False)
         return result
-    wanted = str(tuple("n" if s is None else s for s in shape)).replace("'", "")
+    expected = str(tuple("n" if s is None else s for s in shape)).replace("'", "")
     if result is None:
-        raise InputError(f"{what} must be an array of numbers of shape {wanted}; got {short_repr(value)}")
+        raise InputError(f"{what} must be an array of numbers of shape {expected}; got {short_repr(value)}")
     if result.ndim != len(shape) or any(s not in (None, n) for s, n in zip(shape, result.shape, strict=True)):
-        raise InputError(f"{what} must have shape {wanted}; got shape {result.shape}")
+        raise InputError(f"{what} must have shape {expected}; got shape {result.shape}")
     if where is not None:
         place = f"entry {list(where)} is" if where else "got"
         raise InputError(f"{what} must be finite; {place} {result[where]}")

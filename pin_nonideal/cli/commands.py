@@ -92,10 +92,10 @@ def replay_file(options: argparse.Namespace) -> int:
     if number is None:
         run, page = Trajectory.load(path, scene=scene), path.with_suffix(".html")
     else:
-        kept = Sweep(path)
-        if not 0 <= number < len(kept):
-            raise InputError(f"--run must be at least 0 and below {len(kept)}; got {number}")
-        run, page = kept.load(number, scene), path.with_name(f"{path.resolve().name}.{number}.html")
+        stored_runs = Sweep(path)
+        if not 0 <= number < len(stored_runs):
+            raise InputError(f"--run must be at least 0 and below {len(stored_runs)}; got {number}")
+        run, page = stored_runs.load(number, scene), path.with_name(f"{path.resolve().name}.{number}.html")
     if run.scene is None:
         because = f": {run.notes[-1]}" if run.notes else ""
         raise InputError(
@@ -134,17 +134,17 @@ def print_equilibrium(scene: Scene, q: Any, as_json: bool) -> int:
         q: start configuration by joint name, or None.
         as_json: whether to print JSON, for programs.
     """
-    found = equilibrium(scene, q)
+    rest = equilibrium(scene, q)
     places = compiled_scene(scene).joints
-    values = {p.name: found.q[p.q_first : p.q_first + p.nq].tolist() for p in places}
+    values = {p.name: rest.q[p.q_first : p.q_first + p.nq].tolist() for p in places}
     if as_json:
-        data = {"q": values, "stable": found.stable, "left": found.left, "rates": found.rates.real.tolist()}
+        data = {"q": values, "stable": rest.stable, "left": rest.left, "rates": rest.rates.real.tolist()}
         print(json.dumps(data, indent=2))
         return 0
-    print({True: "stable", False: "unstable", None: "neutral"}[found.stable])
+    print({True: "stable", False: "unstable", None: "neutral"}[rest.stable])
     width = max(len(name) for name in values)
     for place in places:
-        x = found.q[place.q_first : place.q_first + place.nq]
+        x = rest.q[place.q_first : place.q_first + place.nq]
         turns = place.kind.startswith(("JointModelRUB", "JointModelRevoluteUnbounded"))
         shown = [np.arctan2(x[1], x[0])] if turns else x
         print(f"  {place.name:{width}}  " + " ".join(f"{number:.9g}" for number in shown))
@@ -169,15 +169,15 @@ def sweep_file(options: argparse.Namespace) -> int:
         key: tuple(x) if isinstance(x, list) else x for key, x in (table.get("options") or {}).items()
     }
     keep = str(table.get("failures", "keep"))
-    kept: Any = sweep(make, points, table["duration"], jobs=jobs, store=store, failures=keep, **settings)
-    print(kept)
-    for name, data in kept.summary().items():
+    runs: Any = sweep(make, points, table["duration"], jobs=jobs, store=store, failures=keep, **settings)
+    print(runs)
+    for name, data in runs.summary().items():
         q = data["quantiles"]
         print(
             f"  {name}: mean {data['mean']:.6g}, median {q[0.5]:.6g}, 90 % in {q[0.05]:.6g} to {q[0.95]:.6g}"
         )
-    for k, error in list(kept.failures.items())[:10]:
-        print(f"  run {k} {kept.records[k]['parameters']}: {error}")
+    for k, error in list(runs.failures.items())[:10]:
+        print(f"  run {k} {runs.records[k]['parameters']}: {error}")
     return 0
 
 

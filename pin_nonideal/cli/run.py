@@ -77,8 +77,8 @@ def _print_and_write(run: Trajectory, options: argparse.Namespace, writers: list
 def _simulation_settings(options: argparse.Namespace) -> Table:
     """Return keyword arguments of `simulate` from the command line, with defaults for pictures."""
     keys = ("method", "rtol", "atol", "dt", "output_dt", "several", "checkpoint")
-    given = {key: getattr(options, key) for key in keys}
-    settings = {key: value for key, value in given.items() if value is not None}
+    values = {key: getattr(options, key) for key in keys}
+    settings = {key: value for key, value in values.items() if value is not None}
     pictures = options.html is not None or options.plot is not None
     if pictures and options.output_dt is None:
         low, high = PICTURE_SAMPLES
@@ -96,12 +96,12 @@ def _writers(options: argparse.Namespace) -> list[Writer]:
     """Return the output files with their writers; the check comes before the run, which may be long."""
     if options.plot is not None:
         picture_format(options.plot)
-    asked: list[tuple[Path | None, Callable[[Trajectory, Path], Path]]] = [
+    outputs: list[tuple[Path | None, Callable[[Trajectory, Path], Path]]] = [
         (options.save, lambda run, path: run.save(path)),
         (options.html, _write_replay),
         (options.plot, _write_figure),
     ]
-    writers = [(path, writer) for path, writer in asked if path is not None]
+    writers = [(path, writer) for path, writer in outputs if path is not None]
     for path, _ in writers:
         folder = path.parent
         if not folder.is_dir():

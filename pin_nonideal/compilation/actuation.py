@@ -198,7 +198,7 @@ def gains_of(model: Model, gain: object, who: str) -> Array:
     return named_joint_values(model, gain, who)
 
 
-def commanded(model: Model, given: object) -> Mask:
+def commanded(model: Model, torques: object) -> Mask:
     """Return the mask of the degrees of freedom that torques, samples or gains command, (nv,).
 
     A table by joint name commands its joints. A number commands the joints with one degree of freedom, and an
@@ -206,11 +206,11 @@ def commanded(model: Model, given: object) -> Mask:
 
     Args:
         model: pinocchio.Model.
-        given: see above; names exist.
+        torques: see above; names exist.
     """
     acts = np.zeros(model.nv, dtype=bool)
-    table = by_name(given)
-    if table is None and not isinstance(given, float):
+    table = by_name(torques)
+    if table is None and not isinstance(torques, float):
         return ~acts
     names = None if table is None else {joint_named(model, name, "actuation") for name in table}
     for j, place in enumerate(joint_places(model), start=1):

@@ -180,13 +180,13 @@ def zero_rows(
 
 
 def _check_vanishing(
-    name: str, local: int, asked: float, largest: float, gap: float, tolerance: float
+    name: str, local: int, acceleration: float, largest: float, gap: float, tolerance: float
 ) -> None:
     """Check that a vanishing row has zero right-hand side and a residual within the tolerance."""
-    if asked > SUM_ROUNDING * max(1.0, largest):
+    if acceleration > SUM_ROUNDING * max(1.0, largest):
         raise InconsistentConstraintsError(
-            f'row {local} of constraint "{name}" moves nothing and asks for the acceleration {asked:.1e}; '
-            "the joints leave that direction no freedom: drop the row or free a joint"
+            f'row {local} of constraint "{name}" moves nothing and asks for the acceleration '
+            f"{acceleration:.1e}; the joints leave that direction no freedom: drop the row or free a joint"
         )
     if gap > tolerance:
         raise LoopClosureError(

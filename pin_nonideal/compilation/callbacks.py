@@ -157,10 +157,10 @@ def breaks(function: object, who: str) -> list[float]:
     Raises:
         InputError: the attribute is no ascending sequence of times.
     """
-    given = getattr(function, "breaks", None)
-    if given is None or isinstance(function, Spline):
+    attribute = getattr(function, "breaks", None)
+    if attribute is None or isinstance(function, Spline):
         return []
-    times = array(f"{who}: breaks", given, (None,))
+    times = array(f"{who}: breaks", attribute, (None,))
     if (np.diff(times) <= 0.0).any():
         raise InputError(f"{who}: breaks must increase; got {times}")
     return [float(t) for t in times]
@@ -186,15 +186,15 @@ def _check_derivatives(jet: Callable[..., Any], who: str) -> None:
             for t, before, at, after in ends
         ]
         wrong = [
-            (t, difference, given)
-            for t, difference, given, size in rows
-            if abs(difference - given) > COARSE * max(abs(difference), abs(given)) + ROUNDING * (1.0 + size)
+            (t, difference, stated)
+            for t, difference, stated, size in rows
+            if abs(difference - stated) > COARSE * max(abs(difference), abs(stated)) + ROUNDING * (1.0 + size)
         ]
         if wrong and len(wrong) == len(rows):
-            t, difference, given = wrong[0]
+            t, difference, stated = wrong[0]
             raise InputError(
                 f"{who}: function of time: {derivative} must be the derivative of {quantity}; at t = {t:g} s "
-                f"it returns {given:.6g}, and differences give {difference:.6g}; mend it, or use sinusoid, "
+                f"it returns {stated:.6g}, and differences give {difference:.6g}; mend it, or use sinusoid, "
                 "polynomial or spline"
             )
 

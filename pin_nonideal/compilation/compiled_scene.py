@@ -98,8 +98,8 @@ class CompiledScene:
         if self.dropped:
             idle = {(name, row) for name, row, _ in self.dropped}
             for block, c in enumerate(self.program.constraints):
-                kept = [row for row in range(c.count) if (c.name, row) not in idle]
-                builder.keep_rows(block, kept)
+                acting_rows = [row for row in range(c.count) if (c.name, row) not in idle]
+                builder.keep_rows(block, acting_rows)
             for row, first, factor in duplicate_rows:
                 builder.add_copy(row, first, factor)
             self.program = builder.finish()

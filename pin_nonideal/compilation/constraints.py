@@ -253,10 +253,10 @@ def anchor_frames(
         constraints: names and descriptions.
         resolver: frames and joints by name.
     """
-    found: list[tuple[str, int, int | None]] = []
+    frames: list[tuple[str, int, int | None]] = []
     for name, c in constraints:
         if isinstance(c, (PointAnchor, FrameAnchor, HingeAnchor, Distance)):
             with suppress(UnknownNameError):  # a joint without a frame
                 second = None if c.frame2 is None else resolver.frame_id(c.frame2, "")
-                found.append((name, resolver.frame_id(c.frame1, ""), second))
-    return found
+                frames.append((name, resolver.frame_id(c.frame1, ""), second))
+    return frames

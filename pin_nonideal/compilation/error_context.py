@@ -229,13 +229,13 @@ def joint_of(model: Model, dof: int) -> int:
 
 def _paradox(names: Sequence[str], failure: core.CoreFailure) -> RunError:
     shown, t = core.Solutions, failure.time
-    found, way_out = {
+    solutions, way_out = {
         shown.several: ("several solutions", 'go on with the nearer one by several="continue", reduce mu,'),
         shown.none: ("no solution", "reduce mu,"),
     }.get(failure.solutions, ("no solution or several", "reduce mu,"))
     limits = " and ".join(", ".join(f"{x:.4g}" for x in each) for each in failure.limits)
     return FrictionParadoxError(
-        f"friction of {_listed(names)} has {found} at t = {t:.4g} s: "
+        f"friction of {_listed(names)} has {solutions} at t = {t:.4g} s: "
         + (f"limits of {limits} (N m or N), " if limits else "")
         + f'det(I - d lam\'/d lam) = {failure.value:.3g}; {way_out} or use reaction="ideal"',
         element=", ".join(names),

@@ -69,13 +69,15 @@ def parse_overrides(compiled: CompiledScene, parameters: Mapping[str, object], n
     """
     columns: dict[tuple[str, int, str], Array] = {}
     parts = _parts(compiled) if parameters else {}
-    for name, given in parameters.items():
+    for name, entries in parameters.items():
         if name == "gravity":
-            columns["gravity", 0, ""] = array("rollout: gravity", given, (n, 3))
-        elif isinstance(given, Mapping) and set(given) <= {"mass", "inertia"} and _is_body(compiled, name):
-            columns |= _body(compiled, name, given, n)
+            columns["gravity", 0, ""] = array("rollout: gravity", entries, (n, 3))
+        elif (
+            isinstance(entries, Mapping) and set(entries) <= {"mass", "inertia"} and _is_body(compiled, name)
+        ):
+            columns |= _body(compiled, name, entries, n)
         elif name in parts:
-            columns |= _columns(name, given, n, parts[name])
+            columns |= _columns(name, entries, n, parts[name])
         else:
             known = [*parts, *list(compiled.model.names)[1:], "gravity"]
             raise UnknownNameError(
@@ -122,26 +124,26 @@ def _parts(compiled: CompiledScene) -> dict[str, list[tuple[LoweredItem, _Relowe
     return parts
 
 
-def _body(compiled: CompiledScene, name: str, given: Mapping[str, object], n: int) -> dict[Any, Array]:
+def _body(compiled: CompiledScene, name: str, entries: Mapping[str, object], n: int) -> dict[Any, Array]:
     """Return mass, center of mass and inertia of a joint's body for all runs."""
     who = f'rollout: parameters: "{name}"'
     if compiled.spec.terms != "core":
         raise InputError(f'{who}: masses can differ between runs with terms="core" only')
-    if len(given) != 1:
+    if len(entries) != 1:
         raise InputError(f'{who}: give "mass" or "inertia", not both')
     joint = int(compiled.model.getJointId(name))
     own = compiled.model.inertias[joint]
-    if "mass" in given:
-        mass = array(f"{who}: mass", given["mass"], (n,))
+    if "mass" in entries:
+        mass = array(f"{who}: mass", entries["mass"], (n,))
     else:
-        dynamic = array(f"{who}: inertia", given["inertia"], (n, 10))
+        dynamic = array(f"{who}: inertia", entries["inertia"], (n, 10))
         mass = dynamic[:, 0]
-    if own.mass == 0.0 and "mass" in given:
+    if own.mass == 0.0 and "mass" in entries:
         raise InputError(f'{who}: the body has no mass, whose inertia would go with it; give "inertia"')
     heavy = mass > 0.0  # Pinocchio creates no inertia without a positive mass
     if not heavy.all():
         bodies = []
-    elif "mass" in given:
+    elif "mass" in entries:
         bodies = [pin.Inertia(m, own.lever, own.inertia * (m / own.mass)) for m in mass]
     else:
         bodies = [pin.Inertia.FromDynamicParameters(p) for p in dynamic]
@@ -161,10 +163,12 @@ def _body(compiled: CompiledScene, name: str, given: Mapping[str, object], n: in
     } | {("body", joint, f"inertia {axis}"): turns[:, :, k] for k, axis in enumerate("xyz")}
 
 
-def _columns(name: str, given: object, n: int, parts: list[tuple[LoweredItem, _Relower]]) -> dict[Any, Array]:
+def _columns(
+    name: str, entries: object, n: int, parts: list[tuple[LoweredItem, _Relower]]
+) -> dict[Any, Array]:
     """Return the numbers of the program that depend on the given fields of a description, for all runs."""
     described = parts[0][0].description
-    others = list(_descriptions(name, described, given, n))
+    others = list(_descriptions(name, described, entries, n))
     columns: dict[object, Array] = {}
     for item, relower in parts:
         arguments = [relower.arguments(item, other, name) for other in others]
@@ -177,23 +181,24 @@ def _columns(name: str, given: object, n: int, parts: list[tuple[LoweredItem, _R
     return columns
 
 
-def _descriptions(name: str, described: object, given: object, n: int) -> Iterator[object]:
+def _descriptions(name: str, described: object, entries: object, n: int) -> Iterator[object]:
     """Yield the description of each run, with the checks of its constructor."""
     who = f'rollout: parameters: "{name}"'
     if isinstance(described, np.ndarray):
-        yield from array(who, given, (n, len(described)))
+        yield from array(who, entries, (n, len(described)))
         return
-    if not is_dataclass(described) or not isinstance(given, Mapping):
+    if not is_dataclass(described) or not isinstance(entries, Mapping):
         raise InputError(
-            f"{who} must be values by field of a description; got {short_repr(given)} for {label(described)}"
+            f"{who} must be values by field of a description; got {short_repr(entries)} "
+            f"for {label(described)}"
         )
     known = [field.name for field in fields(described)]
-    for key, values in given.items():
+    for key, values in entries.items():
         if key not in known or key == "name":
             raise UnknownNameError(f'{who}: no field "{key}"{nearest(str(key), known)}')
         if not isinstance(values, (list, tuple, np.ndarray)) or np.shape(values)[:1] != (n,):
             raise InputError(f"{who}: {key} must be {n} values, one a run; got {short_repr(values)}")
-    plain = {key: v.tolist() if isinstance(v, np.ndarray) else v for key, v in given.items()}
+    plain = {key: v.tolist() if isinstance(v, np.ndarray) else v for key, v in entries.items()}
     for k in range(n):
         one: Any = described
         try:

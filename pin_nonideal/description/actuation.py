@@ -231,17 +231,17 @@ def checked_gain(what: str, value: object) -> float | Array | dict[str, Array]:
     return float(checked) if checked.ndim == 0 else checked
 
 
-def sample_times(who: str, given: object) -> Array:
+def sample_times(who: str, values: object) -> Array:
     """Return increasing sample times [s], (nt,) with nt >= 1, read-only.
 
     Args:
         who: label of the description.
-        given: the argument.
+        values: the argument.
 
     Raises:
         InputError: there is no sample, or a time does not follow the one before it.
     """
-    times = array(f"{who}: times", given, (None,))
+    times = array(f"{who}: times", values, (None,))
     if times.size == 0:
         raise InputError(f"{who}: times must hold at least one sample; got none")
     late = np.flatnonzero(np.diff(times) <= 0.0)
@@ -254,20 +254,20 @@ def sample_times(who: str, given: object) -> Array:
     return times
 
 
-def checked_samples(what: str, given: object, count: int) -> Array | dict[str, Array]:
+def checked_samples(what: str, values: object, count: int) -> Array | dict[str, Array]:
     """Return samples of all joints, (nt, n), or by joint name, (nt,) or (nt, n) for each joint.
 
     Args:
         what: words for messages.
-        given: the argument: an array, a dict or a pandas DataFrame.
+        values: the argument: an array, a dict or a pandas DataFrame.
         count: nt.
 
     Raises:
         InputError: a shape does not fit, or a number is not finite.
     """
-    samples = by_name(given)
+    samples = by_name(values)
     if samples is None:
-        return array(what, given, (count, None))
+        return array(what, values, (count, None))
     return {
         name: array(f'{what} of "{name}"', x, (count,) if np.ndim(x) < 2 else (count, None))
         for name, x in samples.items()
@@ -321,10 +321,10 @@ def requesting_drives(actuation: object) -> list[object]:
     Args:
         actuation: the actuation of a scene, as returned by `given_actuation`.
     """
-    found: list[object] = []
+    requesting: list[object] = []
     for drive in drives_of(actuation):
-        found += drives_of(drive.actuation) if isinstance(drive, EffortLimits) else [drive]
-    return found
+        requesting += drives_of(drive.actuation) if isinstance(drive, EffortLimits) else [drive]
+    return requesting
 
 
 def sampled_drives(actuation: object) -> list[Any]:

@@ -87,18 +87,18 @@ class PointAnchor:
     def __post_init__(self) -> None:
         _name(self)
         _frames(self)
-        given = self.axes
+        letters = self.axes
         if (
-            not isinstance(given, str)
-            or not given
-            or set(given) - set("xyz")
-            or len(set(given)) != len(given)
+            not isinstance(letters, str)
+            or not letters
+            or set(letters) - set("xyz")
+            or len(set(letters)) != len(letters)
         ):
             raise InputError(
                 f'{label(self)}: axes must be one or more of the letters "xyz", each once; '
-                f"got {short_repr(given)}"
+                f"got {short_repr(letters)}"
             )
-        object.__setattr__(self, "axes", "".join(sorted(given)))
+        object.__setattr__(self, "axes", "".join(sorted(letters)))
 
 
 @dataclass(frozen=True)

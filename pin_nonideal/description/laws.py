@@ -163,12 +163,12 @@ class JointFriction:
             joints = [name for name in single if name not in mimics]
         table = joints if isinstance(joints, Mapping) else {name: {} for name in joints}
         laws = []
-        for joint, given in table.items():
+        for joint, fields in table.items():
             if joint not in known:
                 raise UnknownNameError(
                     f'JointFriction.for_joints: no joint "{joint}"{nearest(str(joint), known)}'
                 )
-            own = given if isinstance(given, Mapping) else {"coulomb": given}
+            own = fields if isinstance(fields, Mapping) else {"coulomb": fields}
             laws.append(cls(joint, **{"name": f"{joint} friction", **coefficients, **own}))  # type: ignore[arg-type]
         return laws
 

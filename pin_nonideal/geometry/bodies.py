@@ -107,12 +107,13 @@ def shape_color(what: str, color: ArrayLike | None) -> Array | None:
     """
     if color is None:
         return None
-    given = array(what, color, (None,))
-    if len(given) not in (3, 4) or (given < 0.0).any() or (given > 1.0).any():
+    channels = array(what, color, (None,))
+    if len(channels) not in (3, 4) or (channels < 0.0).any() or (channels > 1.0).any():
         raise InputError(
-            f"{what} must be red, green, blue and optionally opacity, each from 0 to 1; got {given.tolist()}"
+            f"{what} must be red, green, blue and optionally opacity, each from 0 to 1; "
+            f"got {channels.tolist()}"
         )
-    return np.array([*given, 1.0][:4])
+    return np.array([*channels, 1.0][:4])
 
 
 def _inertia(who: str, shape: object, density: float | None, mass: float | None) -> pin.Inertia:

@@ -143,14 +143,14 @@ def geometry_contacts(
             pin.removeCollisionPairs(model, pairs, str(path), False)
         except Exception as error:  # errors of Pinocchio and of its XML reader
             raise LoadingError(f'geometry_contacts: srdf "{path}" must be an SRDF file: {error}') from error
-    found = []
+    contacts = []
     for pair in pairs.collisionPairs:
         ends = pair.first, pair.second
         if chosen is not None and chosen.isdisjoint(ends):
             continue
         if adjacent or not _share_a_joint(model, *(objects[i].parentJoint for i in ends)):
-            found.append(GeometryContact(*(objects[i].name for i in ends), **rubbing))
-    return found
+            contacts.append(GeometryContact(*(objects[i].name for i in ends), **rubbing))
+    return contacts
 
 
 def ground_contacts(
@@ -238,7 +238,7 @@ def _shapes_of_links(
     """
     carriers = [set(_carriers(model, item)) for item in objects]
     known = [str(f.name) for f in model.frames if f.type == pin.FrameType.BODY] + list(model.names)[1:]
-    found: dict[int, str] = {}
+    link_of_shape: dict[int, str] = {}
     for link in sequence(f"{who}: links", links):
         own = [i for i, names in enumerate(carriers) if text(f"{who}: link", link) in names]
         if not own and link not in known:
@@ -248,8 +248,8 @@ def _shapes_of_links(
             raise InputError(
                 f'{who}: link "{link}" has no shape in the collision model{nearest(link, shaped)}'
             )
-        found |= {i: link for i in own if i not in found}
-    return found
+        link_of_shape |= {i: link for i in own if i not in link_of_shape}
+    return link_of_shape
 
 
 def _carriers(model: Model, item: GeometryObject) -> Iterator[str]:
@@ -288,7 +288,7 @@ def expand_geometry_contacts(contacts: Iterable[object], model: Model, geometry:
 def _manifold(c: GeometryContact, model: Model, geometry: GeometryModel) -> list[ManifoldContact]:
     """Return the contacts of one pair of shapes."""
     who = label(c)
-    first, second = (_shape(who, given, model, geometry) for given in (c.geometry1, c.geometry2))
+    first, second = (_shape(who, item, model, geometry) for item in (c.geometry1, c.geometry2))
     if first.frame == second.frame:
         raise InputError(f"{who}: both geometries are on the same body, which cannot touch itself")
     ground, thing = (first, second) if first.normal is not None else (second, first)
@@ -297,6 +297,6 @@ def _manifold(c: GeometryContact, model: Model, geometry: GeometryModel) -> list
     return manifold(who, first, second, c.rounding, base, options)
 
 
-def _shape(who: str, given: str | GeometryObject, model: Model, geometry: GeometryModel) -> Shape:
-    is_object = isinstance(given, pin.GeometryObject)
-    return shape_of(who, given if is_object else object_named(who, given, geometry), model)
+def _shape(who: str, item: str | GeometryObject, model: Model, geometry: GeometryModel) -> Shape:
+    is_object = isinstance(item, pin.GeometryObject)
+    return shape_of(who, item if is_object else object_named(who, item, geometry), model)

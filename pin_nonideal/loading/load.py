@@ -100,20 +100,22 @@ def load(
             f"name must be the name of a robot or a path; got {short_repr(name)}: "
             f"{getattr(error, 'strerror', None) or error}"
         ) from None
-    found = _find(name, text, parameters)
-    arguments = scene_arguments(found.robot, found.table, found.name, merge=found.merge, start=q0, speed=v0)
-    given = dict(parameters)
+    loaded = _find(name, text, parameters)
+    arguments = scene_arguments(
+        loaded.robot, loaded.table, loaded.name, merge=loaded.merge, start=q0, speed=v0
+    )
+    recorded = dict(parameters)
     if terms != "core":
-        given["terms"] = terms
+        recorded["terms"] = terms
     for key, state in (("q0", q0), ("v0", v0)):
         if state is not None:
-            given[key] = state if isinstance(state, (str, Mapping)) else np.asarray(state).tolist()
+            recorded[key] = state if isinstance(state, (str, Mapping)) else np.asarray(state).tolist()
     if assembly_tolerance != ASSEMBLY_TOLERANCE:
-        given["assembly_tolerance"] = assembly_tolerance
+        recorded["assembly_tolerance"] = assembly_tolerance
     if flag("load: limits", limits):
-        given["limits"] = True
-    _add_limits(arguments, limits, found.robot.ranges)
-    _warn_of_open_loops(arguments, found.robot.open_loops)
+        recorded["limits"] = True
+    _add_limits(arguments, limits, loaded.robot.ranges)
+    _warn_of_open_loops(arguments, loaded.robot.open_loops)
     arguments["terms"] = terms
     scene = Scene(**arguments, assembly_tolerance=assembly_tolerance)
     parts = remove_dependent_rows(scene, assembly_tolerance)
@@ -121,8 +123,8 @@ def load(
         arguments.update(model=parts.model, constraints=parts.constraints, q0=parts.q)
         arguments["notes"] = (*scene.notes, parts.note)
         scene = Scene(**arguments, assembly_tolerance=assembly_tolerance)
-    held = held_entries(found.robot, found.table, q0, v0)
-    return _with_origin(scene, _origin(text, given), found, held)
+    held = held_entries(loaded.robot, loaded.table, q0, v0)
+    return _with_origin(scene, _origin(text, recorded), loaded, held)
 
 
 def _warn_of_open_loops(arguments: Table, loops: Sequence[str]) -> None:
@@ -188,16 +190,16 @@ class ShapeReader:
         return getattr(load_from_origin(self.origin), self.kind)
 
 
-def _with_origin(scene: Scene, origin: Table | None, found: LoadedRobot, held: Held) -> Scene:
+def _with_origin(scene: Scene, origin: Table | None, loaded: LoadedRobot, held: Held) -> Scene:
     """Return the scene with its origin, the name and parameters of the call of `load`."""
     sources = None
     if origin is not None:
-        kinds = {"visual_model": found.robot.visual, "collision_model": found.robot.collision}
+        kinds = {"visual_model": loaded.robot.visual, "collision_model": loaded.robot.collision}
         visual, collision = (
             ShapeReader(origin, kind) if shapes is not None else None for kind, shapes in kinds.items()
         )
         sources = visual, collision
-    return with_origin(scene, origin, shapes=sources, friction=found.robot.contact_friction, held=held)
+    return with_origin(scene, origin, shapes=sources, friction=loaded.robot.contact_friction, held=held)
 
 
 class LoadedRobot(NamedTuple):
@@ -218,15 +220,15 @@ class LoadedRobot(NamedTuple):
 
 def _origin(text: str, parameters: Table) -> Table | None:
     """Return name and parameters that load the scene from any folder, or None if JSON cannot encode them."""
-    kept, path = dict(parameters), Path(text).expanduser()
-    folders = kept.get("package_dirs")
+    recorded, path = dict(parameters), Path(text).expanduser()
+    folders = recorded.get("package_dirs")
     if folders is not None:
         listed = [folders] if isinstance(folders, (str, Path)) else folders
-        kept["package_dirs"] = [str(Path(folder).resolve()) for folder in listed]
+        recorded["package_dirs"] = [str(Path(folder).resolve()) for folder in listed]
     own = text in (*robot_folders(), *example_names()) or not path.exists()
     try:
         return dict(
-            json.loads(json.dumps({"name": text if own else str(path.resolve()), "parameters": kept}))
+            json.loads(json.dumps({"name": text if own else str(path.resolve()), "parameters": recorded}))
         )
     except (TypeError, ValueError):
         return None
@@ -245,14 +247,14 @@ def _find(name: str | os.PathLike[str], text: str, parameters: Table) -> LoadedR
     return _note_folder(LoadedRobot(example_robot(text, list(folders)), {}, text), path)
 
 
-def _note_folder(found: LoadedRobot, path: Path) -> LoadedRobot:
+def _note_folder(loaded: LoadedRobot, path: Path) -> LoadedRobot:
     """Add a note to a robot found by its name, if a file or folder of that name exists too."""
     if path.exists():
-        found.robot.notes.append(
+        loaded.robot.notes.append(
             f'"{path}" of the working directory is not what was loaded, for it is the name of a robot; '
             f'write "./{path}" for the folder'
         )
-    return found
+    return loaded
 
 
 def robots() -> list[tuple[str, str]]:

@@ -73,8 +73,10 @@ class EditableScene(SceneBase):
             "contacts": add_contacts,
             "forces": add_forces,
         }
-        given = {"actuation": actuation, "q0": q0, "v0": v0, "name": name}
-        parts = parts_of_replacement(self._parts(), self._compiled, self._states, lists, added, remove, given)
+        others = {"actuation": actuation, "q0": q0, "v0": v0, "name": name}
+        parts = parts_of_replacement(
+            self._parts(), self._compiled, self._states, lists, added, remove, others
+        )
         return rebuilt(type(self), parts)  # type: ignore[no-any-return]
 
     def put_on_ground(self: S, plane: str | None = None) -> S:

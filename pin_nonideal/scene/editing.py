@@ -63,8 +63,8 @@ def parts_after(
             )
     after = {}
     for kind in KINDS:
-        kept = [one for one, name in zip(now[kind], names[kind], strict=True) if name not in leave]
-        first = kept if new[kind] is None else sequence(f"replace: {kind}", new[kind])
+        remaining = [one for one, name in zip(now[kind], names[kind], strict=True) if name not in leave]
+        first = remaining if new[kind] is None else sequence(f"replace: {kind}", new[kind])
         after[kind] = (*first, *sequence(f"replace: add_{kind}", added[kind]))
     return after
 
@@ -76,7 +76,7 @@ def parts_of_replacement(
     lists: Table,
     added: Table,
     remove: Iterable[str],
-    given: Table,
+    others: Table,
 ) -> Table:
     """Return the parts of a scene, as `copying.parts_of` does, after `Scene.replace`.
 
@@ -87,23 +87,23 @@ def parts_of_replacement(
         lists: lists that replace present ones, by kind; None keeps a list.
         added: lists that are appended, by kind.
         remove: names of descriptions to leave out.
-        given: new actuation, or UNCHANGED; new "q0", "v0" and "name", or None for the present ones.
+        others: new actuation, or UNCHANGED; new "q0", "v0" and "name", or None for the present ones.
 
     Raises:
         InputError: a list is no list of descriptions, or a state does not fit the model.
         UnknownNameError: there is no description of a name in `remove`.
     """
     made = parts["made"] | parts_after(compiled, lists, added, remove)
-    if not isinstance(given["actuation"], Unchanged):
-        made["actuation"] = given["actuation"]
-    if given["q0"] is not None:
-        made["q0"] = states.configuration(given["q0"], "replace: q0")
-    if given["v0"] is not None:
-        made["v0"] = states.velocity(given["v0"], "replace: v0")
-    if given["name"] is not None:
-        made["name"] = given["name"]
+    if not isinstance(others["actuation"], Unchanged):
+        made["actuation"] = others["actuation"]
+    if others["q0"] is not None:
+        made["q0"] = states.configuration(others["q0"], "replace: q0")
+    if others["v0"] is not None:
+        made["v0"] = states.velocity(others["v0"], "replace: v0")
+    if others["name"] is not None:
+        made["name"] = others["name"]
     later = parts["later"] | {"table": None}
-    later["held"] = held_after(compiled.model, states.held, given["q0"], given["v0"])
+    later["held"] = held_after(compiled.model, states.held, others["q0"], others["v0"])
     return parts | {"made": made, "later": later}
 
 

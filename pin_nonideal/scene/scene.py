@@ -143,9 +143,9 @@ class Scene(EditableScene):
                 Further causes are a contact with deep initial penetration or without a short displacement out
                 of it, and a coordinate at which floating-point numbers are more than 1 mm or 1 mrad apart.
         """
-        wanted = choice("report", report, (True, False))
-        found = self._states.project(q, v, number("t", t))
-        return found if wanted else found[:2]
+        with_report = choice("report", report, (True, False))
+        projected = self._states.project(q, v, number("t", t))
+        return projected if with_report else projected[:2]
 
     # --- one instant ----------------------------------------------------------------------------------------
 

@@ -209,8 +209,8 @@ class _Transcript:
             return method
 
         def record(*arguments: object, **named: object) -> object:
-            said = [name, _plain(arguments), {key: _plain(value) for key, value in named.items()}]
-            self._digest.update(json.dumps(said).encode())
+            call = [name, _plain(arguments), {key: _plain(value) for key, value in named.items()}]
+            self._digest.update(json.dumps(call).encode())
             return method(*arguments, **named)
 
         return record

@@ -65,30 +65,30 @@ def components(scene: Scene) -> list[Component]:
     Args:
         scene: the whole scene.
     """
-    found: list[Component] | None = scene.__dict__.get("_components")
-    if found is None:
-        found = scene.__dict__["_components"] = _components(scene)
-    return found
+    parts: list[Component] | None = scene.__dict__.get("_components")
+    if parts is None:
+        parts = scene.__dict__["_components"] = _components(scene)
+    return parts
 
 
 def _components(scene: Scene) -> list[Component]:
     model, program = scene.model, compiled_scene(scene).program
     held = scene.actuation
     by_position = isinstance(held, HoldPosition) and isinstance(held.kp, float) and isinstance(held.kd, float)
-    said = [*scene.constraints, *scene.laws, *scene.forces]
+    descriptions = [*scene.constraints, *scene.laws, *scene.forces]
     whole = (
         not scene.element_names
         or program.states
         or scene.contacts
         or not (held is None or by_position)
-        or any(type(one) not in LOCAL for one in said)
+        or any(type(one) not in LOCAL for one in descriptions)
         or sum(parent == 0 for parent in list(model.parents)[1:]) < 2
     )
     if whole:
         return []
     tree = _trees(model)
     anchors = dict(zip(scene.constraint_slices, scene.constraints, strict=False))
-    touched = [_touched(one, model, tree, anchors) for one in said]
+    touched = [_touched(one, model, tree, anchors) for one in descriptions]
     group = {root: root for root in tree[1:]}
     for roots in touched:
         joined = {group[root] for root in roots}
@@ -97,7 +97,7 @@ def _components(scene: Scene) -> list[Component]:
         return []
     own = [group[min(roots)] for roots in touched]
     return [
-        _component(scene, said, own, [group.get(root) for root in tree], of)
+        _component(scene, descriptions, own, [group.get(root) for root in tree], of)
         for of in sorted(set(group.values()))
     ]
 
@@ -127,11 +127,11 @@ def _touched(one: Any, model: Model, tree: Sequence[int], anchors: Table) -> set
 
 
 def _component(
-    scene: Scene, said: Sequence[Any], own: Sequence[int], group: Sequence[int | None], of: int
+    scene: Scene, descriptions: Sequence[Any], own: Sequence[int], group: Sequence[int | None], of: int
 ) -> Component:
     joints = [joint for joint, each in enumerate(group) if each == of]
     model, q, v = _alone(scene.model, joints)
-    mine = [one for one, each in zip(said, own, strict=True) if each == of]
+    mine = [one for one, each in zip(descriptions, own, strict=True) if each == of]
     held = scene.actuation
     if isinstance(held, HoldPosition) and held.q is not None:
         held = replace(held, q=named_configuration(scene.model, held.q, scene.q0, "q")[q])

@@ -76,20 +76,20 @@ def _valued(f: Callable[..., object], who: str) -> Callable[..., float]:
 
 def _direction(f: Callable[..., object], who: str) -> int:
     """Return the sign of the attribute `direction`, as in solve_ivp."""
-    given = getattr(f, "direction", 0)
-    if isinstance(given, bool) or not isinstance(given, (int, float, np.number)) or not np.isfinite(given):
+    sign = getattr(f, "direction", 0)
+    if isinstance(sign, bool) or not isinstance(sign, (int, float, np.number)) or not np.isfinite(sign):
         raise InputError(
-            f"{who}: direction must be a number, of which the sign counts; got {short_repr(given)}"
+            f"{who}: direction must be a number, of which the sign counts; got {short_repr(sign)}"
         )
-    return int(np.sign(given))
+    return int(np.sign(sign))
 
 
 def _terminal(f: Callable[..., object], who: str) -> int:
     """Return the number of events that ends the run, 0 for none, from the attribute `terminal`."""
-    given = getattr(f, "terminal", False)
-    if given is None or isinstance(given, (bool, np.bool_)):
-        return int(bool(given))
-    return count(f"{who}: terminal", given)
+    value = getattr(f, "terminal", False)
+    if value is None or isinstance(value, (bool, np.bool_)):
+        return int(bool(value))
+    return count(f"{who}: terminal", value)
 
 
 def parse_callback(callback: object, nv: int) -> Callable[[float, Array, Array], object] | None:

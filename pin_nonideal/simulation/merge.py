@@ -123,7 +123,7 @@ def _samples(
 ) -> Table:
     """Return the samples as fields of a core outcome; states of a tree alone need no evaluation."""
     program, (nq, nv) = compiled_scene(scene).program, (scene.model.nq, scene.model.nv)
-    asked = (
+    records = (
         options.a,
         options.tau,
         options.forces,
@@ -132,12 +132,12 @@ def _samples(
         options.power,
         options.energy,
     )
-    evaluated = any(asked) or program.rows or nq != nv
+    evaluated = any(records) or program.rows or nq != nv
     k, none = t.size if evaluated else 0, np.zeros((0, nv))
-    y, held, turns, found = (
+    y, held, turns, sought_modes = (
         np.ascontiguousarray(x[:k], dtype=float) for x in (states, modes, directions, sought)
     )
-    inside = core.sample_inside(program, options, t[:k], y, held, turns, found, none, moved[:k])
+    inside = core.sample_inside(program, options, t[:k], y, held, turns, sought_modes, none, moved[:k])
     samples = {name: getattr(inside, name) for name in dir(core.Outcome) if not name.startswith("_")}
     if evaluated:
         return samples

@@ -28,7 +28,7 @@ DEFAULT_RTOL, DEFAULT_ATOL = 1e-8, 1e-10
 # Minimum length of a step in spacings of floating-point times. A shorter step has an error above one percent.
 MIN_SPACINGS = 100.0
 NO_LIMIT = 2**62  # steps of a run without limit
-MAX_KEPT = 32  # maximum number of cached options of a scene
+MAX_CACHED = 32  # maximum number of cached options of a scene
 MAX_SAMPLES = 1e8  # some gigabytes for a small robot
 # Smallest tolerances: no step meets rtol below rounding, and the square of error / atol must not overflow.
 MIN_RTOL, MIN_ATOL = 1e-14, 1e-100
@@ -226,23 +226,23 @@ def check_values(
     flag("simulate: strict", strict)
 
 
-def cached_options(scene: Scene, *asked: Any) -> RunOptions:
+def cached_options(scene: Scene, *arguments: Any) -> RunOptions:
     """Return cached options of `run_options`; controllers often repeat the same run.
 
     Args:
         scene: scene to simulate, which holds the cache.
-        *asked: the other arguments of `run_options`, in order.
+        *arguments: the other arguments of `run_options`, in order.
     """
-    kept: dict[object, RunOptions] = scene.__dict__.setdefault("_cached_options", {})
-    key = (asked, tuple(map(type, asked)))  # types separate True from 1.0
+    cache: dict[object, RunOptions] = scene.__dict__.setdefault("_cached_options", {})
+    key = (arguments, tuple(map(type, arguments)))  # types separate True from 1.0
     try:
-        if key in kept:
-            return kept[key]
+        if key in cache:
+            return cache[key]
     except TypeError:  # lists and arrays are mutable, so their options are not cached
-        return run_options(scene, *asked)
-    if len(kept) >= MAX_KEPT:
-        kept.clear()
-    kept[key] = options = run_options(scene, *asked)
+        return run_options(scene, *arguments)
+    if len(cache) >= MAX_CACHED:
+        cache.clear()
+    cache[key] = options = run_options(scene, *arguments)
     return options
 
 

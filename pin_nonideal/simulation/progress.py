@@ -18,8 +18,8 @@ def progress_bar(progress: bool | None, options: RunOptions) -> AbstractContextM
         progress: True, False, or None for a terminal only.
         options: options of the run.
     """
-    wanted = sys.stderr.isatty() if progress is None else progress
-    return _bar(options) if wanted else nullcontext()
+    is_shown = sys.stderr.isatty() if progress is None else progress
+    return _bar(options) if is_shown else nullcontext()
 
 
 @contextmanager

@@ -33,7 +33,7 @@ from .options import RunOptions
 # Largest residual of a sample on the constraints [m or rad]. Projection after each step reduces residuals to
 # rounding, or to the square root of rounding in singular positions.
 LEFT = 1e-6
-KEPT = "the trajectory up to there is in error.trajectory"
+TRAJECTORY_HINT = "the trajectory up to there is in error.trajectory"
 
 
 def finish(
@@ -81,9 +81,9 @@ def finish(
     cause: BaseException | None = None
     if isinstance(stopped, core.CoreFailure):
         error = compiled_scene(scene).named(stopped)
-        error.args = (f"{error}{_overflow_hint(error, options)}; {KEPT}", *error.args[1:])
+        error.args = (f"{error}{_overflow_hint(error, options)}; {TRAJECTORY_HINT}", *error.args[1:])
     elif isinstance(stopped, KeyboardInterrupt):
-        error = RunInterrupted(f"the run was interrupted at t = {last:.4g} s; {KEPT}", time=last)
+        error = RunInterrupted(f"the run was interrupted at t = {last:.4g} s; {TRAJECTORY_HINT}", time=last)
     elif isinstance(stopped, RunError):
         error, cause = stopped, stopped.__cause__
     else:
@@ -121,7 +121,7 @@ def _opened(scene: Scene, trajectory: Trajectory) -> LoopClosureError:
     residual = rows_at(runner, trajectory.q[k], trajectory.v[k], t)[2]
     left = np.where(gap_rows(compiled_scene(scene).program), np.maximum(-residual, 0.0), np.abs(residual))
     gaps = {key: float(left[rows].max()) for key, rows in scene.constraint_slices.items()}
-    stopped = opened(max(gaps, key=lambda key: gaps[key]), gaps, t, f"; {KEPT}")
+    stopped = opened(max(gaps, key=lambda key: gaps[key]), gaps, t, f"; {TRAJECTORY_HINT}")
     stopped.trajectory = _stopped(trajectory.first(k), stopped)
     return stopped
 
@@ -140,4 +140,4 @@ def _overflow_hint(error: RunError, options: RunOptions) -> str:
 
 def _stopped(trajectory: Trajectory, error: RunError) -> Trajectory:
     """Return the trajectory with the message of the error that stopped the run."""
-    return replace(trajectory, failure=str(error).removesuffix(f"; {KEPT}"))
+    return replace(trajectory, failure=str(error).removesuffix(f"; {TRAJECTORY_HINT}"))

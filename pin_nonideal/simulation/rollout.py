@@ -134,10 +134,10 @@ def _starts(scene: Scene, q: object, v: object, parameters: object) -> tuple[Arr
         raise InputError(f"rollout: parameters must be values by name; got {short_repr(parameters)}")
     starts_q = None if q is None else array("rollout: q", q, (None, scene.model.nq), copy=False)
     starts_v = None if v is None else array("rollout: v", v, (None, scene.model.nv), copy=False)
-    given: list[Any] = [each for each in (starts_q, starts_v) if each is not None]
+    by_run: list[Any] = [each for each in (starts_q, starts_v) if each is not None]
     for values in (parameters or {}).values():
-        given += [*values.values()] if isinstance(values, Mapping) else [values]
-    counts = [len(each) for each in given if isinstance(each, (list, tuple)) or np.ndim(each) > 0]
+        by_run += [*values.values()] if isinstance(values, Mapping) else [values]
+    counts = [len(each) for each in by_run if isinstance(each, (list, tuple)) or np.ndim(each) > 0]
     if not counts:
         raise InputError("rollout needs states or parameters of its runs: rollout(scene, q, v, duration)")
     if starts_q is None:

@@ -58,13 +58,13 @@ class _Run:
 
     def tolerance(self, size: int) -> Array:
         """Return absolute tolerances in ambient coordinates; a quaternion has the smallest of its joint."""
-        given, model = self.options.atol, self.model
+        atol, model = self.options.atol, self.model
         positions = np.empty(model.nq)
         for joint in list(model.joints)[1:]:
-            own = given[joint.idx_v : joint.idx_v + joint.nv]
+            own = atol[joint.idx_v : joint.idx_v + joint.nv]
             same = joint.nq == joint.nv
             positions[joint.idx_q : joint.idx_q + joint.nq] = own if same else own.min(initial=np.inf)
-        known = np.concatenate([positions, given[model.nv :]])
+        known = np.concatenate([positions, atol[model.nv :]])
         return np.concatenate([known, np.full(size - known.size, FREE)])
 
     def smooth_stretch(self, method: Any, t_end: float) -> None:

@@ -115,12 +115,12 @@ def simulate(
     """
     if not isinstance(scene, Scene):
         raise InputError(f"simulate: scene must be a Scene; got {type(scene).__name__}")
-    asked, between = parse_events(events), parse_callback(callback, scene.model.nv)
+    requests, between = parse_events(events), parse_callback(callback, scene.model.nv)
     choice("simulate: progress", progress, (True, False, None))
     steps = (method, rtol, atol, dt, output_dt, max_steps)
-    kept = (max_wall, asked.names, asked.separate)
-    options = cached_options(scene, duration, t0, *steps, record, several, *kept, strict)
-    _check_together(method, asked, callback, checkpoint)
+    more = (record, several, max_wall, requests.names, requests.separate, strict)
+    options = cached_options(scene, duration, t0, *steps, *more)
+    _check_together(method, requests, callback, checkpoint)
     nonnegative("simulate: checkpoint_interval", checkpoint_interval)
     if checkpoint is not None:
         check_writable(file_path("simulate: checkpoint", checkpoint), "the checkpoint")
@@ -132,8 +132,8 @@ def simulate(
     moved = [] if own else states.configuration_notes(q, q0)
     followed = states.start_notes() if own else states.velocity_notes(v, v0)
     notes = moved + followed
-    for given, notes_of_start in ((q, moved), (v, followed)):
-        if notes_of_start and given is not None and not isinstance(given, Mapping):
+    for start, notes_of_start in ((q, moved), (v, followed)):
+        if notes_of_start and start is not None and not isinstance(start, Mapping):
             warnings.warn(f"simulate: {notes_of_start[0]}", RuntimeWarning, stacklevel=2)
     program, delayed = compiled_scene(scene).program_of_runs(options.t0)
     saver = None
@@ -153,7 +153,7 @@ def simulate(
         if method in SCIPY:
             from .scipy_solvers import simulate_stiff
 
-            outcome, stopped = simulate_stiff(scene, q0, v0, options, tick, asked.watched)
+            outcome, stopped = simulate_stiff(scene, q0, v0, options, tick, requests.watched)
         else:
             parts = [] if saver or between else decoupled_components(scene, options)
             apart = run_decoupled(scene, parts, q0, v0, options, tick) if parts else None
@@ -167,7 +167,7 @@ def simulate(
                 tick=tick,
                 save=saver,
                 save_interval=saver.interval if saver else 0.0,
-                events=asked.watched,
+                events=requests.watched,
                 callback=between,
                 hint=hint,
             )
@@ -177,7 +177,7 @@ def simulate(
     return finish(scene, outcome, stopped, options, time.perf_counter() - begin, [*notes, *hints])
 
 
-def _check_together(method: str, asked: RunRequests, callback: object, checkpoint: object) -> None:
+def _check_together(method: str, requests: RunRequests, callback: object, checkpoint: object) -> None:
     """Check that method, events, callback and checkpoint can be combined.
 
     Raises:
@@ -193,7 +193,7 @@ def _check_together(method: str, asked: RunRequests, callback: object, checkpoin
             f'simulate: callback needs one of the core\'s methods; "{method}" runs in SciPy, whose steps '
             "go on from earlier ones"
         )
-    if checkpoint is not None and (asked.watched or callback is not None):
+    if checkpoint is not None and (requests.watched or callback is not None):
         raise InputError(
             "simulate: checkpoint cannot hold functions; leave out events and callback, or the checkpoint"
         )

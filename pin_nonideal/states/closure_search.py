@@ -65,7 +65,7 @@ class ClosureSearch:
             own = np.ones(self.model.nv, dtype=bool) if free is None else free
             block = np.ix_(own, own)
             loops = self._rows(q, unit, self._loops, own)
-            given = (
+            arguments = (
                 self.model,
                 loops,
                 lambda q: mass(q)[block],
@@ -76,8 +76,8 @@ class ClosureSearch:
                 free,
             )
             if not self._gaps.any():
-                return Search(*given).nearest()
-            return UnilateralClosure(self._rows(q, unit, self._gaps, own), *given).nearest()
+                return Search(*arguments).nearest()
+            return UnilateralClosure(self._rows(q, unit, self._gaps, own), *arguments).nearest()
         except np.linalg.LinAlgError:  # a number overflowed: no closure
             return Closure(q, np.inf, 0.0, False, 0), False
 
@@ -96,7 +96,7 @@ class ClosureSearch:
         self,
         q: Array,
         unit: Array,
-        wanted: NDArray[np.bool_],
+        selected: NDArray[np.bool_],
         free: NDArray[np.bool_],
     ) -> Rows:
         """Return the wanted rows of free coordinates over their scales, without duplicate and zero rows."""
@@ -105,7 +105,7 @@ class ClosureSearch:
         samples = [self._sample(q, move) for move in moves]
         weighted = np.hstack([A * unit for A, _, _, _ in samples])
         reach = np.abs(weighted).max(axis=1, initial=0.0)
-        used = wanted & (reach > VANISHING * reach.max(initial=0.0))
+        used = selected & (reach > VANISHING * reach.max(initial=0.0))
         wide = np.hstack([weighted, np.column_stack([phi for _, _, phi, _ in samples])])
         used[[row for row, _, _ in duplicate_rows(wide, used, weighted.shape[1])]] = False
         scale = 1.0 / reach[used]

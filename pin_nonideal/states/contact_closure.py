@@ -24,7 +24,7 @@ SHORT = 1e-7
 # Largest penetration, scaled like its row, that counts as rounding.
 INSIDE = 10.0 * ROUNDING
 # Minimum decrease of the merit function, relative to the decrease of its linear model.
-KEPT = 1e-4
+MIN_DECREASE = 1e-4
 
 
 class UnilateralClosure(Search):
@@ -32,11 +32,11 @@ class UnilateralClosure(Search):
 
     Args:
         gaps: q -> (G, gap) of the unilateral contacts over their row scales, (k, nv) and (k,).
-        given: arguments of `Search`.
+        arguments: arguments of `Search`.
     """
 
-    def __init__(self, gaps: Rows, *given: Any) -> None:
-        super().__init__(*given)
+    def __init__(self, gaps: Rows, *arguments: Any) -> None:
+        super().__init__(*arguments)
         self.loops, self.gaps = self.rows, gaps
 
     def _hold(self, touching: Numbers) -> None:
@@ -63,10 +63,10 @@ class UnilateralClosure(Search):
         for _ in range(SETTLINGS):
             self._hold(np.zeros(0, dtype=int))
             bare = self._place(iterate.q)
-            found = self._least(bare, bare.move)
-            if found is None:
+            least = self._least(bare, bare.move)
+            if least is None:
                 break
-            self._hold(found.touching)
+            self._hold(least.touching)
             start = self._retract(iterate.q)
             if start is None:
                 break
@@ -105,7 +105,7 @@ class UnilateralClosure(Search):
             before, slope = self._merit(iterate, weight), self._slope_of_merit(iterate, step.x, weight)
             for k in range(HALVINGS):
                 trial = self._place(self._go(iterate, step.x, 0.5**k))
-                if self._merit(trial, weight) <= before + KEPT * 0.5**k * slope:
+                if self._merit(trial, weight) <= before + MIN_DECREASE * 0.5**k * slope:
                     break
             else:
                 break

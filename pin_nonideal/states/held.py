@@ -46,16 +46,16 @@ class Held(NamedTuple):
 NOTHING_HELD = Held()
 
 
-def changes(asked: Array, found: Array, held: NDArray[np.bool_]) -> bool:
+def changes(before: Array, after: Array, held: NDArray[np.bool_]) -> bool:
     """Check if a projection has changed held entries by more than rounding.
 
     Args:
-        asked: velocity before, (nv,).
-        found: velocity after, (nv,).
+        before: velocity before, (nv,).
+        after: velocity after, (nv,).
         held: mask of held entries, (nv,).
     """
-    change = np.abs(found - asked)[held].max(initial=0.0)
-    return bool(change > ROUNDING * np.abs(asked).max(initial=0.0))
+    change = np.abs(after - before)[held].max(initial=0.0)
+    return bool(change > ROUNDING * np.abs(before).max(initial=0.0))
 
 
 def moving(model: Model, q: Array, on: Array, unit: Array) -> NDArray[np.bool_]:
@@ -112,19 +112,19 @@ def settled(
         now = float(np.abs(phi[rows]).max(initial=0.0))
         if not now < gap:
             break
-        gap, kept, move = now, q, np.zeros(model.nv)
+        gap, best, move = now, q, np.zeros(model.nv)
         move[free] = np.linalg.lstsq(A[np.ix_(rows, free)], -phi[rows], rcond=DEPENDENT)[0]
         q = pin.integrate(model, q, move)
-    return kept
+    return best
 
 
-def with_entries(model: Model, q: Array, given: Array, held: NDArray[np.bool_]) -> Array:
+def with_entries(model: Model, q: Array, source: Array, held: NDArray[np.bool_]) -> Array:
     """Return a configuration with the held coordinates bitwise equal to the given values.
 
     Args:
         model: pinocchio.Model.
         q: configuration whose held coordinates differ by rounding, (nq,).
-        given: the given configuration, (nq,).
+        source: the given configuration, (nq,).
         held: mask of held coordinates, (nv,).
 
     Returns:
@@ -135,10 +135,10 @@ def with_entries(model: Model, q: Array, given: Array, held: NDArray[np.bool_]) 
         own = held[place.v_first : place.v_first + place.nv]
         if own.all():
             part = slice(place.q_first, place.q_first + place.nq)
-            out[part] = given[part]
+            out[part] = source[part]
             continue
         for k in np.flatnonzero(own[: _plain(place)]):
-            out[place.q_first + k] = given[place.q_first + k]
+            out[place.q_first + k] = source[place.q_first + k]
     return out
 
 
@@ -170,36 +170,36 @@ def require_rounding(
     if not (held & (np.abs(move) > little)).any():
         return
     raise InputError(
-        f"q: no configuration on the constraints has {_told(model, _coordinates(model, q), held)} at t = "
+        f"q: no configuration on the constraints has {_listed(model, _coordinates(model, q), held)} at t = "
         f"{t:.2f} s; name fewer entries, so that the others can follow, or give a configuration that is "
         "consistent"
     )
 
 
 def coordinate_notes(
-    model: Model, asked: Array, found: Array, held: NDArray[np.bool_], unit: Array
+    model: Model, before: Array, after: Array, held: NDArray[np.bool_], unit: Array
 ) -> list[str]:
     """Return notes on coordinates that follow held coordinates, and on held coordinates that moved.
 
     Args:
         model: pinocchio.Model.
-        asked: requested configuration, (nq,).
-        found: configuration at the start of the run, (nq,).
+        before: requested configuration, (nq,).
+        after: configuration at the start of the run, (nq,).
         held: mask of named coordinates, (nv,).
         unit: unit displacement of each coordinate, (nv,).
     """
-    move = np.abs(pin.difference(model, asked, found))
+    move = np.abs(pin.difference(model, before, after))
     follows, gave_way = ~held & (move > LITTLE * unit), held & (move > ROUNDING * unit)
-    now, notes = _coordinates(model, found), []
+    now, notes = _coordinates(model, after), []
     if gave_way.any():
         notes.append(
             "the coordinates that were named are rounded, since the constraints do not allow them together "
-            f"to the last digit: the run starts with {_told(model, now, gave_way)}"
+            f"to the last digit: the run starts with {_listed(model, now, gave_way)}"
         )
     if follows.any():
         notes.append(
-            f"the coordinates that were named are held, {_told(model, now, held)}, and others follow them: "
-            f"{_told(model, now, follows)}"
+            f"the coordinates that were named are held, {_listed(model, now, held)}, and others follow them: "
+            f"{_listed(model, now, follows)}"
         )
     return notes
 
@@ -254,56 +254,56 @@ def holding(
     moved = np.linalg.norm(B, axis=1) > DEPENDENT * lengths
     scale = lengths[moved]
     x = shortest(B[moved] / scale[:, None], -rate[moved] / scale, np.ones(B.shape[1]))
-    found: Array = v.copy()
-    found[free] += np.linalg.solve(root.T, x)
-    missed = np.abs(rows_at(runner, q, found, t)[3][acting]) / lengths
-    in_play = sum(float(np.linalg.norm(all_root.T @ x)) for x in (v, found, unit))  # one unit per second
+    velocity: Array = v.copy()
+    velocity[free] += np.linalg.solve(root.T, x)
+    missed = np.abs(rows_at(runner, q, velocity, t)[3][acting]) / lengths
+    in_play = sum(float(np.linalg.norm(all_root.T @ x)) for x in (v, velocity, unit))  # one unit per second
     if (missed > MISSED * max(in_play, float(np.abs((rate - A @ v) / lengths).max(initial=0.0)))).any():
         raise InputError(
-            f"v: no velocity on the constraints has {_told(model, v, held)} at t = {t:.2f} s; name fewer "
+            f"v: no velocity on the constraints has {_listed(model, v, held)} at t = {t:.2f} s; name fewer "
             "entries, so that the others can follow, or give velocities that are consistent"
         )
-    return found
+    return velocity
 
 
-def changed(model: Model, asked: Array, found: Array) -> list[str]:
+def changed(model: Model, before: Array, after: Array) -> list[str]:
     """Return a note on a velocity that the projection changed notably, or no note.
 
     Args:
         model: pinocchio.Model.
-        asked: requested velocity, (nv,).
-        found: velocity at the start of the run, (nv,).
+        before: requested velocity, (nv,).
+        after: velocity at the start of the run, (nv,).
     """
-    change = np.abs(found - asked)
-    much = change > LITTLE * max(np.abs(asked).max(initial=0.0), np.abs(found).max(initial=0.0))
+    change = np.abs(after - before)
+    much = change > LITTLE * max(np.abs(before).max(initial=0.0), np.abs(after).max(initial=0.0))
     if not much.any():
         return []
     return [
         "the initial velocity did not satisfy the constraints and was projected onto them: the run starts "
-        f"with {_told(model, found, much)}; Scene.project(report=True) says more"
+        f"with {_listed(model, after, much)}; Scene.project(report=True) says more"
     ]
 
 
-def held_notes(model: Model, asked: Array, found: Array, held: NDArray[np.bool_]) -> list[str]:
+def held_notes(model: Model, before: Array, after: Array, held: NDArray[np.bool_]) -> list[str]:
     """Return a note on velocities that follow held entries, or no note.
 
     Args:
         model: pinocchio.Model.
-        asked: requested velocity, (nv,).
-        found: velocity at the start of the run, (nv,).
+        before: requested velocity, (nv,).
+        after: velocity at the start of the run, (nv,).
         held: mask of held entries, (nv,).
     """
-    change = np.abs(found - asked)
-    follows = ~held & (change > LITTLE * max(np.abs(asked).max(initial=0.0), np.abs(found).max(initial=0.0)))
+    change = np.abs(after - before)
+    follows = ~held & (change > LITTLE * max(np.abs(before).max(initial=0.0), np.abs(after).max(initial=0.0)))
     if not follows.any():
         return []
     return [
-        f"the velocities that were named are held, {_told(model, found, held)}, and others follow them: "
-        f"{_told(model, found, follows)}"
+        f"the velocities that were named are held, {_listed(model, after, held)}, and others follow them: "
+        f"{_listed(model, after, follows)}"
     ]
 
 
-def _told(model: Model, v: Array, which: NDArray[np.bool_]) -> str:
+def _listed(model: Model, v: Array, which: NDArray[np.bool_]) -> str:
     dofs = list(map(int, np.flatnonzero(which)))
     shown = ", ".join(f'"{coordinate(model, dof)}" = {v[dof]:.4g}' for dof in dofs[:4])
     return f"{shown} and {len(dofs) - 4} more" if len(dofs) > 4 else shown

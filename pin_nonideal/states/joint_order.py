@@ -58,18 +58,18 @@ def order_words(model: Model) -> str | None:
     )
 
 
-def describe_order(model: Model, given: object, what: str, sizes: Literal["nqs", "nvs"]) -> None:
+def describe_order(model: Model, values: object, what: str, sizes: Literal["nqs", "nvs"]) -> None:
     """Warn if a list of joint values may have been written in the order of the file.
 
     Args:
         model: pinocchio.Model.
-        given: values of all joints.
+        values: values of all joints.
         what: words for messages.
         sizes: attribute of the model with the number of values of each joint.
     """
-    if not isinstance(given, (list, tuple)):
+    if not isinstance(values, (list, tuple)):
         return
-    if len(given) != sum(getattr(model, sizes)) or file_order(model) is None:
+    if len(values) != sum(getattr(model, sizes)) or file_order(model) is None:
         return
     warnings.warn(
         f"{what}: {order_words(model)}; name the joints, such as {what.split(': ')[-1]}="

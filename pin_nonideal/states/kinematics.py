@@ -21,13 +21,13 @@ def joint_placements(model: Model, q: Array) -> list[Placement]:
     Returns:
         A pinocchio.SE3 for every joint, as `Data.oMi` after `pinocchio.forwardKinematics`.
     """
-    found = [pin.SE3.Identity()]
+    placements = [pin.SE3.Identity()]
     for index in range(1, model.njoints):
         joint = model.joints[index]
         data = joint.createData()
         joint.calc(data, q)
-        found.append(found[model.parents[index]] * model.jointPlacements[index] * pin.SE3(data.M))
-    return found
+        placements.append(placements[model.parents[index]] * model.jointPlacements[index] * pin.SE3(data.M))
+    return placements
 
 
 def frame_on_joint(model: Model, name: str) -> tuple[int, Placement]:
@@ -56,8 +56,8 @@ def frame_index(model: Model, name: str) -> int:
         name: name of a frame of the model.
     """
     kinds = (pin.FrameType.BODY, pin.FrameType.JOINT, pin.FrameType.FIXED_JOINT, pin.FrameType.OP_FRAME)
-    found = (int(model.getFrameId(name, kind)) for kind in kinds if model.existFrame(name, kind))
-    return next(found, None) or int(model.getFrameId(name))
+    indices = (int(model.getFrameId(name, kind)) for kind in kinds if model.existFrame(name, kind))
+    return next(indices, None) or int(model.getFrameId(name))
 
 
 def frame_motion(model: Model, name: str, q: Array, v: Array) -> tuple[Array, Array, Array]:

@@ -162,19 +162,19 @@ class Search:
                 if not self._is_closed(iterate):
                     open_iterate = min(iterate, open_iterate, key=self._lacking)
                     continue
-                found = self._unwound(self._settle(iterate))
+                closure = self._unwound(self._settle(iterate))
             except UserFunctionError:  # a user function raises on the path of this start
                 continue
-            if conditioning(self.mass(found.q)) <= MIN_RCOND:
-                fallback = fallback if fallback and fallback.distance <= found.distance else found
+            if conditioning(self.mass(closure.q)) <= MIN_RCOND:
+                fallback = fallback if fallback and fallback.distance <= closure.distance else closure
                 continue
             if best is None:
-                move = self._longest(found.q)
+                move = self._longest(closure.q)
                 further = FURTHER_STARTS * ((move > FAR) + (move > VERY_FAR))
                 starts = k + further
-            same = best is not None and abs(found.distance - best.distance) <= SAME_CLOSURE * best.distance
-            if best is None or found.distance < best.distance * (1.0 - SAME):
-                best, often = found, often if same else 0
+            same = best is not None and abs(closure.distance - best.distance) <= SAME_CLOSURE * best.distance
+            if best is None or closure.distance < best.distance * (1.0 - SAME):
+                best, often = closure, often if same else 0
                 same = True
             often += same
         if best is not None:
@@ -186,15 +186,17 @@ class Search:
         lacking = self._lacking(open_iterate)
         return Closure(open_iterate.q, lacking, self._distance(open_iterate), False, self.iterations), False
 
-    def _unwound(self, found: Closure) -> Closure:
+    def _unwound(self, closure: Closure) -> Closure:
         """Return the nearer of a closure and the closure without whole turns of its joints."""
-        move = self._difference(found.q)
+        move = self._difference(closure.q)
         turns = np.where(self.angles, np.round(move / TURN), 0.0)
         if not turns.any():
-            return found
+            return closure
         iterate = self._close(self._integrate(self.q0, move - TURN * turns))
         return (
-            min(found, self._settle(iterate), key=lambda c: c.distance) if self._is_closed(iterate) else found
+            min(closure, self._settle(iterate), key=lambda c: c.distance)
+            if self._is_closed(iterate)
+            else closure
         )
 
     def _is_closed(self, iterate: Iterate) -> bool:
@@ -284,10 +286,10 @@ class Search:
 
     def _settle(self, iterate: Iterate) -> Closure:
         """Descend to a local minimum of the distance; return the start if the descent ends at a corner."""
-        found, settled = self._slide(iterate)
-        if not settled and self._has_corner(found):
-            found = iterate
-        return Closure(found.q, found.gap, self._distance(found), settled, self.iterations)
+        end, settled = self._slide(iterate)
+        if not settled and self._has_corner(end):
+            end = iterate
+        return Closure(end.q, end.gap, self._distance(end), settled, self.iterations)
 
     def _slide(self, iterate: Iterate) -> tuple[Iterate, bool]:
         """Apply Newton's method for the Lagrangian in the open directions; return if it ends in a minimum."""

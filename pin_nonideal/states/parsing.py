@@ -56,7 +56,7 @@ PIECES: dict[str, tuple[dict[str, Piece], dict[str, Piece]]] = {
 
 def named_configuration(
     model: Model,
-    given: State,
+    state: State,
     base: Array,
     what: str,
     parts: Sequence[tuple[str, slice]] | None = None,
@@ -71,7 +71,7 @@ def named_configuration(
 
     Args:
         model: pinocchio.Model.
-        given: see above.
+        state: see above.
         base: configuration that a table changes, (nq,).
         what: words for messages.
         parts: result of `unit_parts`, if known.
@@ -80,23 +80,23 @@ def named_configuration(
         InputError: wrong shape, not finite, or a part far from unit length.
         UnknownNameError: there is no such joint, piece or reference configuration.
     """
-    if isinstance(given, str):
+    if isinstance(state, str):
         known = [entry.key() for entry in model.referenceConfigurations]
-        if given not in known:
-            raise UnknownNameError(f'{what}: no reference configuration "{given}"{nearest(given, known)}')
-        return np.array(model.referenceConfigurations[given])
-    if not isinstance(given, Mapping):
-        describe_order(model, given, what, "nqs")
-        return configuration(model, given, what, parts)
+        if state not in known:
+            raise UnknownNameError(f'{what}: no reference configuration "{state}"{nearest(state, known)}')
+        return np.array(model.referenceConfigurations[state])
+    if not isinstance(state, Mapping):
+        describe_order(model, state, what, "nqs")
+        return configuration(model, state, what, parts)
     q = np.array(base)
-    for name, value in given.items():
+    for name, value in state.items():
         j = joint_named(model, name, what)
         first, size = model.idx_qs[j], model.nqs[j]
         q[first : first + size] = _values(model, j, 0, value, q[first : first + size], f'{what} of "{name}"')
     return with_unit_lengths(model, q, what)
 
 
-def named_velocity(model: Model, given: State, base: Array, what: str) -> Array:
+def named_velocity(model: Model, state: State, base: Array, what: str) -> Array:
     """Return a velocity from numbers or from a table by joint name, (nv,).
 
     A table maps a joint name to a number, to the joint's values, or to a table of pieces. A planar joint and
@@ -105,7 +105,7 @@ def named_velocity(model: Model, given: State, base: Array, what: str) -> Array:
 
     Args:
         model: pinocchio.Model.
-        given: see above.
+        state: see above.
         base: velocity that a table changes, (nv,).
         what: words for messages.
 
@@ -113,18 +113,18 @@ def named_velocity(model: Model, given: State, base: Array, what: str) -> Array:
         InputError: wrong shape, or not finite.
         UnknownNameError: there is no such joint or piece.
     """
-    if not isinstance(given, Mapping):
-        describe_order(model, given, what, "nvs")
-        return np.array(array(what, given, (model.nv,)))
+    if not isinstance(state, Mapping):
+        describe_order(model, state, what, "nvs")
+        return np.array(array(what, state, (model.nv,)))
     v = np.array(base)
-    for name, value in given.items():
+    for name, value in state.items():
         j = joint_named(model, name, what)
         first, size = model.idx_vs[j], model.nvs[j]
         v[first : first + size] = _values(model, j, 1, value, v[first : first + size], f'{what} of "{name}"')
     return v
 
 
-def named_joint_values(model: Model, given: object, what: str, others: float = 0.0) -> Array:
+def named_joint_values(model: Model, joint_values: object, what: str, others: float = 0.0) -> Array:
     """Values of the degrees of freedom from numbers or by joint name, (nv,): torques, gains, limits.
 
     A table (a mapping or a pandas Series) holds, by joint name, one number for all degrees of freedom of the
@@ -132,7 +132,7 @@ def named_joint_values(model: Model, given: object, what: str, others: float = 0
 
     Args:
         model: pinocchio.Model.
-        given: array (nv,), or a table by joint name.
+        joint_values: array (nv,), or a table by joint name.
         what: words for messages.
         others: value of the joints that a table leaves out.
 
@@ -140,9 +140,9 @@ def named_joint_values(model: Model, given: object, what: str, others: float = 0
         InputError: wrong shape, or not finite.
         UnknownNameError: there is no such joint.
     """
-    table = by_name(given)
+    table = by_name(joint_values)
     if table is None:
-        return np.array(array(what, given, (model.nv,)))
+        return np.array(array(what, joint_values, (model.nv,)))
     values = np.full(model.nv, others)
     for name, value in table.items():
         j = joint_named(model, name, what)
@@ -155,12 +155,13 @@ def named_joint_values(model: Model, given: object, what: str, others: float = 0
     return values
 
 
-def named_joint_samples(model: Model, given: object, count: int, what: str) -> Array:
+def named_joint_samples(model: Model, joint_samples: object, count: int, what: str) -> Array:
     """Samples of the degrees of freedom from an array or by joint name, (nt, nv); zero for joints left out.
 
     Args:
         model: pinocchio.Model.
-        given: array (nt, nv), or by joint name samples (nt,) or (nt, n) of a joint of n degrees of freedom.
+        joint_samples: array (nt, nv), or by joint name samples (nt,) or (nt, n) of a joint of n degrees of
+            freedom.
         count: nt.
         what: words for messages.
 
@@ -168,9 +169,9 @@ def named_joint_samples(model: Model, given: object, count: int, what: str) -> A
         InputError: wrong shape, or not finite.
         UnknownNameError: there is no such joint.
     """
-    table = by_name(given)
+    table = by_name(joint_samples)
     if table is None:
-        values = array(what, given, (count, None))
+        values = array(what, joint_samples, (count, None))
         if values.shape[1] != model.nv:
             raise InputError(
                 f"{what} must have {model.nv} columns (nv); got {values.shape[1]}; "
@@ -186,13 +187,15 @@ def named_joint_samples(model: Model, given: object, count: int, what: str) -> A
     return values
 
 
-def named_configuration_samples(model: Model, given: object, base: Array, count: int, what: str) -> Array:
+def named_configuration_samples(
+    model: Model, configurations: object, base: Array, count: int, what: str
+) -> Array:
     """Samples of a configuration from an array or by joint name, (nt, nq).
 
     Args:
         model: pinocchio.Model.
-        given: array (nt, nq), or by joint name samples (nt,) or (nt, n) of the n values of a joint, of which
-            an angle [rad] replaces (cos, sin).
+        configurations: array (nt, nq), or by joint name samples (nt,) or (nt, n) of the n values of a joint,
+            of which an angle [rad] replaces (cos, sin).
         base: configuration of the joints that a table leaves out, (nq,).
         count: nt.
         what: words for messages.
@@ -201,9 +204,9 @@ def named_configuration_samples(model: Model, given: object, base: Array, count:
         InputError: wrong shape, not finite, or a part far from unit length.
         UnknownNameError: there is no such joint.
     """
-    table = by_name(given)
+    table = by_name(configurations)
     if table is None:
-        samples = np.array(array(what, given, (count, model.nq)))
+        samples = np.array(array(what, configurations, (count, model.nq)))
     else:
         samples = np.tile(base, (count, 1))
         for name, values in table.items():
@@ -218,29 +221,29 @@ def named_configuration_samples(model: Model, given: object, base: Array, count:
     return samples
 
 
-def named_entries(model: Model, given: State | None) -> NDArray[np.bool_] | None:
+def named_entries(model: Model, state: State | None) -> NDArray[np.bool_] | None:
     """Return the mask of entries that a table of a velocity names, (nv,), or None without a table.
 
     Args:
         model: pinocchio.Model.
-        given: a velocity as in `named_velocity`.
+        state: a velocity as in `named_velocity`.
     """
-    if not isinstance(given, Mapping):
+    if not isinstance(state, Mapping):
         return None
-    return ~np.isnan(named_velocity(model, given, np.full(model.nv, np.nan), "v"))
+    return ~np.isnan(named_velocity(model, state, np.full(model.nv, np.nan), "v"))
 
 
-def named_coordinates(model: Model, given: State | None) -> NDArray[np.bool_] | None:
+def named_coordinates(model: Model, state: State | None) -> NDArray[np.bool_] | None:
     """Return the mask of tangent coordinates that a table of a configuration names, (nv,), or None.
 
     Args:
         model: pinocchio.Model.
-        given: a configuration as in `named_configuration`.
+        state: a configuration as in `named_configuration`.
     """
-    if not isinstance(given, Mapping):
+    if not isinstance(state, Mapping):
         return None
     named = np.zeros(model.nv, dtype=bool)
-    for name, value in given.items():
+    for name, value in state.items():
         j = joint_named(model, name, "q")
         own = named[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]]
         if not isinstance(value, Mapping):
@@ -311,13 +314,13 @@ def _pieced(kind: str, level: int, table: Mapping[object, Any], now: Array, what
     """Return the values of a joint from a table of its pieces."""
     pieces = next((both[level] for start, both in PIECES.items() if kind.startswith(start)), {})
     values = np.array(now)
-    for key, given in table.items():
+    for key, value in table.items():
         if key not in pieces:
             raise UnknownNameError(
                 f'{what}: no "{key}" in a {kind.removeprefix("JointModel")} joint{nearest(str(key), pieces)}'
             )
         first, size, way = pieces[key]
-        numbers = array(f"{what}: {key}", [given] if size == 1 and np.ndim(given) == 0 else given, (size,))
+        numbers = array(f"{what}: {key}", [value] if size == 1 and np.ndim(value) == 0 else value, (size,))
         if way == "rpy":
             numbers = pin.Quaternion(pin.rpy.rpyToMatrix(*numbers)).coeffs()
         elif way == "angle":

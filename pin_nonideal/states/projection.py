@@ -142,11 +142,11 @@ class Projection:
         on, v_on, before, after, rate = runner.project(q, v, t, self._reached())
         iterations, nearest, met = 0, True, after <= self._closed
         if not (met and self._is_nearby(q, on) and self._stays_outside(runner, q, on, t)):
-            found, nearest = self._search(runner, q, t, on if met else None)
-            iterations = found.iterations
-            on, v_on, after, rate = self._polished(runner, found.q, v, t)
-            met = after <= self._closed or found.gap <= CLOSURE_TOLERANCE
-            self._require_met(runner, q, found.q, met, nearest, t)
+            closure, nearest = self._search(runner, q, t, on if met else None)
+            iterations = closure.iterations
+            on, v_on, after, rate = self._polished(runner, closure.q, v, t)
+            met = after <= self._closed or closure.gap <= CLOSURE_TOLERANCE
+            self._require_met(runner, q, closure.q, met, nearest, t)
         if held.q is not None and held.q.any():
             on, search = self._hold(runner, q, on, held.q, held.firm_q, t)
             if search is not None:
@@ -196,9 +196,9 @@ class Projection:
         """
         search = None
         if moves(self.model, q, on, held, self.unit):
-            found, nearest = self._search(runner, q, t, None, ~held)
-            search = found.iterations, nearest
-            there = settled(self.model, runner, found.q, ~held, self._loops, t)
+            closure, nearest = self._search(runner, q, t, None, ~held)
+            search = closure.iterations, nearest
+            there = settled(self.model, runner, closure.q, ~held, self._loops, t)
             phi = self._residuals(runner, there, t)
             if _largest(phi[self._loops]) <= self._closed and self._is_outside(there, phi):
                 on = there
@@ -207,14 +207,14 @@ class Projection:
         return with_entries(self.model, on, q, held & ~moving(self.model, q, on, self.unit)), search
 
     def _require_met(
-        self, runner: core.Runner, q: Array, found: Array, met: bool, nearest: bool, t: float
+        self, runner: core.Runner, q: Array, projected: Array, met: bool, nearest: bool, t: float
     ) -> None:
         """Check that a search ended on the constraints, and near its start if only contacts were violated.
 
         Args:
             runner: a workspace of the core.
             q: start of the search, (nq,).
-            found: end of the search, (nq,).
+            projected: end of the search, (nq,).
             met: whether all constraints are satisfied at the end.
             nearest: whether the search confirms the end as nearest.
             t: time [s].
@@ -223,9 +223,9 @@ class Projection:
             LoopClosureError: loops stay open.
             InputError: the loops are closed at q, but no short displacement removes the penetration.
         """
-        phi, now = self._residuals(runner, q, t), self._residuals(runner, found, t)
+        phi, now = self._residuals(runner, q, t), self._residuals(runner, projected, t)
         inside = not self._is_outside(q, phi) and largest_loop_gap(phi, self.program) <= self._closed
-        far = (np.abs(pin.difference(self.model, q, found)) > FAR * self.unit).any()
+        far = (np.abs(pin.difference(self.model, q, projected)) > FAR * self.unit).any()
         if inside and (not met or (far and not nearest)):
             raise penetration_error(phi, self.program, t)
         if not met:
@@ -279,8 +279,8 @@ class Projection:
             own = copy(self)
             if names:
                 own.program = core.with_numbers(self.program, names, values[i : i + 1])
-            as_told = after[i] <= self._closed and met[i] and self._is_nearby(q[i], on[i])
-            if not (as_told and own._stays_outside(own.program.runner(), q[i], on[i], t)):
+            is_valid = after[i] <= self._closed and met[i] and self._is_nearby(q[i], on[i])
+            if not (is_valid and own._stays_outside(own.program.runner(), q[i], on[i], t)):
                 try:
                     on[i], v_on[i], _ = own.nearest(q[i], v[i], t)
                 except (PinNonidealError, core.CoreFailure) as failure:

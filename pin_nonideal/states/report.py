@@ -55,8 +55,8 @@ def report_of(
     model: Model,
     unit: Array,
     mass: Callable[[Array], Array],
-    given: tuple[Array, Array],
-    found: tuple[Array, Array],
+    start: tuple[Array, Array],
+    projected: tuple[Array, Array],
     held: Held,
     gap: float = 0.0,
     iterations: int = 0,
@@ -68,14 +68,14 @@ def report_of(
         model: pinocchio.Model.
         unit: unit displacement of each coordinate, (nv,).
         mass: q -> M, (nv, nv).
-        given: q (nq,) and v (nv,) before.
-        found: q (nq,) and v (nv,) after.
+        start: q (nq,) and v (nv,) before.
+        projected: q (nq,) and v (nv,) after.
         held: named entries.
         gap: largest residual before [m or rad, in the scale of its row].
         iterations: steps of the search.
         nearest: whether the search confirms the configuration as nearest.
     """
-    (q, v), (on, v_on) = given, found
+    (q, v), (on, v_on) = start, projected
     move, change = pin.difference(model, q, on), v_on - v
     distance, most, moved = _farthest(model, unit, mass, q, move)
     velocity_distance, fastest, changed = _farthest(model, unit, mass, on, change)

@@ -98,9 +98,9 @@ def shortest(scaled: Array, y: Array, lengths: Array) -> Array:
     x = np.zeros(len(lengths))
     left, values, right = np.linalg.svd(scaled[:, used])
     rank = int((values > DEPENDENT).sum())
-    found = right[:rank].T @ ((left.T[:rank] @ y) / values[:rank]) / lengths[used]
+    solution = right[:rank].T @ ((left.T[:rank] @ y) / values[:rank]) / lengths[used]
     idle = right[rank:].T / lengths[used][:, None]
-    x[used] = found - idle @ np.linalg.lstsq(idle, found, rcond=None)[0]
+    x[used] = solution - idle @ np.linalg.lstsq(idle, solution, rcond=None)[0]
     return x
 
 
@@ -128,7 +128,7 @@ def duplicate_rows(
     unit, probe = unit * side[:, None], np.abs(probe)
     order = np.argsort(probe, kind="stable")
     taken = np.zeros(len(rows), dtype=bool)
-    found = []
+    duplicates = []
     for place, i in enumerate(order):
         if taken[i]:
             continue
@@ -143,5 +143,5 @@ def duplicate_rows(
         for j in same:
             if j != first:
                 factor = side[j] * length[rows[j]] / (side[first] * length[rows[first]])
-                found.append((int(rows[j]), int(rows[first]), float(factor)))
-    return sorted(found)
+                duplicates.append((int(rows[j]), int(rows[first]), float(factor)))
+    return sorted(duplicates)

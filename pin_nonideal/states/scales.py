@@ -42,13 +42,13 @@ def slides(model: Model) -> NDArray[np.bool_]:
     Args:
         model: pinocchio.Model.
     """
-    q, found = pin.neutral(model), np.zeros(model.nv, dtype=bool)
+    q, sliding = pin.neutral(model), np.zeros(model.nv, dtype=bool)
     for joint in list(model.joints)[1:]:
         data = joint.createData()
         joint.calc(data, q)
         turning = np.asarray(data.S).reshape(6, joint.nv)[3:]
-        found[joint.idx_v : joint.idx_v + joint.nv] = np.abs(turning).max(axis=0) < VANISHING
-    return found
+        sliding[joint.idx_v : joint.idx_v + joint.nv] = np.abs(turning).max(axis=0) < VANISHING
+    return sliding
 
 
 def coordinate(model: Model, dof: int) -> str:

@@ -38,7 +38,7 @@ class ClosedReference:
         times: sample times [s], (nt,).
         q: configurations, (nt, nq); coordinates that are not given are guesses.
         v: velocities, (nt, nv), or None.
-        given: mask of the given coordinates, (nv,).
+        stated: mask of the stated coordinates, (nv,).
         driven: names of the driven joints.
         dofs: mask of their degrees of freedom, (nv,).
         who: words for messages.
@@ -56,7 +56,7 @@ class ClosedReference:
         times: Array,
         q: Array,
         v: Array | None,
-        given: Mask,
+        stated: Mask,
         driven: list[str],
         dofs: Mask,
         who: str,
@@ -68,16 +68,16 @@ class ClosedReference:
         self._runner, self._rows = compiled.program.runner(), holonomic_rows(compiled.program)
         self._allowed = CLOSED * max(1.0, compiled.projection.length)
         still = np.zeros(scene.model.nv)
-        start = compiled.project(q[0], still, float(times[0]), Held(q=given & dofs))[0]
+        start = compiled.project(q[0], still, float(times[0]), Held(q=stated & dofs))[0]
         basis = AtRest(scene, still, float(times[0]), start).free(start)
-        self._free = ~self._independent(basis, [given & dofs, given])
+        self._free = ~self._independent(basis, [stated & dofs, stated])
         on = np.array(q)
         on[0] = self._settled(start, float(times[0]))
         unit = np.where(slides(scene.model), compiled.projection.length or 1.0, 1.0)
         for k in range(1, len(on)):
-            on[k] = self._followed(on[k - 1], q[k], given, times[k - 1 : k + 1], unit)
+            on[k] = self._followed(on[k - 1], q[k], stated, times[k - 1 : k + 1], unit)
         if by_name:
-            self._require_kept(on, q, times, given, unit)
+            self._require_reference(on, q, times, stated, unit)
         on_rates = None if v is None else np.array(v)
         if on_rates is not None:
             for k, t in enumerate(times.tolist()):
@@ -98,20 +98,20 @@ class ClosedReference:
         """Return the torques of the driven joints for a motion on the constraints, (nv,)."""
         return inverse_dynamics(self._scene, q, v, a, self._driven, t=t).tau
 
-    def _followed(self, before: Array, q: Array, given: Mask, times: Array, unit: Array) -> Array:
+    def _followed(self, before: Array, q: Array, stated: Mask, times: Array, unit: Array) -> Array:
         """Return a sample on the constraints, followed from the sample before it in short moves, (nq,).
 
         Args:
             before: the sample before it, on the constraints, (nq,).
             q: the sample, (nq,).
-            given: mask of its given coordinates, (nv,).
+            stated: mask of its given coordinates, (nv,).
             times: times of both samples [s].
             unit: unit displacement of each coordinate, (nv,).
         """
         model = self._scene.model
 
         def way() -> Array:
-            return np.where(given, pin.difference(model, before, q), 0.0)
+            return np.where(stated, pin.difference(model, before, q), 0.0)
 
         count = max(1, int(np.ceil(np.abs(way() / unit).max(initial=0.0) / LONGEST)))
         for left in range(count, 0, -1):
@@ -119,15 +119,15 @@ class ClosedReference:
             before = self._settled(pin.integrate(model, before, way() / left), t)
         return before
 
-    def _require_kept(self, on: Array, q: Array, times: Array, given: Mask, unit: Array) -> None:
+    def _require_reference(self, on: Array, q: Array, times: Array, stated: Mask, unit: Array) -> None:
         """Check that given coordinates keep their values, up to the rounding of a log.
 
         Raises:
             InputError: a given coordinate has moved farther.
         """
         model = self._scene.model
-        for t, now, asked in zip(times.tolist(), on, q, strict=True):
-            away = np.where(given, np.abs(pin.difference(model, asked, now)) / unit, 0.0)
+        for t, now, reference in zip(times.tolist(), on, q, strict=True):
+            away = np.where(stated, np.abs(pin.difference(model, reference, now)) / unit, 0.0)
             worst = int(np.argmax(away))
             if away[worst] > LOG_ROUNDING:
                 raise InputError(
@@ -170,9 +170,9 @@ class ClosedReference:
     def _velocity(self, q: Array, v: Array, t: float) -> Array:
         """Return the velocity on the constraints with the independent entries of v, (nv,)."""
         A, _, _, rate = rows_at(self._runner, q, v, t)
-        found = np.array(v)
-        found[self._free] -= self._solved(A, rate, t)
-        return found
+        closed = np.array(v)
+        closed[self._free] -= self._solved(A, rate, t)
+        return closed
 
     def _solved(self, A: Array, b: Array, t: float) -> Array:
         """Solve A x = b for the dependent coordinates."""

@@ -102,12 +102,12 @@ def equilibrium(
     best: Equilibrium | None = None
     for k in range(attempts):
         q = start if k == 0 else search.elsewhere(start, k)
-        found = None if q is None else search.run(q, k + 1)
-        if found is None:
+        result = None if q is None else search.run(q, k + 1)
+        if result is None:
             continue
-        if found.stable or not downhill:
-            return found
-        best = best or found
+        if result.stable or not downhill:
+            return result
+        best = best or result
     if best is None:
         raise EquilibriumError(
             f'no state of rest of "{scene.name}" was found from {attempts} starts: {search.reason()}',
@@ -276,9 +276,9 @@ class _Search:
         from scipy.linalg import eig
 
         inertia = now.free.T @ self.rest.mass(q) @ now.free
-        found, shapes = eig(stiffness, inertia) if len(now.left) else (np.zeros(0), np.zeros((0, 0)))
-        order = np.argsort(found.real)
-        rates: NDArray[np.complex128] = np.asarray(found[order], dtype=complex)
+        values, shapes = eig(stiffness, inertia) if len(now.left) else (np.zeros(0), np.zeros((0, 0)))
+        order = np.argsort(values.real)
+        rates: NDArray[np.complex128] = np.asarray(values[order], dtype=complex)
         shapes = np.abs(shapes[:, order])
         weights = np.einsum("ik,ij,jk->k", shapes, np.abs(inertia), shapes)
         least = self.neutral(now, inertia, stiffness, shapes) / np.where(weights > 0.0, weights, 1.0)

@@ -217,10 +217,10 @@ class _Joint:
 
     def slow(self, sign: float) -> float:
         """Return the torque at which slow motion in one direction needs no other force."""
-        found = self.way(sign)
-        if found is None:
+        direction = self.way(sign)
+        if direction is None:
             return math.nan
-        way, opens = found
+        way, opens = direction
         modes, several = self.modes(way)
         speed = SLOW * way if several or opens else self.rest.still
         torque = self.tau.copy()

@@ -110,20 +110,20 @@ def inverse_dynamics(
     model, still = scene.model, np.zeros(scene.model.nv)
     at = named_configuration(model, q, scene.q0, "inverse_dynamics: q")
     speed = named_velocity(model, v, scene.v0, "inverse_dynamics: v")
-    wanted = named_velocity(model, a, still, "inverse_dynamics: a")
+    acceleration = named_velocity(model, a, still, "inverse_dynamics: a")
     time = number("inverse_dynamics: t", t)
     dofs = _driven(scene, actuated)
     limits = None if bounds is None else _bounds(scene, bounds, dofs)
     rest = AtRest(scene, still, time, at)
     A, b, _, rate = rows_at(rest.runner, at, speed, time)
     if len(A):
-        allowed = _allowed(rest, at, A, b, wanted)
-        _open_contacts(rest, A, b, rate, wanted, allowed)
-        _check_follows(scene, A, b, wanted, rest.open, allowed)
-    found = _Torques(rest, at, speed, wanted, dofs).solve(limits)
-    if speed.any() or wanted.any():
-        return found
-    return replace(found, _holding=partial(holding_torques, scene, at, found.tau, time, rest.open, dofs))
+        allowed = _allowed(rest, at, A, b, acceleration)
+        _open_contacts(rest, A, b, rate, acceleration, allowed)
+        _check_follows(scene, A, b, acceleration, rest.open, allowed)
+    result = _Torques(rest, at, speed, acceleration, dofs).solve(limits)
+    if speed.any() or acceleration.any():
+        return result
+    return replace(result, _holding=partial(holding_torques, scene, at, result.tau, time, rest.open, dofs))
 
 
 def _driven(scene: Scene, actuated: Sequence[str] | None) -> list[int]:
@@ -147,12 +147,12 @@ def _bounds(scene: Scene, bounds: object, dofs: list[int]) -> tuple[Array, Array
         )
 
     def bound(k: int, others: float) -> Array:
-        given, what = bounds[k], f"bounds[{k}]"
-        if by_name(given) is not None:
-            return named_joint_values(scene.model, given, what, others)[dofs]
-        if np.ndim(given) == 0:
-            return np.full(len(dofs), float(array(what, given, ())))
-        return array(what, given, (len(dofs),))
+        entry, what = bounds[k], f"bounds[{k}]"
+        if by_name(entry) is not None:
+            return named_joint_values(scene.model, entry, what, others)[dofs]
+        if np.ndim(entry) == 0:
+            return np.full(len(dofs), float(array(what, entry, ())))
+        return array(what, entry, (len(dofs),))
 
     least, largest = bound(0, -np.inf), bound(1, np.inf)
     if not (least < largest).all():
@@ -232,13 +232,15 @@ class _Torques:
         tau, before = np.zeros(len(self.v)), np.inf
         for _ in range(PASSES):
             now = self.rest.runner.solve(self.q, self.slipping, self.rest.t, tau, self.modes)
-            given = now.F - tau + now.C  # forces without the torques
-            needed = self.free.T @ (self.M @ self.a - given)
+            undriven = now.F - tau + now.C  # forces without the torques
+            needed = self.free.T @ (self.M @ self.a - undriven)
             u = _least(scaled, np.linalg.solve(root, needed), self.lengths, moments)
             change = self.select @ (u / self.arms) - tau
             tau = self.select @ (u / self.arms)
             scale = float(
-                np.abs(given).max(initial=0.0) + np.abs(tau).max(initial=0.0) + np.abs(self.M @ self.a).max()
+                np.abs(undriven).max(initial=0.0)
+                + np.abs(tau).max(initial=0.0)
+                + np.abs(self.M @ self.a).max()
             )
             size = float(np.abs(change).max(initial=0.0))
             if size <= BALANCED * scale or (size >= before and size <= 1e3 * BALANCED * scale):

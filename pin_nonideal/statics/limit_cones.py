@@ -100,10 +100,10 @@ class LimitCones:
         elements = len(self.sizes)
         following: list[tuple[int, float] | None] = [None] * elements
         rows = scene.constraint_slices
-        said = dict(zip(rows, (*scene.constraints, *scene.contacts), strict=True))
+        descriptions = dict(zip(rows, (*scene.constraints, *scene.contacts), strict=True))
         for e, name in enumerate(scene.element_names):
             for part in PARTS:
-                about = said.get(name.removesuffix(f" {part}") if part else name)
+                about = descriptions.get(name.removesuffix(f" {part}") if part else name)
                 if not hasattr(about, "torsional") or (part and not name.endswith(f" {part}")):
                     continue
                 row = rows[name.removesuffix(f" {part}") if part else name].start
@@ -174,10 +174,10 @@ class LimitCones:
             row = np.zeros(self.count)
             row[first] = -1.0
             pulls.append((row, 0.0))
-        found = self._least_violations(pulls, list(range(len(pulls))), pressing=False)
+        violations = self._least_violations(pulls, list(range(len(pulls))), pressing=False)
         pulled = {
             first: float(x) * self.unit / float(self.lengths[first])
-            for first, x in zip(self.contacts, found, strict=True)
+            for first, x in zip(self.contacts, violations, strict=True)
             if x > AT_LIMIT
         }
         if pulled:
@@ -189,10 +189,10 @@ class LimitCones:
             row[self.parts[e]] += n
             cuts.append((row, constant))
             elements.append(e)
-        found = self._least_violations(cuts, elements, pressing=True)
+        violations = self._least_violations(cuts, elements, pressing=True)
         rubs = {
             e: float(x) * self.unit / float(self.lengths[self.parts[e].start])
-            for e, x in enumerate(found)
+            for e, x in enumerate(violations)
             if x > AT_LIMIT
         }
         return {}, rubs
@@ -217,7 +217,7 @@ class LimitCones:
         for idle in self.open:
             limits[idle] = (0.0, 0.0)
         rows = [np.append(row, -np.eye(several)[k]) for (row, _), k in zip(bounds, owners, strict=True)]
-        found = linprog(
+        optimum = linprog(
             np.append(np.zeros(self.count), np.ones(several)),
             A_ub=np.array(rows) if rows else None,
             b_ub=[bound for _, bound in bounds] or None,
@@ -226,7 +226,7 @@ class LimitCones:
             bounds=limits,
             method="highs",
         )
-        return np.zeros(several) if found.x is None else np.asarray(found.x[self.count :])
+        return np.zeros(several) if optimum.x is None else np.asarray(optimum.x[self.count :])
 
     def _within_cones(self, factor: float, sign: float = 0.0, most: float = 0.0) -> tuple[float, Array]:
         """Solve the programs of more and more cuts until the forces lie within all cones."""
@@ -288,7 +288,7 @@ class LimitCones:
         goal = np.zeros(self.count + 1)
         goal[-2 if sign else -1] = -sign if sign else 1.0
         equal = np.hstack([self.balance, np.zeros((len(self.load), 1))])
-        found = linprog(
+        optimum = linprog(
             goal,
             A_ub=np.array(rows) if rows else None,
             b_ub=bounds or None,
@@ -298,9 +298,9 @@ class LimitCones:
             method="highs",
             options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
         )
-        if found.x is None:
+        if optimum.x is None:
             return np.inf, np.zeros(0 if sign else self.count)
-        return float(found.x[-1]), np.asarray(found.x[:-1])
+        return float(optimum.x[-1]), np.asarray(optimum.x[:-1])
 
     def least_factor(self) -> float:
         """Return the least factor of all limits for which forces balance, by bisection, or infinity."""

@@ -92,18 +92,18 @@ class TrackTrajectory(SceneDrive):
         optional_text("TrackTrajectory: name", self.name)
         who = label(self)
         times = sample_times(who, self.times)
-        given: Table = {"times": times, "q": checked_samples(f"{who}: q", self.q, times.size)}
+        checked: Table = {"times": times, "q": checked_samples(f"{who}: q", self.q, times.size)}
         if self.v is not None:
-            given["v"] = checked_samples(f"{who}: v", self.v, times.size)
-            _require_same_joints(who, given["q"], given["v"])
-        given |= {key: checked_gain(f"{who}: {key}", getattr(self, key)) for key in ("kp", "kd")}
+            checked["v"] = checked_samples(f"{who}: v", self.v, times.size)
+            _require_same_joints(who, checked["q"], checked["v"])
+        checked |= {key: checked_gain(f"{who}: {key}", getattr(self, key)) for key in ("kp", "kd")}
         choice(f"{who}: feedforward", self.feedforward, FEEDFORWARDS)
         if self.period is not None:
-            given["period"] = positive(f"{who}: period", self.period)
+            checked["period"] = positive(f"{who}: period", self.period)
         if self.joints is not None:
             names = sequence(f"{who}: joints", self.joints)
-            given["joints"] = tuple(text(f"{who}: joints", name) for name in names)
-        for key, value in given.items():
+            checked["joints"] = tuple(text(f"{who}: joints", name) for name in names)
+        for key, value in checked.items():
             object.__setattr__(self, key, value)
 
     def bound(self, model: Model, q0: Array, spec: SceneSpec) -> BoundDrive:
@@ -121,26 +121,26 @@ class TrackTrajectory(SceneDrive):
         times = np.asarray(self.times)
         q = named_configuration_samples(model, self.q, q0, times.size, f"{who}: q")
         v = None if self.v is None else named_joint_samples(model, self.v, times.size, f"{who}: v")
-        given = _named(model, self.q, f"{who}: q")
+        stated = _named(model, self.q, f"{who}: q")
         gains = [gains_of(model, getattr(self, key), f"{who}: {key}") for key in ("kp", "kd")]
-        driven = self._driven(model, given, gains, who)
+        driven = self._driven(model, stated, gains, who)
         kp, kd = (np.where(driven, gain, 0.0) for gain in gains)
         breaks = break_times(model, times, v is not None)
         rounding = 0.0 if self.period is None else TIME_ROUNDING  # continuous torques jump at breaks
         if self.feedforward != "constrained":
             motion = ReferenceMotion(model, times, q, v, rounding)
-            tracking = _Tracking(model, motion, given, driven, kp, kd, self.feedforward)
+            tracking = _Tracking(model, motion, stated, driven, kp, kd, self.feedforward)
             return BoundDrive(tracking, driven, breaks)
         scene = without_drives(model, q0, spec, who)
         names = [place.name for place in joint_places(model) if driven[place.v_first]]
 
         def reference() -> ClosedReference:
             named = by_name(self.q) is not None
-            return ClosedReference(scene, times, q, v, given, names, driven, who, named, rounding)
+            return ClosedReference(scene, times, q, v, stated, names, driven, who, named, rounding)
 
         return BoundDrive(_ConstrainedTracking(model, reference, kp, kd), driven, breaks)
 
-    def _driven(self, model: Model, given: Mask, gains: Sequence[Array], who: str) -> Mask:
+    def _driven(self, model: Model, stated: Mask, gains: Sequence[Array], who: str) -> Mask:
         """Return the mask of the degrees of freedom that are driven, (nv,).
 
         Raises:
@@ -149,7 +149,7 @@ class TrackTrajectory(SceneDrive):
         if self.joints is not None:
             driven = _named(model, dict.fromkeys(self.joints), f"{who}: joints")
         elif by_name(self.q) is not None:
-            driven = given.copy()
+            driven = stated.copy()
         else:
             driven = np.zeros(model.nv, dtype=bool)
             for gain, values in zip((self.kp, self.kd), gains, strict=True):
@@ -160,7 +160,7 @@ class TrackTrajectory(SceneDrive):
                 f"{who}: at least one joint must be driven; got none with a gain; name the driven joints in "
                 "joints"
             )
-        _require_among(model, driven, given, f"{who}: joints", "the joints of q")
+        _require_among(model, driven, stated, f"{who}: joints", "the joints of q")
         for key in ("kp", "kd"):
             if by_name(getattr(self, key)) is not None:
                 named = _named(model, getattr(self, key), f"{who}: {key}")
@@ -197,9 +197,9 @@ def _require_among(model: Model, named: Mask, allowed: Mask, what: str, where: s
             )
 
 
-def _named(model: Model, given: object, who: str) -> Mask:
+def _named(model: Model, samples: object, who: str) -> Mask:
     """Return the mask of the degrees of freedom of named joints, (nv,); an array names all joints."""
-    table = by_name(given)
+    table = by_name(samples)
     mask = np.full(model.nv, table is None)
     for name in table or ():
         j = joint_named(model, name, who)
@@ -222,7 +222,7 @@ class _Tracking:
     Args:
         model: pinocchio.Model.
         reference: function of time that returns q, v and a.
-        given: mask of the coordinates of the reference, (nv,).
+        stated: mask of the coordinates of the reference, (nv,).
         driven: mask of the driven degrees of freedom, (nv,).
         kp: stiffness, (nv,).
         kd: damping, (nv,).
@@ -233,7 +233,7 @@ class _Tracking:
         self,
         model: Model,
         reference: ReferenceMotion,
-        given: Mask,
+        stated: Mask,
         driven: Mask,
         kp: Array,
         kd: Array,
@@ -244,7 +244,7 @@ class _Tracking:
         self._present = [
             (slice(p.q_first, p.q_first + p.nq), slice(p.v_first, p.v_first + p.nv))
             for p in joint_places(model)
-            if not given[p.v_first : p.v_first + p.nv].any()
+            if not stated[p.v_first : p.v_first + p.nv].any()
         ]
 
     def __call__(self, t: float, q: Array, v: Array) -> Array:

@@ -134,9 +134,9 @@ class Sweep(Sequence[Trajectory]):
             if record is None:
                 rows.append([k, "", "missing"])
                 continue
-            said = ", ".join(f"{name}={short_repr(x)}" for name, x in record["parameters"].items())
+            settings = ", ".join(f"{name}={short_repr(x)}" for name, x in record["parameters"].items())
             shown = [f"{record[key]:.6g}" if record.get(key) is not None else "" for key in numbers]
-            rows.append([k, said, record["error"] or "done", *shown])
+            rows.append([k, settings, record["error"] or "done", *shown])
         if len(self) > ROWS_SHOWN:
             rows.append(["...", f"{len(self) - ROWS_SHOWN} more", ""])
         title = str(self)
@@ -161,7 +161,7 @@ class Sweep(Sequence[Trajectory]):
         """
         done = [(k, r) for k, r in enumerate(self.records) if r is not None]
         names = sorted({key for _, r in done for key, x in r.items() if isinstance(x, (int, float))})
-        found: Table = {}
+        statistics: Table = {}
         for name in names:
             runs, values = zip(
                 *((k, r[name]) for k, r in done if isinstance(r.get(name), (int, float))), strict=True
@@ -169,9 +169,9 @@ class Sweep(Sequence[Trajectory]):
             x = np.array(values, dtype=float)
             levels = {level: float(np.quantile(x, level)) for level in QUANTILES}
             worst = int(runs[int(np.argmax(x))])
-            found[name] = {"mean": float(x.mean()), "std": float(x.std()), "count": len(x)}
-            found[name] |= {"quantiles": levels, "worst": worst}
-        return found
+            statistics[name] = {"mean": float(x.mean()), "std": float(x.std()), "count": len(x)}
+            statistics[name] |= {"quantiles": levels, "worst": worst}
+        return statistics
 
 
 def open_store(folder: Path, digest: str, runs: int) -> list[int]:
@@ -306,5 +306,5 @@ def partial_trajectory(error: RunError) -> Trajectory | None:
     Args:
         error: error that the run raised.
     """
-    found = error.trajectory
-    return found if isinstance(found, Trajectory) else None
+    trajectory = error.trajectory
+    return trajectory if isinstance(trajectory, Trajectory) else None

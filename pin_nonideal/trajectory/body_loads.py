@@ -67,11 +67,11 @@ class _Frames:
     """Substitute for the core's builder that records the frames of a contact."""
 
     def __init__(self) -> None:
-        self.found: list[Frame] = []
+        self.frames: list[Frame] = []
 
     def __getattr__(self, _: str) -> Callable[..., int]:
         def note(*arguments: Any, **__: Any) -> int:
-            self.found += [x for x in arguments if isinstance(x, tuple) and len(x) == 3 and len(x[1]) == 9]
+            self.frames += [x for x in arguments if isinstance(x, tuple) and len(x) == 3 and len(x[1]) == 9]
             return 0
 
         return note
@@ -89,7 +89,7 @@ def _frames(c: Any, name: str, resolver: Resolver) -> tuple[Frame, Frame] | None
         return None
     noted: Any = _Frames()
     lower_gaps(c, name, noted, resolver)
-    first, second = noted.found
+    first, second = noted.frames
     return first, second
 
 

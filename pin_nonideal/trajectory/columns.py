@@ -84,11 +84,11 @@ def _number(name: str) -> str:
     return dot + last if last.isdigit() else ""
 
 
-def _with_units(found: Iterator[tuple[str, Array, str]]) -> dict[str, tuple[Array, str]]:
+def _with_units(entries: Iterator[tuple[str, Array, str]]) -> dict[str, tuple[Array, str]]:
     """Columns and their units by name without spaces."""
     table: dict[str, tuple[Array, str]] = {}
-    for given, values, unit in found:
-        base = column_name(given)
+    for words, values, unit in entries:
+        base = column_name(words)
         name, number = base, 1
         while name in table:
             number += 1

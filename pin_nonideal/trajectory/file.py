@@ -259,12 +259,12 @@ def _event(t: float, kind: str, element: str, change: float = 0.0, *vectors: Seq
 
 def _extra_arrays(run: RunFields) -> Table:
     """Return the arrays without a row for each sample, by name."""
-    found: Table = {} if run.grid is None else {"grid": run.grid.astype(np.int8)}
+    arrays: Table = {} if run.grid is None else {"grid": run.grid.astype(np.int8)}
     for k, record in enumerate(run.user_events):
-        found |= {f"event/{k}/{key}": getattr(record, key) for key in ("t", "q", "v")}
+        arrays |= {f"event/{k}/{key}": getattr(record, key) for key in ("t", "q", "v")}
     if run.dense is not None:
-        found |= {f"dense/{key}": getattr(run.dense, key) for key in DENSE}
-    return found
+        arrays |= {f"dense/{key}": getattr(run.dense, key) for key in DENSE}
+    return arrays
 
 
 def _extra_fields(loose: Table, header: Table, samples: int) -> Table:

@@ -116,9 +116,9 @@ def _require_recorded(run: RunFields, k: int, motions: BodyMotions, body: Part, 
         InputError: they do not.
     """
     name = str(run.scene.model.names[body.joint])
-    found, size = _balance(run, k, motions, body)
+    balance, size = _balance(run, k, motions, body)
     recorded = reactions_of(run)[name][k, :6]
-    missed = float(np.abs(found.vector - recorded).max())
+    missed = float(np.abs(balance.vector - recorded).max())
     model = run.scene.model
     whole = sum(Y.mass for Y in model.inertias) * float(np.linalg.norm(model.gravity.linear))
     whole += max(float(np.abs(wrench[k]).max()) for wrench in reactions_of(run).values())
@@ -175,11 +175,11 @@ def _beyond(model: Model, frame: int, index: int) -> bool | None:
 
 def _ancestors(model: Model, index: int) -> set[int]:
     """Return the frames of the same body from which a frame descends."""
-    joint, found, frame = model.frames[index].parentJoint, set(), int(model.frames[index].parentFrame)
-    while frame not in found and frame != index and model.frames[frame].parentJoint == joint:
-        found.add(frame)
+    joint, ancestors, frame = model.frames[index].parentJoint, set(), int(model.frames[index].parentFrame)
+    while frame not in ancestors and frame != index and model.frames[frame].parentJoint == joint:
+        ancestors.add(frame)
         frame = int(model.frames[frame].parentFrame)
-    return found
+    return ancestors
 
 
 def _inertia_beyond(model: Model, index: int, who: str) -> pin.Inertia:

@@ -108,7 +108,7 @@ class Trajectory(RunFields):
     def _repr_html_(self) -> str:
         first, *lines = summary(self).split("\n")
         parts = [SUMMARY_LINE.fullmatch(line.strip()) for line in lines]
-        rows = [found.groups() if found else (line,) for found, line in zip(parts, lines, strict=True)]
+        rows = [match.groups() if match else (line,) for match, line in zip(parts, lines, strict=True)]
         return table(f"Trajectory {first}", rows)
 
     def columns(self) -> dict[str, Array]:

@@ -105,16 +105,16 @@ def default_plots(runs: Sequence[Trajectory]) -> list[str]:
         runs: runs of one scene.
     """
     first = runs[0]
-    found = ["q", "v", *(["energy"] if first.energy else [])]
+    kinds = ["q", "v", *(["energy"] if first.energy else [])]
     if first.scene.contacts and first.lam is not None:
-        found.append("contacts")
+        kinds.append("contacts")
     if has_open_contact(first):
-        found.append("gaps")
+        kinds.append("gaps")
     if first.scene.constraint_slices:
-        found.append("violation")
+        kinds.append("violation")
     if getattr(first, "law_forces", None) and friction_joints(first):
-        found.append("friction")
-    return found + (["modes"] if bands_of(first) else [])
+        kinds.append("friction")
+    return kinds + (["modes"] if bands_of(first) else [])
 
 
 Drawn = tuple[str, list[Any]]
@@ -125,20 +125,20 @@ def _requested_plots(runs: Sequence[Trajectory], what: Any) -> list[Drawn]:
     items = parse_plots("plot: what", what)
     if not items:
         raise InputError("plot: what must name at least one plot; got none")
-    found: list[Drawn] = []
+    drawn: list[Drawn] = []
     for item in items:
         if item == "modes":
             if not bands_of(runs[0]):
                 raise InputError(
                     'plot "modes" needs an element that sticks or slips, and this scene has none'
                 )
-            found += [("modes", [run]) for run in runs]
+            drawn += [("modes", [run]) for run in runs]
             continue
         over = is_relation(item) and item not in [str(name) for name in runs[0].scene.model.names]
         each = [relations_of(run, item) if over else plots_of(run, [item]) for run in runs]
         kind = "relation" if over else "time"
-        found += [(kind, list(parts)) for parts in zip(*each, strict=False)]
-    return found
+        drawn += [(kind, list(parts)) for parts in zip(*each, strict=False)]
+    return drawn
 
 
 def _figure(

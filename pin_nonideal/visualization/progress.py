@@ -19,8 +19,8 @@ def stages(progress: bool | None, count: int) -> AbstractContextManager[Stage]:
         progress: True, False, or None for a terminal only.
         count: number of stages.
     """
-    wanted = sys.stderr.isatty() if progress is None else progress
-    return _bar(count) if wanted else nullcontext(_silent)
+    is_shown = sys.stderr.isatty() if progress is None else progress
+    return _bar(count) if is_shown else nullcontext(_silent)
 
 
 def _silent(name: str) -> None:

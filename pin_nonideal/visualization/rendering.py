@@ -154,18 +154,18 @@ def _gif(pictures: list[bytes], fps: float) -> bytes:
 
 def _ffmpeg(ending: str) -> str:
     """Return the path of ffmpeg, or of the executable in imageio-ffmpeg."""
-    found = shutil.which("ffmpeg")
-    if found is None:
+    encoder = shutil.which("ffmpeg")
+    if encoder is None:
         try:
             from imageio_ffmpeg import get_ffmpeg_exe
 
-            found = get_ffmpeg_exe()
+            encoder = get_ffmpeg_exe()
         except (ImportError, RuntimeError):
             raise OutputError(
                 f"render: {ending} needs ffmpeg on the path, or pip install 'pin-nonideal[video]'; "
                 "or write .gif instead"
             ) from None
-    return str(found)
+    return str(encoder)
 
 
 def _video(pictures: list[bytes], ending: str, fps: float, encoder: str) -> bytes:

@@ -26,7 +26,7 @@ from pin_nonideal.atomic_files import check_writable, file_path, whole_file
 from pin_nonideal.errors import InputError, OutputError, short_repr
 from pin_nonideal.validation import choice, positive
 from pin_nonideal.visualization.page.payload import STAGES, packed_runs
-from pin_nonideal.visualization.page.relations import is_asked
+from pin_nonideal.visualization.page.relations import names_relation
 from pin_nonideal.visualization.page.signals import Chosen, parse_plots, plots_of, runs_and_names
 from pin_nonideal.visualization.page.xy_plots import relations_of
 from pin_nonideal.visualization.progress import stages
@@ -179,7 +179,7 @@ def replay(
 def _check_plots(runs: Sequence[Trajectory], plots: Chosen) -> None:
     """Check the chosen plots before work on the page begins."""
     items = parse_plots("plots", plots)
-    relations = [item for item in items if is_asked(runs[0], item)]
+    relations = [item for item in items if names_relation(runs[0], item)]
     for run in runs:
         plots_of(run, [item for item in items if item not in relations])
     for item in relations:
@@ -207,7 +207,7 @@ def _page(content: bytes, title: str, compress: bool) -> str:
             "\n".join(['"use strict";', *(asset(name) for name in SCRIPTS)]).encode(), compress
         ),
     }
-    return re.sub(r"\{\{(\w+)\}\}", lambda found: parts[found.group(1)], asset("page.html"))
+    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match.group(1)], asset("page.html"))
 
 
 def _stored(plain: bytes, compress: bool) -> str:
@@ -225,10 +225,10 @@ def viewer_library() -> tuple[bytes, str]:
     Raises:
         OutputError: the package meshcat is missing, or its files cannot be read.
     """
-    found = importlib.util.find_spec("meshcat")
-    if found is None or not found.submodule_search_locations:
+    spec = importlib.util.find_spec("meshcat")
+    if spec is None or not spec.submodule_search_locations:
         raise OutputError("a replay needs the package meshcat, which is missing: pip install meshcat")
-    viewer = Path(found.submodule_search_locations[0]) / "viewer"
+    viewer = Path(spec.submodule_search_locations[0]) / "viewer"
     bundle = viewer / "dist" / "main.min.js"
     try:
         library = bundle.read_bytes()

@@ -50,15 +50,15 @@ def convex_hull(points: Array, what: str) -> ConvexHull:
     from scipy.spatial import QhullError
 
     try:
-        found = Qhull(points)
+        hull = Qhull(points)
     except (QhullError, ValueError) as error:
         raise InputError(
             f"{what} must span a solid: four that lie in no plane at least; got {len(points)}"
         ) from error
-    face = _faces(found.equations[:, :3], found.neighbors)
+    face = _faces(hull.equations[:, :3], hull.neighbors)
     edges = [
-        (*(corner for j, corner in enumerate(found.simplices[i]) if j != k), face[i], face[other])
-        for i, beside in enumerate(found.neighbors)
+        (*(corner for j, corner in enumerate(hull.simplices[i]) if j != k), face[i], face[other])
+        for i, beside in enumerate(hull.neighbors)
         for k, other in enumerate(beside)
         if i < other and face[i] != face[other]
     ]
@@ -66,8 +66,8 @@ def convex_hull(points: Array, what: str) -> ConvexHull:
     corners, numbers = np.unique(meetings[:, :2], return_inverse=True)
     meetings[:, :2] = numbers.reshape(-1, 2)
     planes = np.empty((face.max() + 1, 4))
-    planes[face, :3] = found.equations[:, :3]
-    planes[face, 3] = -found.equations[:, 3]
+    planes[face, :3] = hull.equations[:, :3]
+    planes[face, 3] = -hull.equations[:, 3]
     return ConvexHull(np.asarray(points[corners]), planes, meetings)
 
 
@@ -111,8 +111,8 @@ def shrunk(points: Array, by: float, what: str) -> Array:
     halves = np.column_stack([planes[:, :3], by - planes[:, 3]])
     corners = HalfspaceIntersection(halves, middle).intersections
     grid = ONE_CORNER * float(np.ptp(points, axis=0).max())
-    _, kept = np.unique(np.round((corners - middle) / grid), axis=0, return_index=True)
-    return np.asarray(corners[np.sort(kept)])
+    _, first_of_each = np.unique(np.round((corners - middle) / grid), axis=0, return_index=True)
+    return np.asarray(corners[np.sort(first_of_each)])
 
 
 def check_convex(points: Array, triangles: NDArray[np.int64], what: str) -> None:

@@ -276,17 +276,17 @@ class RevolvedContact:
                 )
 
 
-def hull_points(given: object, who: str) -> tuple[Vector3, ...]:
+def hull_points(corners: object, who: str) -> tuple[Vector3, ...]:
     """Return points as tuples, after a check that they span a solid.
 
     Args:
-        given: points, (n, 3).
+        corners: points, (n, 3).
         who: words for messages.
 
     Raises:
         InputError: the points are invalid or span no solid.
     """
-    points = array(f"{who}: points", given, (None, 3))
+    points = array(f"{who}: points", corners, (None, 3))
     convex_hull(points, f"{who}: points")
     return tuple((x, y, z) for x, y, z in points.tolist())
 

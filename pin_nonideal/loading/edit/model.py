@@ -243,9 +243,11 @@ def reduced_model(
         parent = model.frames[model.frames[model.getFrameId(name, joint_kind)].parentFrame]
         fixed = new.frames[new.getFrameId(name, pin.FrameType.FIXED_JOINT)]
         kinds = (parent.type, pin.FrameType.FIXED_JOINT)  # the parent may have been fixed as well
-        found = [new.getFrameId(parent.name, kind) for kind in kinds if new.existFrame(parent.name, kind)]
-        if found:
-            fixed.parentFrame = found[0]
+        parent_frames = [
+            new.getFrameId(parent.name, kind) for kind in kinds if new.existFrame(parent.name, kind)
+        ]
+        if parent_frames:
+            fixed.parentFrame = parent_frames[0]
         own = model.inertias[j].toDynamicParameters()
         for frame in model.frames:
             if frame.parentJoint == j and frame.inertia.mass > 0.0:

@@ -191,10 +191,10 @@ def _reduced(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Fix joints at q0, and return the configuration and velocity of the others."""
     model = robot.model
-    kept = [j for j in range(1, model.njoints) if j not in indices]
+    moving = [j for j in range(1, model.njoints) if j not in indices]
     none = [np.zeros(0)]
-    q = np.concatenate([q0[model.idx_qs[j] : model.idx_qs[j] + model.nqs[j]] for j in kept] or none)
-    v = np.concatenate([v0[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]] for j in kept] or none)
+    q = np.concatenate([q0[model.idx_qs[j] : model.idx_qs[j] + model.nqs[j]] for j in moving] or none)
+    v = np.concatenate([v0[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]] for j in moving] or none)
     _exchange(robot, lambda geometries: reduced_model(model, geometries, indices, q0))
     return q, v
 

@@ -98,8 +98,8 @@ def _load_lazily(robots_loader: Any, name: str) -> tuple[RobotFile, Path]:
     if kind.__init__ is not robots_loader.RobotLoader.__init__ or not kind.urdf_filename:
         loader = robots_loader.loader(name)
         robot = loader.robot
-        found = RobotFile(robot.model, robot.visual_model, robot.collision_model, q0=np.array(robot.q0))
-        return found, Path(loader.df_path)
+        loaded = RobotFile(robot.model, robot.visual_model, robot.collision_model, q0=np.array(robot.q0))
+        return loaded, Path(loader.df_path)
     inside = os.path.join(kind.path, kind.urdf_subpath, kind.urdf_filename)
     base = kind.model_path or robots_loader.getModelPath(inside, False)
     file, root = os.path.join(base, inside), pin.JointModelFreeFlyer() if kind.free_flyer else None

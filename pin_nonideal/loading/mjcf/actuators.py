@@ -121,13 +121,13 @@ class Actuators:
         m = self._m
         ctrl = self.ctrl
         if callable(ctrl):
-            given = ctrl(t, q, v)
+            value = ctrl(t, q, v)
             try:
-                ctrl = np.array(given, dtype=float).reshape(m.nu)
+                ctrl = np.array(value, dtype=float).reshape(m.nu)
             except (TypeError, ValueError):
                 ctrl = np.full(m.nu, np.nan)
             if not np.isfinite(ctrl).all():
-                raise InputError(f"ctrl must return {m.nu} finite numbers; got {short_repr(given)}")
+                raise InputError(f"ctrl must return {m.nu} finite numbers; got {short_repr(value)}")
         if self._clamp:
             low, high = m.actuator_ctrlrange.T
             ctrl = np.where(m.actuator_ctrllimited, np.clip(ctrl, low, high), ctrl)

@@ -22,10 +22,11 @@ def geom_names(m: MjModel) -> list[str]:
     Args:
         m: mujoco.MjModel.
     """
-    given = [m.names[adr : m.names.index(b"\0", adr)].decode() for adr in m.name_geomadr]
-    taken = set(given)
+    file_names = [m.names[adr : m.names.index(b"\0", adr)].decode() for adr in m.name_geomadr]
+    taken = set(file_names)
     return [
-        name or next(n for n in (f"geom_{i}", f"geom_{i}_") if n not in taken) for i, name in enumerate(given)
+        name or next(n for n in (f"geom_{i}", f"geom_{i}_") if n not in taken)
+        for i, name in enumerate(file_names)
     ]
 
 

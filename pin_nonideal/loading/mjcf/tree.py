@@ -139,15 +139,15 @@ def build_tree(mujoco: Mujoco, compiled: MjModel, name: str) -> Tree:
 
 def _names(m: MjModel, count: int, addresses: Array, kind: str, barred: str = "") -> list[str]:
     """Return the names of all objects of a kind, with a new name for an unnamed object or a reserved name."""
-    given = [m.names[adr : m.names.index(b"\0", adr)].decode() for adr in addresses[:count]]
-    taken = {*given, barred}
-    for i, old in enumerate(given):
+    names = [m.names[adr : m.names.index(b"\0", adr)].decode() for adr in addresses[:count]]
+    taken = {*names, barred}
+    for i, old in enumerate(names):
         name = "" if old == barred else old
         while not name or (name != old and name in taken):
             name = f"{name}_" if name else f"{old or kind}_{i}"
-        given[i] = name
+        names[i] = name
         taken.add(name)
-    return given
+    return names
 
 
 def _add_body(tree: Tree, body: int, joint_names: list[str]) -> tuple[int, Placement]:

@@ -28,7 +28,7 @@ def dissipation(
             are held.
         notes: receives a note for each replacement, and for each joint with several velocities.
     """
-    given = {law.joint for law in taken if isinstance(law, JointFriction)}
+    with_law = {law.joint for law in taken if isinstance(law, JointFriction)}
     leaders = {c.joint1: (c.joint2, c.ratio) for c in couplings if isinstance(c, JointCoupling)}
     held = {c.joint for c in couplings if isinstance(c, PrescribedMotion)}
     dry: dict[str, float] = {}
@@ -49,7 +49,7 @@ def dissipation(
                 name = leaders[name][0]
         if model.nvs[j] != 1:
             radius[name] = 1.0  # equal values in both units
-        if name in given:
+        if name in with_law:
             replaced[name] = None
         elif name not in held:
             dry[name] = dry.get(name, 0.0) + abs(ratio) * float(friction[0])

@@ -42,7 +42,7 @@ class FileCache:
     """Cache of data from files by their content, without the least recently used entries."""
 
     def __init__(self) -> None:
-        self._found: OrderedDict[Hashable, object] = OrderedDict()
+        self._results: OrderedDict[Hashable, object] = OrderedDict()
         self._lock = Lock()
 
     def __call__(self, content: Hashable, read: Callable[[], object]) -> Any:
@@ -53,15 +53,15 @@ class FileCache:
             read: function that reads the files if the key is not cached.
         """
         with self._lock:
-            if content in self._found:
-                self._found.move_to_end(content)
-                return self._found[content]
-        found = read()
+            if content in self._results:
+                self._results.move_to_end(content)
+                return self._results[content]
+        result = read()
         with self._lock:
-            self._found[content] = found
-            while len(self._found) > MAX_CACHED:
-                self._found.popitem(last=False)
-        return found
+            self._results[content] = result
+            while len(self._results) > MAX_CACHED:
+                self._results.popitem(last=False)
+        return result
 
 
 cached_models, cached_shapes = FileCache(), FileCache()
@@ -73,11 +73,11 @@ def file_stamps(files: Iterable[str | os.PathLike[str]]) -> tuple[tuple[str, int
     Args:
         files: paths; missing files have the time 0 and the size -1.
     """
-    found = []
+    stamps = []
     for file in files:
         try:
             state = os.stat(file)
-            found.append((os.fspath(file), state.st_mtime_ns, state.st_size))
+            stamps.append((os.fspath(file), state.st_mtime_ns, state.st_size))
         except OSError:
-            found.append((os.fspath(file), 0, -1))
-    return tuple(found)
+            stamps.append((os.fspath(file), 0, -1))
+    return tuple(stamps)

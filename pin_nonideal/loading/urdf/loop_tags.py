@@ -18,16 +18,16 @@ def open_loops(root: ElementTree.Element) -> list[str]:
     Args:
         root: `<robot>` element.
     """
-    found = []
+    loops = []
     for element in root:
         if element.tag in ROBOT:
             continue
         if any(word in _local(element) for word in WORDS):
-            found.append(_words(element, _local(element)))
+            loops.append(_words(element, _local(element)))
         elif _local(element) == "gazebo":
             joints = [j for j in element.iter("joint") if j.find("parent") is not None]
-            found += [_words(j, "joint> in <gazebo") for j in joints if j.find("child") is not None]
-    return found
+            loops += [_words(j, "joint> in <gazebo") for j in joints if j.find("child") is not None]
+    return loops
 
 
 def _local(element: ElementTree.Element) -> str:

@@ -67,18 +67,18 @@ def remove_dependent_rows(scene: Scene, tolerance: float) -> IndependentRows | N
     looped = [isinstance(c, (PointAnchor, JointCoupling, FrameAnchor)) for c in constraints]
     if sum(looped) < 2 or not holonomic or len(program.constraints) != len(looped) or program.rows > MAX_ROWS:
         return None
-    kept, q, gap, nearly = _independent_rows(scene, program, tolerance)
-    if kept is None:
+    independent, q, gap, nearly = _independent_rows(scene, program, tolerance)
+    if independent is None:
         return IndependentRows(scene.model, constraints, scene.q0, nearly) if nearly else None
     model, welds = _split_welds(scene.model, constraints, [c.name for c in program.constraints])
     if welds:
         split = [part for c in constraints for part in (welds.get(id(c), (c,)))]
         scene = Scene(model, constraints=split, q0=scene.q0, assembly_tolerance=tolerance)
         program = compiled_scene(scene).program
-        kept, q, gap, nearly = _independent_rows(scene, program, tolerance)
-        if kept is None:
+        independent, q, gap, nearly = _independent_rows(scene, program, tolerance)
+        if independent is None:
             return IndependentRows(model, constraints, scene.q0, nearly) if nearly else None
-    left, gone = _remaining_constraints(constraints, welds, program, kept)
+    left, gone = _remaining_constraints(constraints, welds, program, independent)
     if not gone:
         return None
     note = (
@@ -111,7 +111,10 @@ def _split_welds(
 
 
 def _remaining_constraints(
-    constraints: list[Constraint], welds: dict[int, _Points], program: core.Program, kept: NDArray[np.bool_]
+    constraints: list[Constraint],
+    welds: dict[int, _Points],
+    program: core.Program,
+    independent: NDArray[np.bool_],
 ) -> tuple[list[Constraint], list[str]]:
     """Return the remaining constraints, and descriptions of removed rows; complete welds stay welds."""
     left: list[Constraint] = []
@@ -123,7 +126,7 @@ def _remaining_constraints(
         remaining = []
         for part in parts:
             rows = next(described)
-            mine = kept[first : first + rows.count]
+            mine = independent[first : first + rows.count]
             first += rows.count
             stays = part if mine.all() else _select_rows(part, mine)
             if stays is not None:
@@ -134,12 +137,14 @@ def _remaining_constraints(
     return left, gone
 
 
-def _select_rows(c: Constraint, kept: NDArray[np.bool_]) -> Constraint | None:
+def _select_rows(c: Constraint, independent: NDArray[np.bool_]) -> Constraint | None:
     """Return a constraint with some of its rows, or None without rows; unchanged if it cannot be divided."""
-    if not kept.any():
+    if not independent.any():
         return None
     if isinstance(c, PointAnchor):
-        return replace(c, axes="".join(axis for axis, stays in zip(c.axes, kept, strict=True) if stays))
+        return replace(
+            c, axes="".join(axis for axis, stays in zip(c.axes, independent, strict=True) if stays)
+        )
     return c
 
 
@@ -165,11 +170,11 @@ def _independent_rows(
         step = free @ generator.uniform(-PROBE_RANGE, PROBE_RANGE, free.shape[1])
         probe, apart = nearest_closure(model, program, runner, pin.integrate(model, q, step), tolerance)
         if apart <= tolerance:
-            found = _independent(model, runner, probe, tolerance)
-            rounded = rounded or found[2]
-            nearest.append(found[3])
-            if found[1] > rank:
-                independent, rank = found[:2]
+            at_probe = _independent(model, runner, probe, tolerance)
+            rounded = rounded or at_probe[2]
+            nearest.append(at_probe[3])
+            if at_probe[1] > rank:
+                independent, rank = at_probe[:2]
     nearly, apart = "", max(nearest)
     if apart <= MAX_NOTED:
         nearly = (
@@ -205,16 +210,16 @@ def _independent(
     values = np.linalg.svd(rest, compute_uv=False) if rest.size else np.zeros(0)
     rounded = rounded or bool(((values > ROUNDING) & (values <= tolerance)).any())
     least = float(values[values > tolerance].min(initial=np.inf))
-    kept = np.zeros(len(rest), dtype=bool)
+    independent = np.zeros(len(rest), dtype=bool)
     while True:
         length = np.linalg.norm(rest, axis=1)
         best = int(np.argmax(length)) if len(rest) else 0
         if not len(rest) or length[best] <= tolerance:
-            return kept, int(kept.sum()), rounded, least
-        kept[best] = True
+            return independent, int(independent.sum()), rounded, least
+        independent[best] = True
         direction = rest[best] / length[best]
         rest = rest - np.outer(rest @ direction, direction)
-        rest[kept] = 0.0
+        rest[independent] = 0.0
 
 
 def _null_space(model: Model, runner: core.Runner, q: Array, tolerance: float) -> Array:

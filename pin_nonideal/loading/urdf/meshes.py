@@ -53,19 +53,19 @@ def resolve_meshes(root: ElementTree.Element, path: Path, package_dirs: Sequence
                 if mesh is None:
                     continue
                 filename = mesh.get("filename", "")
-                found = find_mesh(filename, path.parent, package_dirs, files)
-                if found is None:
+                file = find_mesh(filename, path.parent, package_dirs, files)
+                if file is None:
                     missing[filename] = None
                     link.remove(shape)
                     continue
-                mesh.set("filename", str(found.path))
-                meter = mesh_unit(found.path)
+                mesh.set("filename", str(file.path))
+                meter = mesh_unit(file.path)
                 if meter != 1.0:
                     scale = numbers(mesh, "scale", 3, (1, 1, 1), f'link "{link.get("name")}"')
                     mesh.set("scale", " ".join(repr(float(x)) for x in meter * scale))
                     drawn[filename] = meter
-                if found.broken:
-                    guessed[filename] = found.path
+                if file.broken:
+                    guessed[filename] = file.path
     notes = [f'mesh "{m}" was not found; its shape is left out' for m in missing]
     if guessed:
         first = next(iter(guessed))
@@ -164,12 +164,12 @@ def _named_packages(home: Path, package: str) -> list[Path]:
 
 def _by_ending(files: Sequence[Path], inner: str) -> Path | None:
     """Return the only file whose path shares the longest end with another path, or None."""
-    wanted = Path(inner).parts
-    for first in range(len(wanted)):
-        ending = wanted[first:]
-        found = [f for f in files if f.parts[-len(ending) :] == ending]
-        if found:
-            return found[0] if len(found) == 1 else None
+    path_parts = Path(inner).parts
+    for first in range(len(path_parts)):
+        ending = path_parts[first:]
+        matches = [f for f in files if f.parts[-len(ending) :] == ending]
+        if matches:
+            return matches[0] if len(matches) == 1 else None
     return None
 
 

@@ -55,19 +55,21 @@ def repair_urdf(root: ElementTree.Element) -> list[str]:
 
 def _remove_foreign(root: ElementTree.Element) -> list[str]:
     """Remove elements of other tools and of other namespaces."""
-    found: dict[str, None] = {}
+    foreign_tags: dict[str, None] = {}
     for element in list(root):
         if element.tag not in ROBOT:
-            found[str(element.tag).rpartition("}")[2]] = None
+            foreign_tags[str(element.tag).rpartition("}")[2]] = None
             root.remove(element)
     for parent in list(root.iter()):
         for child in [c for c in parent if str(c.tag).startswith(NAMESPACE_MARK)]:
-            found[str(child.tag).rpartition("}")[2]] = None
+            foreign_tags[str(child.tag).rpartition("}")[2]] = None
             parent.remove(child)
         for key in [k for k in parent.attrib if k.startswith(NAMESPACE_MARK)]:
             del parent.attrib[key]
     return (
-        [f"elements of other tools are not read: {', '.join(f'<{tag}>' for tag in found)}"] if found else []
+        [f"elements of other tools are not read: {', '.join(f'<{tag}>' for tag in foreign_tags)}"]
+        if foreign_tags
+        else []
     )
 
 

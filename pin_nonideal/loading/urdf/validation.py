@@ -164,8 +164,8 @@ def _check_shape(shape: ElementTree.Element, where: str) -> None:
     geometry = shape.find("geometry")
     inner = [] if geometry is None else list(geometry)
     if len(inner) != 1 or inner[0].tag not in SHAPES:
-        found = ", ".join(f"<{e.tag}>" for e in inner) or "nothing"
-        raise LoadingError(f"{where}: <geometry> must hold one of {', '.join(SHAPES)}; got {found}")
+        tags = ", ".join(f"<{e.tag}>" for e in inner) or "nothing"
+        raise LoadingError(f"{where}: <geometry> must hold one of {', '.join(SHAPES)}; got {tags}")
     for key, size in SHAPES[inner[0].tag].items():
         values = numbers(inner[0], key, size, (1, 1, 1) if key == "scale" else None, where)
         if key != "scale" and (values <= 0.0).any():
@@ -181,8 +181,8 @@ def _check_joint(joint: ElementTree.Element, path: Path) -> None:
     where = f'"{path}": joint "{joint.get("name")}"'
     kind = joint.get("type")
     if kind not in (*MOVING, "fixed"):
-        found = "none" if kind is None else f'"{kind}"'
-        raise LoadingError(f"{where}: type must be one of {', '.join(MOVING)}, fixed; got {found}")
+        stated = "none" if kind is None else f'"{kind}"'
+        raise LoadingError(f"{where}: type must be one of {', '.join(MOVING)}, fixed; got {stated}")
     pose(joint.find("origin"), where)
     axis = numbers(joint.find("axis"), "xyz", 3, (1, 0, 0), where)
     if kind in ("revolute", "continuous", "prismatic", "planar") and not axis.any():

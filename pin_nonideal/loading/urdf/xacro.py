@@ -57,8 +57,8 @@ def _finding_packages(folder: Path, package_dirs: Sequence[str | Path]) -> Itera
             return
 
         def find(package: str) -> str:
-            found = package_folder(package, folder, package_dirs)
-            return str(ask_ros(package)) if found is None else str(found)
+            location = package_folder(package, folder, package_dirs)
+            return str(ask_ros(package)) if location is None else str(location)
 
         names._eval_find = find
         try:

@@ -104,11 +104,11 @@ def initial_state(
         raise LoadingError(str(error)) from None
 
 
-def _file_state(model: Model, given: object, base: NDArray[np.float64], where: str, parse: Any) -> Any:
+def _file_state(model: Model, entry: object, base: NDArray[np.float64], where: str, parse: Any) -> Any:
     """Return a state of a file: a table by name, a list, or the base state."""
-    if isinstance(given, list) and parse is named_configuration:
-        return with_unit_lengths(model, np.array(array(where, given, (model.nq,))), where)
-    return parse(model, np.asarray(given) if isinstance(given, list) else given or {}, base, where)
+    if isinstance(entry, list) and parse is named_configuration:
+        return with_unit_lengths(model, np.array(array(where, entry, (model.nq,))), where)
+    return parse(model, np.asarray(entry) if isinstance(entry, list) else entry or {}, base, where)
 
 
 def requested_state(
@@ -149,11 +149,11 @@ def held_entries(robot: RobotFile, table: Mapping[str, Any], start: Start, speed
     model, initial = robot.model, table.get("initial") or {}
     of_keyframe = isinstance(start, str) and start in robot.keyframes
 
-    def named(asked: Start, key: str) -> Any:
-        given = initial.get(key) if asked is None else asked
-        if asked is None and isinstance(given, dict):  # fixed joints have no entries
-            given = {name: value for name, value in given.items() if _moves(model, name)}
-        return given
+    def named(override: Start, key: str) -> Any:
+        entries = initial.get(key) if override is None else override
+        if override is None and isinstance(entries, dict):  # fixed joints have no entries
+            entries = {name: value for name, value in entries.items() if _moves(model, name)}
+        return entries
 
     speeds = None if of_keyframe and speed is None else named(speed, "v")
     return Held(named_coordinates(model, named(start, "q")), named_entries(model, speeds))

@@ -234,9 +234,9 @@ def loops(table: Table, where: str) -> list[Constraint]:
     if types is None:
         types = ["6d"] * len(pairs)
     if not isinstance(types, list) or len(types) != len(pairs):
-        found = len(types) if isinstance(types, list) else _kind(types)
+        entries = len(types) if isinstance(types, list) else _kind(types)
         raise LoadingError(
-            f"{where}: type must have one entry for each of the {len(pairs)} loops; got {found}"
+            f"{where}: type must have one entry for each of the {len(pairs)} loops; got {entries}"
         )
     result: list[Constraint] = []
     for i, (pair, kind) in enumerate(zip(pairs, types, strict=True)):
@@ -271,11 +271,13 @@ def pitches(table: Table, where: str) -> dict[str, float]:
     Raises:
         LoadingError: the value is not a table of nonzero numbers.
     """
-    given = (table.get("model") or {}).get("helical") or {}
-    if not isinstance(given, dict):
-        raise LoadingError(f"{where}: model: helical must be a table by joint name; got {short_repr(given)}")
+    entries = (table.get("model") or {}).get("helical") or {}
+    if not isinstance(entries, dict):
+        raise LoadingError(
+            f"{where}: model: helical must be a table by joint name; got {short_repr(entries)}"
+        )
     result = {}
-    for joint, value in given.items():
+    for joint, value in entries.items():
         what = f'{where}: model: helical: pitch of "{joint}"'
         try:
             result[joint] = number(what, value)

@@ -30,10 +30,10 @@ def applied_force_arrows(run: Trajectory, motion: Motion, marks: list[Mark]) -> 
         marks: marks of the scene, for the ends of springs.
     """
     ends, twists = {mark.name: mark for mark in marks if mark.kind == "spring"}, _Twists(run, motion)
-    found: list[Arrow] = []
+    arrows: list[Arrow] = []
     for item in run.scene.forces:
         if isinstance(item, SpringDamper):
-            found.append(_spring(motion, twists, item, ends[item.name or f"spring {item.frame1}"]))
+            arrows.append(_spring(motion, twists, item, ends[item.name or f"spring {item.frame1}"]))
         elif isinstance(item, JointSpring):
             joint = run.scene.model.getJointId(item.joint)
             q, v = run.scene.model.joints[joint].idx_q, run.scene.model.joints[joint].idx_v
@@ -42,9 +42,9 @@ def applied_force_arrows(run: Trajectory, motion: Motion, marks: list[Mark]) -> 
                     -item.stiffness * (motion.q[:, q] - item.rest) - item.damping * motion.of(run.v)[:, v]
                 )
                 name = item.name or f"spring {item.joint}"
-                found += along(run.scene.model, motion, name, "spring", joint, torque)
+                arrows += along(run.scene.model, motion, name, "spring", joint, torque)
         elif isinstance(item, Wrench):
-            found += _wrench(run, motion, item)
+            arrows += _wrench(run, motion, item)
     for law in run.scene.laws:
         if isinstance(law, Drag):
             joint, place = frame_on_joint(run.scene.model, law.frame)
@@ -54,10 +54,10 @@ def applied_force_arrows(run: Trajectory, motion: Motion, marks: list[Mark]) -> 
             push = np.where(
                 speed > 0.0, -law.coefficient * np.maximum(speed, 1e-300) ** (law.exponent - 1.0) * slip, 0.0
             )
-            found.append(
+            arrows.append(
                 Arrow(law.name or f"drag {law.frame}", "drag", "N", push, joint, motion.point(joint, point))
             )
-    return found
+    return arrows
 
 
 def _spring(motion: Motion, twists: _Twists, item: SpringDamper, mark: Mark) -> Arrow:
@@ -74,8 +74,10 @@ def _spring(motion: Motion, twists: _Twists, item: SpringDamper, mark: Mark) -> 
 
 def _wrench(run: Trajectory, motion: Motion, item: Wrench) -> list[Arrow]:
     joint, place = frame_on_joint(run.scene.model, item.frame)
-    given: Any = item.value
-    values = np.array([np.asarray(given(t) if callable(given) else given, dtype=float) for t in motion.times])
+    source: Any = item.value
+    values = np.array(
+        [np.asarray(source(t) if callable(source) else source, dtype=float) for t in motion.times]
+    )
     origin, name = motion.point(joint, np.asarray(place.translation)), item.name or f"wrench {item.frame}"
     return [
         Arrow(name, "given", unit, part, joint, origin)
@@ -93,13 +95,13 @@ class _Twists:
     def own(self) -> Array:
         """Linear and angular velocity of each joint in its own axes, (n, njoints, 6)."""
         model, v = self.run.scene.model, self.motion.of(self.run.v)
-        data, found = model.createData(), np.zeros((len(v), model.njoints, 6))
+        data, twists = model.createData(), np.zeros((len(v), model.njoints, 6))
         moving = range(1, model.njoints)
         for k, q in enumerate(self.motion.q):
             pin.forwardKinematics(model, data, q, v[k])
             for joint in moving:
-                found[k, joint] = data.v[joint].vector
-        return found
+                twists[k, joint] = data.v[joint].vector
+        return twists
 
     def velocity(self, joint: int, point: Array) -> Array:
         """Return the velocity of a point on a joint at each frame, in world axes [m/s], (n, 3)."""

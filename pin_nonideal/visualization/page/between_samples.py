@@ -54,14 +54,14 @@ class Cubics:
         if not self._flat:
             each = [pin.integrate(self.model, *pair) for pair in zip(q, xi, strict=True)]
             return np.array(each).reshape(-1, self.model.nq)
-        found = np.array(q)
+        result = np.array(q)
         dof, first = self._lines.T
-        found[:, first] += xi[:, dof]
+        result[:, first] += xi[:, dof]
         dof, first = self._turns.T
         cos, sin = np.cos(xi[:, dof]), np.sin(xi[:, dof])
-        found[:, first] = q[:, first] * cos - q[:, first + 1] * sin
-        found[:, first + 1] = q[:, first] * sin + q[:, first + 1] * cos
-        return found
+        result[:, first] = q[:, first] * cos - q[:, first + 1] * sin
+        result[:, first + 1] = q[:, first] * sin + q[:, first + 1] * cos
+        return result
 
     def velocities(self, k: NDArray[np.int64], s: Array) -> Array:
         """Velocities on the cubics, (n, nv); arguments as for `configurations`."""
@@ -112,8 +112,8 @@ class Cubics:
         h, part = (self.t[k + 1] - self.t[k])[:, None], s[:, None]
         step, end_rate = self._steps(q0, q1, v1)
         dof = self._turns[:, 0]  # a continuous joint may turn more than once in a long step
-        told = h * (v0 + v1)[:, dof] / 2.0
-        step[:, dof] += 2.0 * np.pi * np.round((told - step[:, dof]) / (2.0 * np.pi))
+        mean_turn = h * (v0 + v1)[:, dof] / 2.0
+        step[:, dof] += 2.0 * np.pi * np.round((mean_turn - step[:, dof]) / (2.0 * np.pi))
         back = 1.0 - part
         xi = h * part * back**2 * v0 + part**2 * (3.0 - 2.0 * part) * step - h * part**2 * back * end_rate
         chord = np.divide(step, h, out=np.zeros_like(step), where=h > 0.0)
@@ -131,13 +131,13 @@ class Cubics:
                 pin.dDifference(self.model, *pair, pin.ARG1) @ v for pair, v in zip(pairs, v1, strict=True)
             ]
             return np.array(step).reshape(v1.shape), np.array(rates).reshape(v1.shape)
-        found = np.empty(v1.shape)
+        steps = np.empty(v1.shape)
         dof, first = self._lines.T
-        found[:, dof] = q1[:, first] - q0[:, first]
+        steps[:, dof] = q1[:, first] - q0[:, first]
         dof, first = self._turns.T
         x0, y0, x1, y1 = q0[:, first], q0[:, first + 1], q1[:, first], q1[:, first + 1]
-        found[:, dof] = np.arctan2(x0 * y1 - y0 * x1, x0 * x1 + y0 * y1)
-        return found, v1
+        steps[:, dof] = np.arctan2(x0 * y1 - y0 * x1, x0 * x1 + y0 * y1)
+        return steps, v1
 
 
 def _closest(program: core.Program, q: Array, v: Array, t: Array, far: float) -> tuple[Array, Array]:
@@ -151,8 +151,8 @@ def _closest(program: core.Program, q: Array, v: Array, t: Array, far: float) ->
             program, q, v, t=float(t[0]), far=far, threads=1, names=[], values=none
         )
         return np.array(closed).reshape(q.shape), np.asarray(after)
-    found, residual, runner = q.copy(), np.full(len(q), np.nan), program.runner()
+    projected, residual, runner = q.copy(), np.full(len(q), np.nan), program.runner()
     for i in range(len(q)):
         with suppress(PinNonidealError, core.CoreFailure):
-            found[i], _, _, residual[i], _ = runner.project(q[i], v[i], float(t[i]), far)
-    return found, residual
+            projected[i], _, _, residual[i], _ = runner.project(q[i], v[i], float(t[i]), far)
+    return projected, residual

@@ -35,12 +35,12 @@ def collisions_of(scene: Scene) -> list[Visual]:
     """Collision shapes, without those of too many triangles in all."""
     if scene.collision_model is None:
         return []
-    found, room = [], TRIANGLES
+    overlays, room = [], TRIANGLES
     for visual in visuals_of(scene.collision_model, TRIANGLES):
         if visual.shape.kind != "plane" and len(visual.shape.triangles) <= room:
             room -= len(visual.shape.triangles)
-            found.append(visual)
-    return found
+            overlays.append(visual)
+    return overlays
 
 
 def colored_collisions(scene: Scene) -> list[Visual]:

@@ -107,10 +107,10 @@ def upward(model: pin.Model) -> Array:
 
 def center_of_mass(model: pin.Model, motion: Motion, stays: list[bool]) -> Array:
     """Return the center of mass of some joints at each frame [m], (n, 3), or of their origins if massless."""
-    kept = [joint for joint in range(1, model.njoints) if stays[joint]]
-    mass = np.array([model.inertias[joint].mass for joint in kept])
-    mass = mass if mass.sum() > 0.0 else np.ones(len(kept))
-    places = np.array([motion.point(joint, model.inertias[joint].lever) for joint in kept])
+    moving = [joint for joint in range(1, model.njoints) if stays[joint]]
+    mass = np.array([model.inertias[joint].mass for joint in moving])
+    mass = mass if mass.sum() > 0.0 else np.ones(len(moving))
+    places = np.array([motion.point(joint, model.inertias[joint].lever) for joint in moving])
     return np.asarray(np.einsum("j,jni->ni", mass / mass.sum(), places))
 
 
@@ -128,7 +128,7 @@ def _still(motion: Motion, visuals: list[Visual], points: Array) -> list[Array]:
     A large floor would make the moving bodies small.
     """
     least, most = points.reshape(-1, 3).min(axis=0), points.reshape(-1, 3).max(axis=0)
-    room, found = 2.0 * float(np.linalg.norm(most - least)), []
+    room, boxes = 2.0 * float(np.linalg.norm(most - least)), []
     for visual in (v for v in visuals if v.joint == 0):
         corners = np.array(_corners(motion, visual))
         if not len(corners):
@@ -137,8 +137,8 @@ def _still(motion: Motion, visuals: list[Visual], points: Array) -> list[Array]:
         high = np.maximum(most, corners[:, 0].max(axis=0))
         if np.linalg.norm(high - low) <= room:
             least, most = low, high
-            found.append(corners)
-    return found
+            boxes.append(corners)
+    return boxes
 
 
 def _joints_in_view(njoints: int, clouds: list[tuple[int, Array]], size: float) -> tuple[list[bool], bool]:
@@ -225,7 +225,7 @@ def pattern_spacings(motion: Motion, visuals: list[Visual], axes: dict[int, Arra
     Returns:
         Spacing by number of the visual.
     """
-    found: dict[int, float] = {}
+    spacings: dict[int, float] = {}
     for joint, axis in axes.items():
         own = [k for k, visual in enumerate(visuals) if visual.joint == joint]
         if len(own) < 4:
@@ -239,5 +239,5 @@ def pattern_spacings(motion: Motion, visuals: list[Visual], axes: dict[int, Arra
             same.setdefault((shape.kind, shape.size, len(shape.vertices)), []).append(float(place))
         steps = [np.diff(sorted(places)) for places in same.values() if len(places) >= 3]
         if steps and all(np.ptp(step) < 1e-3 * step.mean() for step in steps):
-            found |= dict.fromkeys(own, max(float(step.mean()) for step in steps))
-    return found
+            spacings |= dict.fromkeys(own, max(float(step.mean()) for step in steps))
+    return spacings

@@ -67,7 +67,7 @@ class Guide:
 
 def guides_of(run: Trajectory, motion: Motion) -> list[Guide]:
     """Return a guide for each user constraint that restricts one point."""
-    scene, found = run.scene, []
+    scene, guides = run.scene, []
     items = [(name, c) for name, c in zip(scene.constraint_slices, scene.constraints, strict=False)]
     if scene.model.nv > MAX_DOFS:
         return []
@@ -77,8 +77,8 @@ def guides_of(run: Trajectory, motion: Motion) -> list[Guide]:
                 guide = _Tracer(run, motion, name).guide()
             except (PinNonidealError, RuntimeError, np.linalg.LinAlgError):
                 guide = None  # a function that fails for states beside the path
-            found += [guide] if guide is not None else []
-    return found
+            guides += [guide] if guide is not None else []
+    return guides
 
 
 class _Tracer:
@@ -127,10 +127,10 @@ class _Tracer:
         if not joints:
             return None
         self.joint, self.local = joints[-1], np.asarray(self.model.inertias[joints[-1]].lever)
-        found = self.normals(q, t, self.run.v[0])
-        if found is None:
+        normals = self.normals(q, t, self.run.v[0])
+        if normals is None:
             return None
-        N, J = found
+        N, J = normals
         space, rank = np.linalg.matrix_rank(J, tol=1e-6), np.linalg.matrix_rank(N, tol=1e-9)
         path = self.motion.point(self.joint, self.local)
         extent = float(np.linalg.norm(np.ptp(path, axis=0))) or self.motion.size
@@ -155,10 +155,10 @@ class _Tracer:
         normals = []
         for frame in chosen:
             k = int(self.motion.before[frame])
-            found = self.normals(self.run.q[k], float(self.run.t[k]), self.run.v[k])
-            if found is None:
+            factors = self.normals(self.run.q[k], float(self.run.t[k]), self.run.v[k])
+            if factors is None:
                 return None
-            normals.append(found[0][0] / (np.linalg.norm(found[0][0]) or 1.0))
+            normals.append(factors[0][0] / (np.linalg.norm(factors[0][0]) or 1.0))
         filled = np.array(
             [np.interp(np.arange(len(self.motion.times)), chosen, x) for x in np.array(normals).T]
         ).T
@@ -183,10 +183,10 @@ class _Tracer:
 
     def tangents(self, q: Array, t: float) -> Array:
         """Return unit vectors of the allowed velocities of the point, (k, 3)."""
-        found = self.normals(q, t)
-        if found is None:
+        factors = self.normals(q, t)
+        if factors is None:
             return np.zeros((0, 3))
-        N, J = found
+        N, J = factors
         _, spread, axes = np.linalg.svd(
             np.vstack([N / (np.abs(N).max() or 1.0), np.eye(3) - J @ np.linalg.pinv(J, rcond=1e-8)])
         )
@@ -194,7 +194,7 @@ class _Tracer:
 
     def walk(self, q: Array, t: float, heading: Array, length: float, count: int) -> list[Array]:
         """Return the configurations of straight steps along a tangent, up to the closure of the curve."""
-        start, found = self.place(q), []
+        start, steps = self.place(q), []
         for number in range(count):
             tangents = self.tangents(q, t)
             if not len(tangents):
@@ -202,10 +202,10 @@ class _Tracer:
             ahead = tangents.T @ (tangents @ heading)
             heading = ahead / (np.linalg.norm(ahead) or 1.0)
             q = self.step(q, t, length * heading)
-            found.append(q)
+            steps.append(q)
             if number > 8 and np.linalg.norm(self.place(q) - start) < 0.8 * length:
                 break
-        return found
+        return steps
 
     def curve(self, q: Array, t: float, path: Array, extent: float) -> tuple[Array, bool]:
         """Return the points of a closed curve, or of the part of an open curve near the path."""
@@ -218,8 +218,8 @@ class _Tracer:
         points = np.array([*reversed(back), start, *ahead])
         thin = path[:: max(1, len(path) // 300)]
         near = np.linalg.norm(points[:, None] - thin[None], axis=2).min(axis=1) < 0.35 * extent
-        kept = np.flatnonzero(near)
-        return points[kept.min() : kept.max() + 1], False
+        near_path = np.flatnonzero(near)
+        return points[near_path.min() : near_path.max() + 1], False
 
     def surface(self, extent: float) -> Array:
         """Return the points of a strip of the surface along the path, in rows across it."""

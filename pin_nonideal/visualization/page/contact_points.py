@@ -107,13 +107,13 @@ def contact_point_marks(touches: list[ContactPoint], motion: Motion, marks: list
         motion: motion of the run.
         marks: marks of the scene.
     """
-    marked, found = {mark.name for mark in marks}, []
+    marked, points = {mark.name for mark in marks}, []
     for touch in touches:
         if touch.name not in marked:
             path = motion.local(touch.joint, touch.place)
             closed = None if touch.on_plane or touch.closed.all() else touch.closed
             start = path[int(np.argmax(touch.closed))]
-            found.append(
+            points.append(
                 Mark(touch.name, "contact", touch.joint, start, touch.joint, start, path=path, closed=closed)
             )
-    return found
+    return points

@@ -53,7 +53,7 @@ class Plane:
 
 def planes_of(scene: Scene) -> list[Plane]:
     """Return the planes of all contacts and rolling bodies, without duplicates."""
-    found: list[Plane] = []
+    planes: list[Plane] = []
     for item in [*scene.contacts, *scene.constraints]:
         name = getattr(item, "plane", "")
         if not hasattr(item, "normal") or (name is not None and not (name and scene.model.existFrame(name))):
@@ -62,12 +62,12 @@ def planes_of(scene: Scene) -> list[Plane]:
         normal = np.asarray(place.rotation) @ np.asarray(unit_axis("normal", item.normal))
         point = np.asarray(place.translation) + getattr(item, "height", 0.0) * normal
         plane = Plane(joint, point, normal, [_touching(scene.model, item)])
-        known = next((other for other in found if other.same(plane)), None)
+        known = next((other for other in planes if other.same(plane)), None)
         if known is None:
-            found.append(plane)
+            planes.append(plane)
         else:
             known.touching.extend(plane.touching)
-    return found
+    return planes
 
 
 def _touching(model: pin.Model, item: Any) -> tuple[int, Array]:
@@ -105,7 +105,7 @@ def _round_bodies(scene: Scene) -> list[Visual]:
     """Return the spheres and capsules in contact with each other, for a scene without shapes."""
     if scene.visual_model is not None and len(scene.visual_model.geometryObjects):
         return []
-    found: dict[tuple[str, bytes], Visual] = {}
+    bodies: dict[tuple[str, bytes], Visual] = {}
     for item in scene.contacts:
         if not isinstance(item, SphereContact | CapsuleContact):
             continue
@@ -126,10 +126,10 @@ def _round_bodies(scene: Scene) -> list[Visual]:
             )
             middle = place * pin.SE3(turn, (start + end) / 2.0)
             if radius > 0.0:
-                found[frame, way.tobytes()] = Visual(
+                bodies[frame, way.tobytes()] = Visual(
                     f"{frame} round", joint, middle, shape, LINK_COLORS[joint % len(LINK_COLORS)]
                 )
-    return list(found.values())
+    return list(bodies.values())
 
 
 def _patch(number: int, plane: Plane, motion: Motion) -> Visual:
@@ -151,16 +151,16 @@ def _patch(number: int, plane: Plane, motion: Motion) -> Visual:
 def _stops(run: Trajectory, motion: Motion) -> list[Visual]:
     """Return the stops of joints with impacts: a bar for a revolute joint, a plate for a prismatic one."""
     struck = {str(event.element) for event in run.events if event.kind in ("impact", "touch_down")}
-    found = []
+    stops = []
     model = run.scene.model
     limits = {"lower": model.lowerPositionLimit, "upper": model.upperPositionLimit}
     for name, item in compiled_scene(run.scene).described.items():
         if isinstance(item, JointLimit) and name in struck:
             joint, end = model.getJointId(item.joint), name.rpartition(" ")[2]
-            given = getattr(item, end)
-            at = float(limits[end][model.joints[joint].idx_q] if given is None else given)
-            found.append(_stop(model, motion, name, joint, at))
-    return found
+            stated = getattr(item, end)
+            at = float(limits[end][model.joints[joint].idx_q] if stated is None else stated)
+            stops.append(_stop(model, motion, name, joint, at))
+    return stops
 
 
 def _stop(model: pin.Model, motion: Motion, name: str, joint: int, at: float) -> Visual:

@@ -36,7 +36,7 @@ def positions(model: pin.Model, q: Array) -> list[Coordinate]:
         model: model of the scene.
         q: configurations, (nt, nq).
     """
-    found = []
+    coordinates = []
     for joint in range(1, model.njoints):
         name, kind = str(model.names[joint]), model.joints[joint].shortname()
         first, nq, nv = model.joints[joint].idx_q, model.joints[joint].nq, model.joints[joint].nv
@@ -44,14 +44,14 @@ def positions(model: pin.Model, q: Array) -> list[Coordinate]:
         if nv == 1:
             unit = "rad" if joint_axis(model, joint)[1] else "m"
             value = part[:, 0] if nq == 1 else np.unwrap(np.arctan2(part[:, 1], part[:, 0]))
-            found.append(Coordinate(name, name, unit, value))
+            coordinates.append(Coordinate(name, name, unit, value))
         elif kind in ("JointModelFreeFlyer", "JointModelTranslation", "JointModelPlanar"):
             axes = "xy" if kind == "JointModelPlanar" else "xyz"
-            found += [Coordinate(name, f"{name} {a}", "m", part[:, i]) for i, a in enumerate(axes)]
+            coordinates += [Coordinate(name, f"{name} {a}", "m", part[:, i]) for i, a in enumerate(axes)]
             if kind == "JointModelPlanar":
                 angle = np.unwrap(np.arctan2(part[:, 3], part[:, 2]))
-                found.append(Coordinate(name, f"{name} angle", "rad", angle))
-    return found
+                coordinates.append(Coordinate(name, f"{name} angle", "rad", angle))
+    return coordinates
 
 
 def velocities(model: pin.Model, v: Array, per: str = "/s") -> list[Coordinate]:
@@ -62,7 +62,7 @@ def velocities(model: pin.Model, v: Array, per: str = "/s") -> list[Coordinate]:
         v: velocities, (nt, nv).
         per: suffix of the units rad and m.
     """
-    found = []
+    rates = []
     for joint in range(1, model.njoints):
         name, kind = str(model.names[joint]), model.joints[joint].shortname()
         first, nv = model.joints[joint].idx_v, model.joints[joint].nv
@@ -80,5 +80,5 @@ def velocities(model: pin.Model, v: Array, per: str = "/s") -> list[Coordinate]:
         else:
             continue
         for i, (unit, label) in enumerate(zip(units, labels, strict=True)):
-            found.append(Coordinate(name, label, unit + per, v[:, first + i]))
-    return found
+            rates.append(Coordinate(name, label, unit + per, v[:, first + i]))
+    return rates

@@ -155,8 +155,8 @@ def _user_gap_arrows(run: Trajectory, motion: Motion, name: str, lam: Array) -> 
     states = zip(motion.q, motion.of(run.v), motion.times, lam, strict=True)
     rows = scene.constraint_slices[name]
     force = np.array([rows_at(runner, q, v, float(t))[0][rows].T @ own for q, v, t, own in states])
-    found = _at_joints(scene.model, motion, "total", force)
-    return [replace(arrow, name=f"{name}, {arrow.name}") for arrow in found]
+    arrows = _at_joints(scene.model, motion, "total", force)
+    return [replace(arrow, name=f"{name}, {arrow.name}") for arrow in arrows]
 
 
 def _connection_arrows(

@@ -201,8 +201,8 @@ class _Frames:
         """Return the intervals with a positive length and sufficient sampling."""
         last = len(self.well_sampled) - 1
         alone = self.before[:-1] == np.where(self.part[1:] == 0.0, self.before[1:] - 1, self.before[1:])
-        told = ~alone | (self.well_sampled[np.clip(self.before[:-1], 0, last)] if last >= 0 else False)
-        return np.asarray((np.diff(self.times()) > 1e-12 * (1.0 + abs(self.t[-1]))) & told)
+        is_resolved = ~alone | (self.well_sampled[np.clip(self.before[:-1], 0, last)] if last >= 0 else False)
+        return np.asarray((np.diff(self.times()) > 1e-12 * (1.0 + abs(self.t[-1]))) & is_resolved)
 
     def _middle(self, where: NDArray[np.int64]) -> tuple[NDArray[np.int64], Array]:
         """Return the middle sample of each interval, or the middle between two samples."""
@@ -213,16 +213,19 @@ class _Frames:
         return np.where(inside, k0, (k0 + k1 + 1) // 2), part
 
     def _configurations(self, before: NDArray[np.int64], part: Array) -> Array:
-        found, inner = self.run.q[np.where(part < 1.0, before, before + 1)], (part > 0.0) & (part < 1.0)
+        configurations, inner = (
+            self.run.q[np.where(part < 1.0, before, before + 1)],
+            (part > 0.0) & (part < 1.0),
+        )
         if not inner.any():
-            return np.asarray(found)
+            return np.asarray(configurations)
         k, s = before[inner], part[inner]
         if self.dense:
-            found[inner] = self.run.at(self.t[k] + s * (self.t[k + 1] - self.t[k])).q
-            return np.asarray(found)
-        found[inner], moved = self.cubics.closed(k, s, self.size, POSITION_TOLERANCE * self.link)
+            configurations[inner] = self.run.at(self.t[k] + s * (self.t[k + 1] - self.t[k])).q
+            return np.asarray(configurations)
+        configurations[inner], moved = self.cubics.closed(k, s, self.size, POSITION_TOLERANCE * self.link)
         self.well_sampled[k[~(moved <= MAX_MISMATCH * min(1.0, self.size))]] = False
-        return np.asarray(found)
+        return np.asarray(configurations)
 
     def motion(self) -> Motion:
         poses = self.tracks.placements(self.rows)
@@ -242,17 +245,21 @@ def _well_sampled(run: Trajectory, size: float) -> NDArray[np.bool_]:
     joints and spatial orientations are not checked.
     """
     model, h = run.scene.model, np.diff(np.asarray(run.t, dtype=float))[:, None]
-    told = np.ones(len(h), dtype=bool)
+    is_resolved = np.ones(len(h), dtype=bool)
     for joint in list(model.joints)[1:]:
         if joint.nq != 1 or joint.nv != 1:
             continue
         q, v = run.q[:, joint.idx_q : joint.idx_q + 1], run.v[:, joint.idx_v : joint.idx_v + 1]
         mean = h * (v[1:] + v[:-1]) / 2.0
         scale = 1.0 if "P" not in joint.shortname().removeprefix("JointModel")[:1] else size
-        told &= (np.abs(np.diff(q, axis=0) - mean) < MAX_MISMATCH * scale)[:, 0]
+        is_resolved &= (np.abs(np.diff(q, axis=0) - mean) < MAX_MISMATCH * scale)[:, 0]
     # Among coarse intervals, some agree by chance.
-    beside = np.convolve(~told, np.ones(7), mode="same") if len(told) else np.zeros(0)
-    return np.asarray(beside[: len(told)] == 0.0 if len(told) >= 7 else np.full(len(told), told.all()))
+    beside = np.convolve(~is_resolved, np.ones(7), mode="same") if len(is_resolved) else np.zeros(0)
+    return np.asarray(
+        beside[: len(is_resolved)] == 0.0
+        if len(is_resolved) >= 7
+        else np.full(len(is_resolved), is_resolved.all())
+    )
 
 
 def _base(run: Trajectory, size: float, most: int) -> NDArray[np.int64]:

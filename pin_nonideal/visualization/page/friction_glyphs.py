@@ -63,7 +63,7 @@ def elements_of(
         marks: marks of the scene.
         touches: contacts of the run.
     """
-    joints, found = friction_joints(run), []
+    joints, elements = friction_joints(run), []
     contacts = {touch.name: touch for touch in touches}
     places = {mark.name: mark for mark in marks}
     laws = dict(zip(run.element_names, run.element_laws, strict=False))
@@ -73,13 +73,13 @@ def elements_of(
         if law in joints:
             at, share = joints[law], _joint_share(run, law, joints[law], run.element_names.index(name))
             axis, part = joint_axis(run.scene.model, at)[0], None if share is None else motion.of(share)
-            found.append(Element(name, band, at, np.zeros(3), np.asarray(axis), at, share=part))
+            elements.append(Element(name, band, at, np.zeros(3), np.asarray(axis), at, share=part))
         elif law in contacts:
-            found.append(_contact(run, motion, name, band, contacts[law], whole))
+            elements.append(_contact(run, motion, name, band, contacts[law], whole))
         elif (mark := places.get(_anchor(run, law))) is not None:
             along = _hinge_axis(run, mark.name)
-            found.append(Element(name, band, mark.joint1, mark.point1, along, mark.joint1))
-    return found
+            elements.append(Element(name, band, mark.joint1, mark.point1, along, mark.joint1))
+    return elements
 
 
 def _anchor(run: Trajectory, law: str) -> str:

@@ -66,45 +66,47 @@ class Tracks:
 
     def coordinates(self, q: Array) -> Array:
         """Return the coordinates of configurations, (n, nq) to (n, width)."""
-        found = np.empty((len(q), self.width))
+        coordinates = np.empty((len(q), self.width))
         for number, track in self.moving():
             joint = self.model.joints[number]
             part = q[:, joint.idx_q : joint.idx_q + joint.nq]
             if track.axis is not None:
-                found[:, track.first] = part[:, 0] if joint.nq == 1 else np.arctan2(part[:, 1], part[:, 0])
+                coordinates[:, track.first] = (
+                    part[:, 0] if joint.nq == 1 else np.arctan2(part[:, 1], part[:, 0])
+                )
             elif joint.shortname() == "JointModelFreeFlyer":
-                found[:, track.columns] = part
+                coordinates[:, track.columns] = part
             else:
                 data = joint.createData()
                 for k, row in enumerate(q):
                     joint.calc(data, row)
-                    found[k, track.columns] = pin.SE3ToXYZQUAT(pin.SE3(data.M))
-        return found
+                    coordinates[k, track.columns] = pin.SE3ToXYZQUAT(pin.SE3(data.M))
+        return coordinates
 
     def near(self, coordinates: Array, others: Array) -> Array:
         """Shift coordinates by full turns and signs of quaternions to the nearest equivalent of others."""
-        found = coordinates.copy()
+        result = coordinates.copy()
         for number, track in self.moving():
             c = track.columns
             if track.axis is None:
-                away = np.sum(found[:, c][:, 3:] * others[:, c][:, 3:], axis=1) < 0.0
-                found[away, c.start + 3 : c.stop] *= -1.0
+                away = np.sum(result[:, c][:, 3:] * others[:, c][:, 3:], axis=1) < 0.0
+                result[away, c.start + 3 : c.stop] *= -1.0
             elif track.turning and self.model.joints[number].nq == 2:
-                turns = np.round((others[:, c] - found[:, c]) / (2.0 * np.pi))
-                found[:, c] += 2.0 * np.pi * turns
-        return np.asarray(found)
+                turns = np.round((others[:, c] - result[:, c]) / (2.0 * np.pi))
+                result[:, c] += 2.0 * np.pi * turns
+        return np.asarray(result)
 
     def steady(self, coordinates: Array) -> Array:
         """Shift the coordinates of each frame to the nearest equivalent of the frame before it."""
-        found = coordinates.copy()
+        result = coordinates.copy()
         for number, track in self.moving():
             c = track.columns
             if track.axis is None:
-                turned = np.sum(found[1:, c][:, 3:] * found[:-1, c][:, 3:], axis=1) < 0.0
-                found[1:, c.start + 3 : c.stop] *= np.cumprod(np.where(turned, -1.0, 1.0))[:, None]
+                turned = np.sum(result[1:, c][:, 3:] * result[:-1, c][:, 3:], axis=1) < 0.0
+                result[1:, c.start + 3 : c.stop] *= np.cumprod(np.where(turned, -1.0, 1.0))[:, None]
             elif track.turning and self.model.joints[number].nq == 2:
-                found[:, c] = np.unwrap(found[:, c], axis=0)
-        return np.asarray(found)
+                result[:, c] = np.unwrap(result[:, c], axis=0)
+        return np.asarray(result)
 
     def placements(self, coordinates: Array) -> Array:
         """Return the placement of each joint in the world as x, y, z, qx, qy, qz, qw, (n, njoints, 7)."""
@@ -128,17 +130,17 @@ class Tracks:
         """Return the maximum distance of the points that a joint moves from its origin [m], (njoints,)."""
         levers = np.array([inertia.lever for inertia in self.model.inertias])
         ends = poses[:, :3] + turned(poses[:, 3:], levers)
-        found = np.zeros(len(self.joints))
+        lengths = np.zeros(len(self.joints))
         for frame in self.model.frames:
             joint = frame.parentJoint
-            found[joint] = max(found[joint], float(np.linalg.norm(frame.placement.translation)))
+            lengths[joint] = max(lengths[joint], float(np.linalg.norm(frame.placement.translation)))
         for number in range(1, len(self.joints)):
             above = number
             while above:
                 away = np.linalg.norm([ends[number], poses[number, :3]] - poses[above, :3], axis=1).max()
-                found[above] = max(found[above], float(away))
+                lengths[above] = max(lengths[above], float(away))
                 above = int(self.model.parents[above])
-        return found
+        return lengths
 
     def distance(self, one: Array, other: Array, reach: Array) -> Array:
         """Return an upper bound of the distance between equal points under two sets of coordinates [m], (n,).

@@ -45,21 +45,21 @@ def bands_of(run: Trajectory) -> list[tuple[str, Bands]]:
     Args:
         run: run of the replay.
     """
-    found: list[tuple[str, Bands]] = []
+    named_bands: list[tuple[str, Bands]] = []
     if run.modes is not None:
         met = np.any(np.asarray(run.modes) != OPEN, axis=0)
         struck = {str(event.element) for event in run.events}
         named = zip(run.element_names, mode_bands(run.t, run.modes), met, strict=True)
-        found = [(name, bands) for name, bands, meets in named if meets or name in struck]
+        named_bands = [(name, bands) for name, bands, meets in named if meets or name in struck]
     closed = getattr(run, "closed", None)
     if closed is None:
-        return found
+        return named_bands
     rubbing = {run.law_names[law] for law in run.element_laws}
     for name, column in zip(run.scene.contact_names, np.asarray(closed).T, strict=True):
         if name not in rubbing and column.any() and not column.all():
             modes = np.where(column, CLOSED, OPEN).astype(np.int8)
-            found.append((name, mode_bands(run.t, modes[:, None])[0]))
-    return found
+            named_bands.append((name, mode_bands(run.t, modes[:, None])[0]))
+    return named_bands
 
 
 def has_open_contact(run: Trajectory) -> bool:

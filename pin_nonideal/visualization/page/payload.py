@@ -24,7 +24,7 @@ from .friction_glyphs import Element, elements_of
 from .joint_tracks import Tracks
 from .markers import Mark, marks_of
 from .mode_timeline import bands_of
-from .relations import is_asked, stored_relations
+from .relations import names_relation, stored_relations
 from .resampling import resample
 from .signal_list import Signal, rounding_of, signals_of, without_rounding
 from .signals import Chosen, Plot, default_plot_names, parse_plots, plots_of
@@ -86,7 +86,7 @@ def packed_runs(
         drawn[number]["wrap"] = spacing
     stage("curves")
     items = [] if plots is None else parse_plots("plots", plots)
-    curves = None if plots is None else [item for item in items if not is_asked(run, item)]
+    curves = None if plots is None else [item for item in items if not names_relation(run, item)]
     signals = signals_of(run, finer)
     rounding = rounding_of((signal.unit, signal.values) for signal in signals)
     header = {
@@ -120,7 +120,7 @@ def packed_runs(
         "view": _plain(looking),
         "collisions": shapes.add(collisions_of(scene)),
         "signals": [_stored_signal(payload, signal, rounding) for signal in signals],
-        "relations": stored_relations(payload, run, finer, [x for x in items if is_asked(run, x)]),
+        "relations": stored_relations(payload, run, finer, [x for x in items if names_relation(run, x)]),
     }
     header["shapes"] = shapes.stored
     return payload.bytes(header)
@@ -171,21 +171,21 @@ def _plots(
 ) -> list[Table]:
     """Return the plots of the first run, with corresponding curves of the other runs."""
     pairs = zip(runs, finer, strict=False)
-    each = [[_told(plot.thinned(), rounding) for plot in _curves(*pair, items)] for pair in pairs]
-    found = []
+    each = [[_without_noise(plot.thinned(), rounding) for plot in _curves(*pair, items)] for pair in pairs]
+    plots = []
     for plot in each[0]:
         stored = _stored_plot(payload, plot)
-        said = f"{len(each)} of {len(runs)} runs" if len(runs) > len(each) else ""
-        stored["note"] = " · ".join(filter(None, [plot.note, said]))
+        share = f"{len(each)} of {len(runs)} runs" if len(runs) > len(each) else ""
+        stored["note"] = " · ".join(filter(None, [plot.note, share]))
         for number, others in enumerate(each[1:], 1):
             for other in others:
                 if (other.title, other.unit) == (plot.title, plot.unit):
                     stored["curves"] += _compared(payload, plot, other, number, names[number])
-        found.append(stored)
-    return found
+        plots.append(stored)
+    return plots
 
 
-def _told(plot: Plot, rounding: dict[str, float]) -> Plot:
+def _without_noise(plot: Plot, rounding: dict[str, float]) -> Plot:
     """A plot with zero in place of rounding; on a logarithmic axis rounding is what is shown."""
     if plot.log:
         return plot
@@ -221,12 +221,12 @@ def _sliding_axes(model: pin.Model) -> dict[int, Array]:
 
 def _joints(payload: Payload, model: pin.Model, motion: Motion) -> list[Table]:
     """Return the coordinates of each joint, starting with the world; constant coordinates are stored once."""
-    found: list[Table] = [{"name": str(model.names[0])}]
+    joints: list[Table] = [{"name": str(model.names[0])}]
     for number, track in Tracks(model).moving():
         values = motion.coordinates[:, track.columns]
         still = np.array_equal(values, np.broadcast_to(values[0], values.shape))
         exact = float(np.abs(values).max(initial=0.0)) > 16.0  # larger values need more than 32 bits
-        found.append(
+        joints.append(
             {
                 "name": str(model.names[number]),
                 "parent": track.parent,
@@ -239,16 +239,16 @@ def _joints(payload: Payload, model: pin.Model, motion: Motion) -> list[Table]:
                 "values": payload.add(values[:1] if still else values, "f8" if exact else "f4"),
             }
         )
-    return found
+    return joints
 
 
 def _trails(model: pin.Model, guides: list[Guide], bare: bool) -> list[tuple[int, list[float]]]:
     """Return the points with drawn paths: points on guides, and the ends of a model without shapes."""
-    found = {guide.joint: guide.point.tolist() for guide in guides}
+    trails = {guide.joint: guide.point.tolist() for guide in guides}
     for joint in range(1, model.njoints) if bare else ():
         if not len(model.children[joint]):
-            found.setdefault(joint, np.asarray(model.inertias[joint].lever).tolist())
-    return list(found.items())
+            trails.setdefault(joint, np.asarray(model.inertias[joint].lever).tolist())
+    return list(trails.items())
 
 
 def _stored_plot(payload: Payload, plot: Plot) -> Table:
@@ -280,8 +280,8 @@ def _events(payload: Payload, run: Trajectory) -> Table:
 
 def _impulse(event: Any) -> Array:
     """Return the impulse of an impact, in the directions of the contact; zero for other events."""
-    given = getattr(event, "impulse", None)
-    return np.zeros(3) if given is None else np.asarray(given, dtype=float)
+    impulse = getattr(event, "impulse", None)
+    return np.zeros(3) if impulse is None else np.asarray(impulse, dtype=float)
 
 
 def _plain(item: Any) -> Table:
@@ -332,11 +332,11 @@ def _stored_guide(payload: Payload, guide: Guide) -> Table:
 
 def _modes(payload: Payload, run: Trajectory) -> list[Table]:
     """Return the mode bands of the elements: start and mode of each interval."""
-    found = []
+    timelines = []
     for name, pieces in bands_of(run):
         starts, modes = [piece[0] for piece in pieces], [piece[2] for piece in pieces]
-        found.append({"name": name, "starts": payload.add(starts, "f8"), "modes": payload.add(modes)})
-    return found
+        timelines.append({"name": name, "starts": payload.add(starts, "f8"), "modes": payload.add(modes)})
+    return timelines
 
 
 def _subtitle(run: Trajectory) -> str:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 MOST, POINTS, BOUNDS = 1_500, 60_000, 300
 
 
-def is_asked(run: Trajectory, item: Any) -> bool:
+def names_relation(run: Trajectory, item: Any) -> bool:
     """Whether an item of `plots` names a relation and not a joint.
 
     Args:
@@ -30,23 +30,25 @@ def is_asked(run: Trajectory, item: Any) -> bool:
     return is_relation(item) and item not in list(run.scene.model.names)
 
 
-def stored_relations(payload: Payload, run: Trajectory, finer: Trajectory, asked: list[str]) -> list[Table]:
+def stored_relations(
+    payload: Payload, run: Trajectory, finer: Trajectory, requested: list[str]
+) -> list[Table]:
     """The relations of a run: those asked for, which are shown, and those that a reader may choose.
 
     Args:
         payload: that carries their points.
         run: the run.
         finer: the same with more samples, for phase planes.
-        asked: names, as `relations_of` takes them.
+        requested: names, as `relations_of` takes them.
     """
-    more = [name for name in available(run) if name not in asked]
-    each = min(MOST, POINTS // max(len(asked) + len(more), 1))
-    found = []
-    for name in [*asked, *more]:
+    more = [name for name in available(run) if name not in requested]
+    each = min(MOST, POINTS // max(len(requested) + len(more), 1))
+    stored = []
+    for name in [*requested, *more]:
         own = finer if name.split(" ", 1)[0] == "phase" else run
         for relation in relations_of(own, name):
-            found.append(_stored(payload, own, name, relation, each) | {"shown": name in asked})
-    return found
+            stored.append(_stored(payload, own, name, relation, each) | {"shown": name in requested})
+    return stored
 
 
 def _stored(payload: Payload, run: Trajectory, name: str, relation: Relation, points: int) -> Table:

@@ -41,10 +41,10 @@ def resample(run: Trajectory, motion: Motion) -> tuple[Trajectory, Motion]:
         dense = run.at(motion.times[inner])
 
     def at_frames(values: Array, exact: Any = None) -> Array:
-        found = motion.of(np.asarray(values, dtype=float))
+        samples = motion.of(np.asarray(values, dtype=float))
         if exact is not None:
-            found[inner] = exact
-        return found
+            samples[inner] = exact
+        return samples
 
     values: dict[str, Any] = vars(run) | {
         "t": motion.times,
@@ -70,14 +70,14 @@ def resample(run: Trajectory, motion: Motion) -> tuple[Trajectory, Motion]:
         every = zip(("kinetic", "potential", "total"), [*stored.T, stored.sum(axis=1)], strict=True)
         for name, energy in every:
             values["energy"][name][inner] = energy
-    found = type(run).__new__(type(run))  # not copied, because a copy drops a scene that cannot be pickled
-    vars(found).update(values)
+    samples = type(run).__new__(type(run))  # not copied, because a copy drops a scene that cannot be pickled
+    vars(samples).update(values)
     count = len(motion.times)
-    return found, replace(motion, before=np.arange(count), part=np.zeros(count))
+    return samples, replace(motion, before=np.arange(count), part=np.zeros(count))
 
 
 def _velocities(run: Trajectory, motion: Motion, inner: NDArray[np.intp]) -> Array:
     """Return the velocities of the cubic at frames between samples, else of the samples, (n, nv)."""
-    found = motion.of(run.v)
-    found[inner] = Cubics(run).velocities(motion.before[inner], motion.part[inner])
-    return found
+    velocities = motion.of(run.v)
+    velocities[inner] = Cubics(run).velocities(motion.before[inner], motion.part[inner])
+    return velocities

@@ -77,20 +77,20 @@ def signals_of(run: Trajectory, finer: Trajectory) -> list[Signal]:
     """
     if getattr(run, "dense", None) is not None:
         run = finer
-    found = [*_labelled(run, finer), *_loads(run)]
-    known = {word for item in found for word in item.words.split("\n")}
+    signals = [*_labelled(run, finer), *_loads(run)]
+    known = {word for item in signals for word in item.words.split("\n")}
     fine, reader = motion_columns(finer, SMOOTH), _Columns(run)
     for name, values in columns(run).items():
         if name == "t" or name in known or reader.is_idle(name):
             continue
         item = reader.signal(name, values)
         smooth = item.words.split("\n")[-1] in SMOOTH and name in fine
-        found.append(replace(item, values=fine[name] if smooth else item.values, smooth=smooth))
+        signals.append(replace(item, values=fine[name] if smooth else item.values, smooth=smooth))
     order = {section: place for place, section in enumerate(SECTIONS)}
-    found.sort(key=lambda item: order[item.section])
-    each = int(np.clip(POINTS // max(len(found), 1), LEAST, MOST))
+    signals.sort(key=lambda item: order[item.section])
+    each = int(np.clip(POINTS // max(len(signals), 1), LEAST, MOST))
     return [
-        _thinned(item, np.asarray((finer if item.smooth else run).t, dtype=float), each) for item in found
+        _thinned(item, np.asarray((finer if item.smooth else run).t, dtype=float), each) for item in signals
     ]
 
 

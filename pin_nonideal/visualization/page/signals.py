@@ -59,14 +59,14 @@ class Plot:
             return self
         length = -(-count // intervals)
         starts = np.arange(0, count, length)
-        kept = np.zeros(count, dtype=bool)
-        kept[[0, -1]] = True
+        shown = np.zeros(count, dtype=bool)
+        shown[[0, -1]] = True
         for values in self.curves.values():
             whole = np.append(values, np.full(len(starts) * length - count, values[-1]))
             rows = whole.reshape(-1, length)  # an interval each; the first extreme or NaN of a row counts
-            kept[starts + rows.argmin(axis=1)] = True
-            kept[starts + rows.argmax(axis=1)] = True
-        index = np.flatnonzero(kept)
+            shown[starts + rows.argmin(axis=1)] = True
+            shown[starts + rows.argmax(axis=1)] = True
+        index = np.flatnonzero(shown)
         return replace(self, t=self.t[index], curves={k: v[index] for k, v in self.curves.items()})
 
 
@@ -110,7 +110,7 @@ def plots_of(run: Trajectory, chosen: Chosen | None) -> list[Plot]:
     """
     plots: list[Plot] = []
     for item in parse_plots("plots", default_plot_names(run) if chosen is None else chosen):
-        plots += _plot(run, item) if isinstance(item, str) else [_given(run, *item)]
+        plots += _plot(run, item) if isinstance(item, str) else [_user_plot(run, *item)]
     return plots
 
 
@@ -203,34 +203,34 @@ def _in_joints(title: str, model: pin.Model, t: Array, tau: Array) -> list[Plot]
 
     Joints without any torque or force are left out, unless all joints are.
     """
-    found = []
+    torques = []
     for joint in range(1, model.njoints):
         if model.joints[joint].nv == 1:
             name, unit = str(model.names[joint]), "N m" if joint_axis(model, joint)[1] else "N"
-            found.append(Coordinate(name, name, unit, tau[:, model.joints[joint].idx_v]))
-    acting = [c for c in found if np.any(c.values)] or found
-    idle = len(found) - len(acting)
+            torques.append(Coordinate(name, name, unit, tau[:, model.joints[joint].idx_v]))
+    acting = [c for c in torques if np.any(c.values)] or torques
+    idle = len(torques) - len(acting)
     note = f"zero in {idle} other joint{'s' if idle > 1 else ''}" if idle else ""
     plots = _by_unit(title, t, acting)
     return [replace(plot, note=", ".join(filter(None, [plot.note, note]))) for plot in plots]
 
 
-def _given(run: Trajectory, title: str, curves: Mapping[str, Array]) -> Plot:
+def _user_plot(run: Trajectory, title: str, curves: Mapping[str, Array]) -> Plot:
     """Return a plot of curves of the user."""
     what, _, unit = title.partition("[")
     values = {}
     for label, curve in curves.items():
         where = f'curve "{label}" of plot "{title}"'
         try:
-            given = np.asarray(curve)
+            samples = np.asarray(curve)
         except ValueError:  # lists of unequal length
-            given = np.asarray(None)
-        if given.dtype.kind not in "fiub":
+            samples = np.asarray(None)
+        if samples.dtype.kind not in "fiub":
             raise InputError(f"{where} must hold numbers; got {short_repr(curve)}")
-        values[str(label)] = given.astype(np.float64)
-        if given.shape != (len(run.t),):
+        values[str(label)] = samples.astype(np.float64)
+        if samples.shape != (len(run.t),):
             raise InputError(
-                f"{where} must have shape ({len(run.t)},), one value a sample; got {given.shape}"
+                f"{where} must have shape ({len(run.t)},), one value a sample; got {samples.shape}"
             )
     return Plot(what.strip(), unit.strip(" ]"), np.asarray(run.t), values)
 

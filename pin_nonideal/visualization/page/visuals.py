@@ -162,10 +162,10 @@ def _mesh(vertices: Array, triangles: Indices, path: str | None = None) -> Shape
     )
     triangles = inverse.ravel()[triangles]
     a, b, c = triangles.T
-    kept = (a != b) & (b != c) & (c != a)
-    sizes = np.bincount(part[kept], minlength=len(colors))
+    proper = (a != b) & (b != c) & (c != a)
+    sizes = np.bincount(part[proper], minlength=len(colors))
     parts = tuple((int(size), color) for size, (_, color) in zip(sizes, colors, strict=True) if size)
-    return Shape("mesh", vertices=vertices[first], triangles=triangles[kept], parts=parts)
+    return Shape("mesh", vertices=vertices[first], triangles=triangles[proper], parts=parts)
 
 
 def collada_parts(path: Path) -> list[tuple[int, Color | None]]:

@@ -51,13 +51,13 @@ def available(run: Trajectory) -> list[str]:
     model = run.scene.model
     joints = [joint for joint in range(1, model.njoints) if model.joints[joint].nv == 1]
     joints = sorted(joints, key=lambda joint: -_spread(run, joint))[:MOST]
-    found = []
+    names = []
     if run.law_forces:
         known = friction_joints(run)
         laws = sorted(known, key=lambda law: -_spread(run, known[law]))[:MOST]
         kinds = ("friction", "load") if run.reactions else ("friction",)
-        found = [f"{kind} {law}" for kind in kinds for law in laws if law in run.law_forces]
-    return found + [f"phase {model.names[joint]}" for joint in sorted(joints)]
+        names = [f"{kind} {law}" for kind in kinds for law in laws if law in run.law_forces]
+    return names + [f"phase {model.names[joint]}" for joint in sorted(joints)]
 
 
 def is_relation(item: Any) -> bool:
@@ -92,20 +92,20 @@ def _phases(run: Trajectory, name: str) -> list[Relation]:
         raise UnknownNameError(f'plot "phase {name}": no joint "{name}"{nearest(name, names)}')
     single = {str(joint) for joint in names if model.joints[model.getJointId(joint)].nv == 1}
     rates = {item.joint: item.values for item in velocities(model, run.v) if item.joint in single}
-    found: dict[str, dict[str, tuple[Array, Array]]] = {}
+    by_unit: dict[str, dict[str, tuple[Array, Array]]] = {}
     for place in positions(model, run.q):
         if place.joint in rates and name in ("", place.joint):
-            found.setdefault(place.unit, {})[place.joint] = (place.values, rates[place.joint])
-    if not found:
+            by_unit.setdefault(place.unit, {})[place.joint] = (place.values, rates[place.joint])
+    if not by_unit:
         raise InputError('plot "phase" needs a joint of one degree of freedom, and here is none')
     relations = []
-    for unit, curves in found.items():
+    for unit, curves in by_unit.items():
         rank = sorted(curves, key=lambda label: -float(np.ptp(curves[label][0])))[:MAX_CURVES]
-        kept = {label: pair for label, pair in curves.items() if label in rank}
-        title = "Phase plane" if len(kept) > 1 else next(iter(kept))
+        drawn = {label: pair for label, pair in curves.items() if label in rank}
+        title = "Phase plane" if len(drawn) > 1 else next(iter(drawn))
         relations.append(
             Relation(
-                title, f"position [{unit}]", f"velocity [{unit}/s]", kept, note=omission_note(len(curves))
+                title, f"position [{unit}]", f"velocity [{unit}/s]", drawn, note=omission_note(len(curves))
             )
         )
     return relations
@@ -113,7 +113,7 @@ def _phases(run: Trajectory, name: str) -> list[Relation]:
 
 def friction_joints(run: Trajectory) -> dict[str, int]:
     """Return the friction laws in joints of one degree of freedom, with the index of the joint."""
-    model, found = run.scene.model, {}
+    model, indices = run.scene.model, {}
     names = {str(joint): index for index, joint in enumerate(model.names) if index}
     for law in run.scene.laws:
         index = names.get(str(getattr(law, "joint", "")))
@@ -121,8 +121,8 @@ def friction_joints(run: Trajectory) -> dict[str, int]:
             continue
         label = getattr(law, "name", None) or f"{type(law).__name__}({law.joint})"
         if label in run.law_names:
-            found[label] = index
-    return found
+            indices[label] = index
+    return indices
 
 
 def _frictions(run: Trajectory, name: str, over_load: bool) -> list[Relation]:
