@@ -64,7 +64,7 @@ def parse_overrides(compiled: CompiledScene, parameters: Mapping[str, object], n
         n: number of runs.
 
     Raises:
-        InputError: a value does not fit, or changes the structure of the scene.
+        InputError: a value does not fit, replaces a function, or changes the structure of the scene.
         UnknownNameError: no part of the scene has that name.
     """
     columns: dict[tuple[str, int, str], Array] = {}
@@ -198,6 +198,12 @@ def _descriptions(name: str, described: object, entries: object, n: int) -> Iter
             raise UnknownNameError(f'{who}: no field "{key}"{nearest(str(key), known)}')
         if not isinstance(values, (list, tuple, np.ndarray)) or np.shape(values)[:1] != (n,):
             raise InputError(f"{who}: {key} must be {n} values, one a run; got {short_repr(values)}")
+        own = _functions_of(getattr(described, key))
+        if any(functions and functions != own for functions in map(_functions_of, values)):
+            raise InputError(
+                f"{who}: {key} holds a function, which cannot differ between runs; sweep makes a scene for "
+                "each"
+            )
     plain = {key: v.tolist() if isinstance(v, np.ndarray) else v for key, v in entries.items()}
     for k in range(n):
         one: Any = described
@@ -205,6 +211,17 @@ def _descriptions(name: str, described: object, entries: object, n: int) -> Iter
             yield replace(one, **{key: values[k] for key, values in plain.items()})
         except InputError as error:
             raise InputError(f"rollout: parameters: run {k}: {error}") from None
+
+
+def _functions_of(value: object) -> list[int]:
+    """Return the identities of the functions in a field of a description."""
+    if callable(value):
+        return [id(value)]
+    if is_dataclass(value):
+        return [each for field in fields(value) for each in _functions_of(getattr(value, field.name))]
+    if isinstance(value, (list, tuple)):
+        return [each for entry in value for each in _functions_of(entry)]
+    return []
 
 
 class _Recorder:

@@ -174,9 +174,9 @@ def ground_contacts(
             the shapes of all moving bodies.
         ground: name of a shape of the collision model, or a pinocchio.GeometryObject on the world; None for
             `ground()`, the half-space z <= 0.
-        mu: kinetic coefficient of friction of all contacts.
-        static_ratio: static over kinetic friction of all contacts, at least 1.
-        restitution: coefficient of restitution of all contacts, 0 to 1.
+        mu: as in `geometry_contacts`.
+        static_ratio: as in `geometry_contacts`.
+        restitution: as in `geometry_contacts`.
 
     Returns:
         Descriptions for `Scene(contacts=)`.

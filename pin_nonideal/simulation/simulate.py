@@ -172,7 +172,7 @@ def simulate(
                 hint=hint,
             )
             stopped = outcome.stopped
-        if tick is not None and len(outcome.t):
+        if tick is not None and stopped is None and len(outcome.t):
             tick(float(outcome.t[-1]))  # the core shows the time only at intervals
     return finish(scene, outcome, stopped, options, time.perf_counter() - begin, [*notes, *hints])
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pinocchio as pin
@@ -225,3 +226,89 @@ def test_what_shapes_the_scene_is_no_parameter():
     pinocchio = pn.Scene(chain(), terms="pinocchio")
     with refuses('"b": masses can differ between runs with terms="core" only', pn.InputError):
         pn.rollout(pinocchio, None, None, 0.1, parameters={"b": {"mass": [1.0]}})
+
+
+def rail(**parts):
+    """A body on a rail, with a frame at its center."""
+    model = empty()
+    body(model, 0, pin.JointModelPX(), "slide", 1.0, inertia=0.01 * np.eye(3))
+    frame(model, "middle", 1, pin.SE3.Identity())
+    return pn.Scene(model, **parts)
+
+
+def constant(value, *_):
+    return np.full(1, value)
+
+
+def limit(value, *_):
+    return value
+
+
+def along(t, q):
+    return np.ones(1)
+
+
+def push(value, t):
+    return [value, 0.0, 0.0, 0.0, 0.0, 0.0]
+
+
+def ramp(rate, t):
+    return rate * t, rate, 0.0
+
+
+def held_row(value, t, q, v, data):
+    return np.ones((1, 1)), np.full(1, value)
+
+
+def functions(make):
+    return [partial(make, value) for value in (1.0, 2.0, 3.0)]
+
+
+REPLACED = {
+    "force": ({"forces": [pn.UserForce(functions(constant)[0], name="it")]}, "it", "function", constant),
+    "wrench": ({"forces": [pn.Wrench("middle", functions(push)[0], name="it")]}, "it", "value", push),
+    "law": ({"laws": [pn.UserLaw(functions(constant)[0], name="it")]}, "it", "function", constant),
+    "friction": ({"laws": [pn.UserFriction(along, functions(limit)[0], name="it")]}, "it", "limit", limit),
+    "motion": (
+        {"constraints": [pn.PrescribedMotion("slide", functions(ramp)[0], name="it")]},
+        "it",
+        "function",
+        ramp,
+    ),
+    "constraint": (
+        {"constraints": [pn.UserConstraint(functions(held_row)[0], 1, name="it")]},
+        "it",
+        "function",
+        held_row,
+    ),
+    "control": (
+        {"actuation": pn.SampledControl(functions(constant)[0], 0.01)},
+        "actuation",
+        "function",
+        constant,
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REPLACED)
+def test_functions_are_no_parameters(case):
+    parts, name, field, make = REPLACED[case]
+    scene = rail(**parts)
+    with refuses(
+        f'rollout: parameters: "{name}": {field} holds a function, which cannot differ between runs; sweep '
+        "makes a scene for each",
+        pn.InputError,
+    ):
+        pn.rollout(scene, None, None, 0.1, parameters={name: {field: functions(make)}})
+
+
+def test_functions_inside_of_a_parameter_are_no_parameters():
+    """A control within effort limits; the scene's own function may be repeated."""
+    controls = [pn.SampledControl(function, 0.01) for function in functions(constant)]
+    driven = rail(actuation=pn.EffortLimits(controls[0], 0.5))
+    with refuses("actuation holds a function, which cannot differ between runs", pn.InputError):
+        pn.rollout(driven, None, None, 0.1, parameters={"actuation": {"actuation": controls[1:2]}})
+    own = functions(constant)[0]
+    pushed = rail(forces=[pn.UserForce(own, name="it")])
+    (run,) = pn.rollout(pushed, None, None, 0.1, parameters={"it": {"function": [own]}})
+    assert run.q[-1] == pytest.approx([0.005], rel=1e-12)
