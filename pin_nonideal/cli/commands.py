@@ -13,8 +13,8 @@ import numpy as np
 from pin_nonideal.atomic_files import check_writable, file_path
 from pin_nonideal.errors import InputError, LoadingError, short_repr
 from pin_nonideal.loading.load import load
+from pin_nonideal.loading.yaml.plain_values import plain_yaml
 from pin_nonideal.loading.yaml.robot import check_keys
-from pin_nonideal.loading.yaml.subset import plain_yaml
 from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.statics.equilibrium import equilibrium
 from pin_nonideal.sweeps.grid import sweep_grid, sweep_samples

@@ -16,8 +16,8 @@ from pin_nonideal.loading.urdf.reader import RobotFile
 from pin_nonideal.states.joint_order import remember_order
 from pin_nonideal.types import Table
 
+from .actuation import actuation_of
 from .initial_state import Start, initial_state, joint_index, requested_state, vector
-from .motors import actuation_of
 from .robot import (
     CONSTRAINTS,
     CONTACTS,

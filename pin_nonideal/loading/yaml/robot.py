@@ -20,7 +20,7 @@ from pin_nonideal.geometry.from_model import GeometryContact
 from pin_nonideal.types import Table
 from pin_nonideal.validation import number
 
-from .subset import plain_yaml
+from .plain_values import plain_yaml
 
 COMMUNITY_KEYS = ("closed_loop", "type", "name_mot", "joint_name", "joint_type")
 OWN_KEYS = (
