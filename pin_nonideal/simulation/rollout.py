@@ -166,13 +166,18 @@ def _arrays(
     require_resolved(scene.model, q)
     if len(q):
         compiled_scene(scene).check_functions(q[0], v[0], options.t0)
-    on, v_on, opened = compiled_scene(scene).projection.nearest_of_each(q, v, options.t0, threads, numbers)
-    for i, failure in opened.items():
-        error = compiled_scene(scene).named(failure) if isinstance(failure, core.CoreFailure) else failure
+    compiled = compiled_scene(scene)
+    on, v_on, opened = compiled.projection.nearest_of_each(q, v, options.t0, threads, numbers)
+    errors = {i: compiled.named(e) if isinstance(e, core.CoreFailure) else e for i, e in opened.items()}
+    for i, error in errors.items():
         if isinstance(error, RunError):
             error.index = i
-        raise error
-    made = run_arrays(scene, np.ascontiguousarray(on), np.ascontiguousarray(v_on), numbers, options, threads)
+    if errors and not keep:
+        raise errors[min(errors)]
+    closed = np.array([i for i in range(len(q)) if i not in errors], dtype=np.intp)
+    starts = np.ascontiguousarray(on[closed]), np.ascontiguousarray(v_on[closed])
+    of_closed = numbers._replace(values=numbers.values[closed])
+    made = run_arrays(scene, *starts, of_closed, options, threads).among(len(q), closed, errors)
     for i, error in made.failures.items():
         if isinstance(error, RunError):
             error.index = i

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +29,7 @@ class RunArrays:
         q: configurations, (n, nt, nq); NaN after the last sample.
         v: velocities, (n, nt, nv); NaN after the last sample.
         samples: number of samples of each run, (n,).
-        violation: largest |residual| of each run [m or rad], (n,).
+        violation: largest |residual| of each run [m or rad], (n,); NaN without samples.
         steps: accepted steps of each run, (n,).
         failures: errors of failed runs, by index.
         scene: the scene of the runs.
@@ -58,6 +59,27 @@ class RunArrays:
         q, v = self.q[runs, at], self.v[runs, at]
         q[none], v[none] = np.nan, np.nan
         return q, v
+
+    def among(self, n: int, runs: NDArray[np.intp], errors: Mapping[int, PinNonidealError]) -> RunArrays:
+        """Return these runs among n runs, of which the others failed before their first sample.
+
+        Args:
+            n: number of all runs.
+            runs: number of each of these runs among all runs.
+            errors: errors of the other runs, by number.
+        """
+        if not errors:
+            return self
+
+        def spread(values: Any, fill: float) -> Any:
+            all_values = np.full((n, *values.shape[1:]), fill, dtype=values.dtype)
+            all_values[runs] = values
+            return all_values
+
+        t, q, v, violation = (spread(x, np.nan) for x in (self.t, self.q, self.v, self.violation))
+        samples, steps = spread(self.samples, 0), spread(self.steps, 0)
+        failures = {int(runs[i]): error for i, error in self.failures.items()} | dict(errors)
+        return RunArrays(t, q, v, samples, violation, steps, dict(sorted(failures.items())), self.scene)
 
 
 def run_arrays(

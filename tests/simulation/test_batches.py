@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from functools import partial
 
@@ -175,6 +176,26 @@ def test_a_start_that_cannot_be_closed_is_a_failure_of_its_run():
     kept = pn.rollout(scene, np.tile(scene.q0, (2, 1)), np.zeros((2, 3)), 0.1, failures="keep")
     assert [type(each) for each in kept] == [pn.LoopClosureError] * 2
     assert [each.index for each in kept] == [0, 1]
+
+
+def test_arrays_keep_starts_that_cannot_be_closed_apart():
+    """A ball deep below the floor cannot be put on it; the other balls fall as they do alone."""
+    scene = ball()
+    q, v = scene.initial_state()
+    starts = np.tile(q, (3, 1))
+    starts[1, 2] = -50.0
+    speeds = np.tile(v, (3, 1))
+    lists = pn.rollout(scene, starts, speeds, 0.2, failures="keep")
+    runs = pn.rollout(scene, starts, speeds, 0.2, failures="keep", as_arrays=True)
+    assert list(runs.failures) == [1]
+    assert str(runs.failures[1]) == str(lists[1])
+    assert runs.samples.tolist() == [len(lists[0]), 0, len(lists[2])]
+    for k in (0, 2):
+        np.testing.assert_array_equal(runs.q[k, : runs.samples[k]], lists[k].q)
+    assert np.isnan(runs.last[0][1]).all()
+    assert np.isnan(runs.violation[1])
+    with pytest.raises(type(lists[1]), match=re.escape(str(lists[1]))):
+        pn.rollout(scene, starts, speeds, 0.2, as_arrays=True)
 
 
 REFUSED = {

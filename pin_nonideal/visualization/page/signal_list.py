@@ -54,7 +54,7 @@ class Signal:
 
 
 @dataclass(frozen=True)
-class _Found:
+class _RecordedSignal:
     """A signal before it is thinned, and whether it is smooth between samples."""
 
     label: str
@@ -94,7 +94,7 @@ def signals_of(run: Trajectory, finer: Trajectory) -> list[Signal]:
     ]
 
 
-def _labelled(run: Trajectory, finer: Trajectory) -> Iterator[_Found]:
+def _labelled(run: Trajectory, finer: Trajectory) -> Iterator[_RecordedSignal]:
     """Return positions, velocities and accelerations by the names of their components."""
     model = run.scene.model
     for kind, field, own, items in (
@@ -109,22 +109,24 @@ def _labelled(run: Trajectory, finer: Trajectory) -> Iterator[_Found]:
             column = f"{column_name(item.joint)}.{field}" + (f".{place}" if joint.nv > 1 else "")
             if field == "q" and joint.nv > 1 and place > 2:  # the angle of a planar joint has another column
                 column = f"{item.joint} angle"
-            yield _Found(f"{item.label}, {kind}", item.unit, MOTION, f"{column}\n{field}", item.values, own)
+            yield _RecordedSignal(
+                f"{item.label}, {kind}", item.unit, MOTION, f"{column}\n{field}", item.values, own
+            )
 
 
-def _loads(run: Trajectory) -> Iterator[_Found]:
+def _loads(run: Trajectory) -> Iterator[_RecordedSignal]:
     """Return sizes of forces: multipliers of constraints, forces of contacts, loads of bearings."""
     if run.lam is not None:
         for name, rows in run.scene.constraint_slices.items():
             size = np.linalg.norm(run.lam[:, rows], axis=1)
-            yield _Found(f"{name}, |lam|", "N, N m", REACTIONS, "reaction load multipliers", size)
+            yield _RecordedSignal(f"{name}, |lam|", "N, N m", REACTIONS, "reaction load multipliers", size)
     for name, values in (run.contact_forces or {}).items() if has_open_contact(run) else ():
         size = np.linalg.norm(values, axis=1)
-        yield _Found(f"{name}, force", "N", REACTIONS, "contact reaction load", size)
+        yield _RecordedSignal(f"{name}, force", "N", REACTIONS, "contact reaction load", size)
     for name, wrench in (getattr(run, "reactions", None) or {}).items():
         for what, unit, part in (("force", "N", wrench[:, :3]), ("moment", "N m", wrench[:, 3:6])):
             size = np.linalg.norm(part, axis=1)
-            yield _Found(f"{name}, load, |{what}|", unit, REACTIONS, "reaction bearing wrench", size)
+            yield _RecordedSignal(f"{name}, load, |{what}|", unit, REACTIONS, "reaction bearing wrench", size)
 
 
 class _Columns:
@@ -159,17 +161,17 @@ class _Columns:
         owner, law, _ = self._law_force(name)
         return law is not None and (law, owner) not in self._acting
 
-    def signal(self, name: str, values: Array) -> _Found:
+    def signal(self, name: str, values: Array) -> _RecordedSignal:
         """Return the signal of a column; its words end with the field."""
         if name in self._ledger:
             field, own = self._ledger[name]
             unit, words = ("J", "work") if field == "energy" else ("W", "")
-            return _found(name, f"{field}: {own}", unit, ENERGY, words, field, values)
+            return _signal_of(name, f"{field}: {own}", unit, ENERGY, words, field, values)
         owner, law, number = self._law_force(name)
         if law is not None:
             owner = self._names.get(owner, owner)
             label, unit = f"{law}, on {owner}{number.replace('.', ' ')}", self._unit(owner, number)
-            return _found(name, label, unit, FRICTION, "friction force law torque", "C", values)
+            return _signal_of(name, label, unit, FRICTION, "friction force law torque", "C", values)
         number = (re.search(r"\.\d+$", name) or [""])[0]
         owner, _, field = name.removesuffix(number).rpartition(".")
         return self._of_field(name, self._names.get(owner, owner), field, number, values)
@@ -187,13 +189,13 @@ class _Columns:
             place = name.find(".C.", place + 1)
         return "", None, ""
 
-    def _of_field(self, name: str, owner: str, field: str, number: str, values: Array) -> _Found:
+    def _of_field(self, name: str, owner: str, field: str, number: str, values: Array) -> _RecordedSignal:
         part, unit = number.replace(".", " "), self._unit(owner, number)
         if field == "reaction":
             place = int(number[1:])
             unit = "N" if place < 3 else "N m"
             label = f"{owner}, reaction, {WRENCH[place]}"
-            return _found(name, label, unit, REACTIONS, "load bearing wrench component", field, values)
+            return _signal_of(name, label, unit, REACTIONS, "load bearing wrench component", field, values)
         known = {
             "q": (f"{owner}, q{part}", "", MOTION, "position configuration"),
             "v": (f"{owner}, v{part}", "", MOTION, "velocity"),
@@ -208,9 +210,9 @@ class _Columns:
         }
         if field in known and owner:
             label, unit, section, words = known[field]
-            return _found(name, label, unit, section, words, field, values)
+            return _signal_of(name, label, unit, section, words, field, values)
         rates = {"violation": "m, rad", "violation_rate": "m/s, rad/s"}
-        return _found(name, name.replace("_", " "), rates.get(name, ""), OTHERS, "", field, values)
+        return _signal_of(name, name.replace("_", " "), rates.get(name, ""), OTHERS, "", field, values)
 
     def _unit(self, joint: str, number: str) -> str:
         """Return the unit of a generalized force in a joint, or of one component."""
@@ -226,12 +228,14 @@ class _Columns:
         return {"JointModelTranslation": "N"}.get(kind, "N m" if "Spherical" in kind else "N, N m")
 
 
-def _found(name: str, label: str, unit: str, section: str, words: str, field: str, values: Array) -> _Found:
+def _signal_of(
+    name: str, label: str, unit: str, section: str, words: str, field: str, values: Array
+) -> _RecordedSignal:
     """Return the signal of a column by its name."""
-    return _Found(label, unit, section, f"{name}\n{words}\n{field}", np.asarray(values, dtype=float))
+    return _RecordedSignal(label, unit, section, f"{name}\n{words}\n{field}", np.asarray(values, dtype=float))
 
 
-def _thinned(item: _Found, t: Array, points: int) -> Signal:
+def _thinned(item: _RecordedSignal, t: Array, points: int) -> Signal:
     """Return the signal with few points; two points if its value is constant."""
     values, label = item.values, item.label
     if len(t) > 2 and (values == values[0]).all():
