@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,8 @@ from pin_nonideal.types import Array
 from .decoupled import decoupled_components, rollout_decoupled
 from .options import RunOptions
 from .results import LEFT
+
+Number = TypeVar("Number", np.float64, np.int64)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -71,7 +73,7 @@ class RunArrays:
         if not errors:
             return self
 
-        def spread(values: Any, fill: float) -> Any:
+        def spread(values: NDArray[Number], fill: float) -> NDArray[Number]:
             all_values = np.full((n, *values.shape[1:]), fill, dtype=values.dtype)
             all_values[runs] = values
             return all_values
@@ -112,7 +114,7 @@ def run_arrays(
     except KeyboardInterrupt:
         raise RunInterrupted("the runs were interrupted") from None
     most = t.size // n if n else 0
-    made = RunArrays(
+    runs = RunArrays(
         t.reshape(n, most),
         q.reshape(n, most, -1) if n * most else np.zeros((n, most, q0.shape[1])),
         v.reshape(n, most, -1) if n * most else np.zeros((n, most, v0.shape[1])),
@@ -121,8 +123,8 @@ def run_arrays(
         steps.astype(np.int64),
         scene=scene,
     )
-    made.failures.update(_failures(scene, dict(stopped), violation))
-    return made
+    runs.failures.update(_failures(scene, dict(stopped), violation))
+    return runs
 
 
 def _of_outcomes(scene: Scene, outcomes: Sequence[core.Outcome]) -> RunArrays:
