@@ -234,10 +234,10 @@ def completion(
     if shell == "fish":
         lines = ["complete -c pin-nonideal -f -n __fish_use_subcommand -a '" + " ".join(commands) + "'"]
         for name, own in commands.items():
-            seen = f"__fish_seen_subcommand_from {name}"
+            condition = f"__fish_seen_subcommand_from {name}"
             names = examples if name == "example" else robots
-            lines.append(f"complete -c pin-nonideal -n '{seen}' -a '{' '.join(names)}'")
-            lines += [f"complete -c pin-nonideal -n '{seen}' -l {option[2:]}" for option in own]
+            lines.append(f"complete -c pin-nonideal -n '{condition}' -a '{' '.join(names)}'")
+            lines += [f"complete -c pin-nonideal -n '{condition}' -l {option[2:]}" for option in own]
         return "\n".join(lines)
     cases = "\n".join(f'    {name}) words="{" ".join(own)}" ;;' for name, own in commands.items())
     body = f"""_pin_nonideal() {{

@@ -54,12 +54,12 @@ def _run_and_write(run: Callable[[], Trajectory], options: argparse.Namespace, w
         with warnings.catch_warnings():
             # the printed notes of the run contain the same messages
             warnings.simplefilter("ignore", RuntimeWarning)
-            done = run()
+            trajectory = run()
     except RunError as error:
         if error.trajectory is not None:
             _print_and_write(error.trajectory, options, writers)
         raise
-    _print_and_write(done, options, writers)
+    _print_and_write(trajectory, options, writers)
     return 0
 
 

@@ -171,9 +171,9 @@ class CompiledScene:
         """Return the parts of the scene that errors of its runs name."""
         spec = self.spec
         sources = ("the actuation", _quoted("force", spec.forces), _quoted("law", spec.laws))
-        taken: set[str] = set()
-        unique_names(spec.constraints, taken)
-        names = unique_names(spec.contacts, taken)
+        used_names: set[str] = set()
+        unique_names(spec.constraints, used_names)
+        names = unique_names(spec.contacts, used_names)
         pairs = {
             name: _frames_of(c) for name, c in zip(names, spec.contacts, strict=True) if any(_frames_of(c))
         }

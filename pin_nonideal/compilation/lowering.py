@@ -66,9 +66,9 @@ def lowered(spec: SceneSpec, builder: core.Builder, resolver: Resolver) -> Itera
         builder: the core's program under construction, still empty.
         resolver: frames and joints by name.
     """
-    taken: set[str] = set()
-    constraint_names = unique_names(spec.constraints, taken)
-    contact_names = unique_names(spec.contacts, taken)
+    used_names: set[str] = set()
+    constraint_names = unique_names(spec.constraints, used_names)
+    contact_names = unique_names(spec.contacts, used_names)
     law_names = unique_names(spec.laws, set())
     for c, name in zip(spec.constraints, constraint_names, strict=True):
         lower_constraint(c, name, builder, resolver)

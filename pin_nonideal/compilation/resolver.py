@@ -252,12 +252,12 @@ def turned(frame: Frame, rpy: Sequence[float] | Array) -> Frame:
     return joint, (np.reshape(R, (3, 3)) @ pin.rpy.rpyToMatrix(*rpy)).ravel().tolist(), p
 
 
-def unique_names(descriptions: Sequence[object], taken: set[str]) -> list[str]:
+def unique_names(descriptions: Sequence[object], used_names: set[str]) -> list[str]:
     """Return a unique name for each description: the user's name, or the kind with its frames or joints.
 
     Args:
         descriptions: constraints, laws or contacts.
-        taken: names in use; extended by this function.
+        used_names: names in use; extended by this function.
 
     Raises:
         InputError: two descriptions have the same name.
@@ -266,7 +266,7 @@ def unique_names(descriptions: Sequence[object], taken: set[str]) -> list[str]:
     for d in descriptions:
         own = getattr(d, "name", None)
         if own:
-            if own in taken:
+            if own in used_names:
                 raise InputError(f'names must be unique in a scene; "{own}" is used twice')
             name = str(own)
         else:
@@ -274,10 +274,10 @@ def unique_names(descriptions: Sequence[object], taken: set[str]) -> list[str]:
             parts = [str(getattr(d, k)) for k in keys if getattr(d, k, None) is not None]
             base = name = type(d).__name__ + (f"({', '.join(parts)})" if parts else "")
             count = 1
-            while name in taken:
+            while name in used_names:
                 count += 1
                 name = f"{base} #{count}"
-        taken.add(name)
+        used_names.add(name)
         names.append(name)
     return names
 

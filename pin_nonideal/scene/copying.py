@@ -35,16 +35,16 @@ def parts_of(scene: Any, source: Any, shapes: tuple[Any, object], held: Held) ->
         shapes: for display and for collisions, or the functions that read them.
         held: entries of the initial state that were named.
     """
-    made = {
+    arguments = {
         key: getattr(scene, key)
         for key in (*LISTS, "actuation", "name", "source", "licence", "terms", "impact")
     }
-    made |= {"q0": scene.q0, "v0": scene.v0, "assembly_tolerance": source.assembly_tolerance}
-    made |= {"visual_model": shapes[0], "collision_model": shapes[1]}
+    arguments |= {"q0": scene.q0, "v0": scene.v0, "assembly_tolerance": source.assembly_tolerance}
+    arguments |= {"visual_model": shapes[0], "collision_model": shapes[1]}
     later = {"table": source.table, "shapes": source.shapes, "friction": scene.contact_friction, "held": held}
     return {
         "model": scene.model,
-        "made": made,
+        "made": arguments,
         "notes": list(scene.notes),
         "later": later,
         "order": file_order(scene.model),
@@ -58,10 +58,10 @@ def rebuilt(kind: type, parts: Table) -> Any:
         kind: Scene, or a class derived from it.
         parts: result of `parts_of`, packed or not.
     """
-    made = {key: _unpacked(value) for key, value in parts["made"].items()}
+    arguments = {key: _unpacked(value) for key, value in parts["made"].items()}
     if parts["order"] is not None:
         remember_order(parts["model"], parts["order"])
-    scene = kind(parts["model"], **made)
+    scene = kind(parts["model"], **arguments)
     scene.notes[:] = parts["notes"]
     scene.__setstate__(parts["later"])
     return scene
@@ -91,14 +91,14 @@ def packed(parts: Table, name: str) -> Table:
     Raises:
         InputError: a part cannot be pickled; the message names it.
     """
-    made = dict(parts["made"])
+    arguments = dict(parts["made"])
     for key in (*LISTS, "actuation", "visual_model", "collision_model"):
-        value = made[key]
+        value = arguments[key]
         if isinstance(value, tuple):
-            made[key] = tuple(_packed(each, label(each), name) for each in value)
+            arguments[key] = tuple(_packed(each, label(each), name) for each in value)
         else:
-            made[key] = _packed(value, key, name)
-    return {**parts, "made": made}
+            arguments[key] = _packed(value, key, name)
+    return {**parts, "made": arguments}
 
 
 def _packed(value: object, what: str, scene: str) -> object:

@@ -52,8 +52,8 @@ def parts_after(
     names = dict(
         zip(("laws", "forces"), (unique_names(now[k], set()) for k in ("laws", "forces")), strict=True)
     )
-    taken: set[str] = set()
-    names |= {kind: unique_names(now[kind], taken) for kind in ("constraints", "contacts")}
+    used_names: set[str] = set()
+    names |= {kind: unique_names(now[kind], used_names) for kind in ("constraints", "contacts")}
     leave = set(sequence("replace: remove", remove))
     known = [name for kind in KINDS for name in names[kind]]
     for name in leave:
@@ -93,18 +93,18 @@ def parts_of_replacement(
         InputError: a list is no list of descriptions, or a state does not fit the model.
         UnknownNameError: there is no description of a name in `remove`.
     """
-    made = parts["made"] | parts_after(compiled, lists, added, remove)
+    arguments = parts["made"] | parts_after(compiled, lists, added, remove)
     if not isinstance(others["actuation"], Unchanged):
-        made["actuation"] = others["actuation"]
+        arguments["actuation"] = others["actuation"]
     if others["q0"] is not None:
-        made["q0"] = states.configuration(others["q0"], "replace: q0")
+        arguments["q0"] = states.configuration(others["q0"], "replace: q0")
     if others["v0"] is not None:
-        made["v0"] = states.velocity(others["v0"], "replace: v0")
+        arguments["v0"] = states.velocity(others["v0"], "replace: v0")
     if others["name"] is not None:
-        made["name"] = others["name"]
+        arguments["name"] = others["name"]
     later = parts["later"] | {"table": None}
     later["held"] = held_after(compiled.model, states.held, others["q0"], others["v0"])
-    return parts | {"made": made, "later": later}
+    return parts | {"made": arguments, "later": later}
 
 
 def held_after(model: Model, held: Held, q0: State | None, v0: State | None) -> Held:

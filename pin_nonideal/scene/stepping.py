@@ -192,10 +192,10 @@ class SceneStepper:
         )
         begin = number("stepper: t0", t0)
         program, delayed = self._compiled.program_of_runs(begin)
-        made = Stepper(self._new_run(program, method, length, size, *tolerances), self._compiled, delayed)
+        stepper = Stepper(self._new_run(program, method, length, size, *tolerances), self._compiled, delayed)
         at, speed, _ = self._states.project(q, v, begin)
-        made.reset(at, speed, begin, tau)
-        return made
+        stepper.reset(at, speed, begin, tau)
+        return stepper
 
     def _new_run(
         self, program: core.Program, method: str, period: float, dt: float, rtol: float, atol: float

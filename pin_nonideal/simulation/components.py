@@ -131,15 +131,15 @@ def _component(
 ) -> Component:
     joints = [joint for joint, each in enumerate(group) if each == of]
     model, q, v = _alone(scene.model, joints)
-    mine = [one for one, each in zip(descriptions, own, strict=True) if each == of]
+    of_component = [one for one, each in zip(descriptions, own, strict=True) if each == of]
     held = scene.actuation
     if isinstance(held, HoldPosition) and held.q is not None:
         held = replace(held, q=named_configuration(scene.model, held.q, scene.q0, "q")[q])
     alone = Scene(
         model,
-        constraints=[one for one in mine if any(one is each for each in scene.constraints)],
-        laws=[one for one in mine if any(one is each for each in scene.laws)],
-        forces=[one for one in mine if any(one is each for each in scene.forces)],
+        constraints=[one for one in of_component if any(one is each for each in scene.constraints)],
+        laws=[one for one in of_component if any(one is each for each in scene.laws)],
+        forces=[one for one in of_component if any(one is each for each in scene.forces)],
         actuation=held,
         q0=scene.q0[q],
         v0=scene.v0[v],
@@ -166,8 +166,8 @@ def _alone(model: Model, joints: Sequence[int]) -> tuple[Model, Indices, Indices
             number[model.parents[joint]], kind, model.jointPlacements[joint], model.names[joint]
         )
         alone.appendBodyToJoint(number[joint], model.inertias[joint], pin.SE3.Identity())
-        mine = alone.joints[number[joint]]
-        to_q, to_v = slice(mine.idx_q, mine.idx_q + mine.nq), slice(mine.idx_v, mine.idx_v + mine.nv)
+        added = alone.joints[number[joint]]
+        to_q, to_v = slice(added.idx_q, added.idx_q + added.nq), slice(added.idx_v, added.idx_v + added.nv)
         for name in ("lowerPositionLimit", "upperPositionLimit"):
             getattr(alone, name)[to_q] = getattr(model, name)[at_q]
         for name in ("armature", "rotorInertia", "rotorGearRatio", "damping", "friction"):

@@ -28,8 +28,8 @@ def decoupled_components(scene: Scene, options: RunOptions) -> list[Component]:
         scene: the scene of the run.
         options: options of the run.
     """
-    apart = METHODS[options.method] and options.method not in SCIPY and not options.event_names
-    return components(scene) if apart and options.max_steps == 0 and options.max_wall == 0.0 else []
+    is_supported = METHODS[options.method] and options.method not in SCIPY and not options.event_names
+    return components(scene) if is_supported and options.max_steps == 0 and options.max_wall == 0.0 else []
 
 
 def run_together(

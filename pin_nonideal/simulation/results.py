@@ -105,10 +105,10 @@ def _fields(scene: Scene, outcome: core.Outcome, options: RunOptions, notes: lis
         fields.setdefault("user_events", []).append(UserEventRecord(name, np.array(times), q[at], v[at]))
     if options.dense:
         fields["dense"] = dense_output(outcome, options, scene.model.nv, len(scene.element_names))
-    made = with_defaults({**fields, "grid": grid, "notes": notes})
+    trajectory_fields = with_defaults({**fields, "grid": grid, "notes": notes})
     if not options.separate:
-        return made
-    run = Trajectory(**made).samples(grid)
+        return trajectory_fields
+    run = Trajectory(**trajectory_fields).samples(grid)
     run.t[:] = exact_grid(run.t, options)
     return {name: value for name, value in vars(run).items() if name != "stats"}
 

@@ -177,17 +177,17 @@ def _arrays(
     closed = np.array([i for i in range(len(q)) if i not in errors], dtype=np.intp)
     starts = np.ascontiguousarray(on[closed]), np.ascontiguousarray(v_on[closed])
     of_closed = numbers._replace(values=numbers.values[closed])
-    made = run_arrays(scene, *starts, of_closed, options, threads).among(len(q), closed, errors)
-    for i, error in made.failures.items():
+    runs = run_arrays(scene, *starts, of_closed, options, threads).among(len(q), closed, errors)
+    for i, error in runs.failures.items():
         if isinstance(error, RunError):
             error.index = i
-    interrupted = [error for error in made.failures.values() if isinstance(error, RunInterrupted)]
-    if interrupted or (made.failures and not keep):
-        error = interrupted[0] if interrupted else made.failures[min(made.failures)]
+    interrupted = [error for error in runs.failures.values() if isinstance(error, RunInterrupted)]
+    if interrupted or (runs.failures and not keep):
+        error = interrupted[0] if interrupted else runs.failures[min(runs.failures)]
         if isinstance(error, RunError):
-            error.results = [made]
+            error.results = [runs]
         raise error
-    return made
+    return runs
 
 
 def _run(

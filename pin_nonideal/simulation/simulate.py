@@ -156,9 +156,9 @@ def simulate(
             outcome, stopped = simulate_stiff(scene, q0, v0, options, tick, requests.watched)
         else:
             parts = [] if saver or between else decoupled_components(scene, options)
-            apart = run_decoupled(scene, parts, q0, v0, options, tick) if parts else None
+            merged = run_decoupled(scene, parts, q0, v0, options, tick) if parts else None
             # If a component fails, a run in common steps reports the failure.
-            outcome = apart or run_together(
+            outcome = merged or run_together(
                 scene,
                 q0,
                 v0,

@@ -127,18 +127,18 @@ def duplicate_rows(
     side = np.where(probe < 0.0, -1.0, 1.0)  # a duplicate may have the opposite sign
     unit, probe = unit * side[:, None], np.abs(probe)
     order = np.argsort(probe, kind="stable")
-    taken = np.zeros(len(rows), dtype=bool)
+    is_duplicate = np.zeros(len(rows), dtype=bool)
     duplicates = []
     for place, i in enumerate(order):
-        if taken[i]:
+        if is_duplicate[i]:
             continue
         close, same = SAME_ROW * (1.0 + np.abs(unit[i]).max()), [i]
         for j in order[place + 1 :]:
             if probe[j] - probe[i] > SUM_ROUNDING * (1.0 + probe[i]):
                 break
-            if not taken[j] and np.abs(unit[i] - unit[j]).max() <= close:
+            if not is_duplicate[j] and np.abs(unit[i] - unit[j]).max() <= close:
                 same.append(j)
-        taken[same] = True
+        is_duplicate[same] = True
         first = min(same)
         for j in same:
             if j != first:

@@ -149,9 +149,9 @@ class _Search:
                 return self.result(q, now, self.stiffness(q, now), start)
             size = float(np.abs(move / self.unit).max(initial=0.0))
             scale = min(1.0, longest / size) if size > 0.0 else 1.0
-            taken = self.step(q, now, scale * move)
-            if taken is not None:
-                q, now = taken
+            next_state = self.step(q, now, scale * move)
+            if next_state is not None:
+                q, now = next_state
                 if self.rest.touch(q):
                     now = self.rest.balance(q)
                 longest = min(LONGEST, 2.0 * max(longest, scale * size))

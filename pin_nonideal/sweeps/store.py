@@ -124,8 +124,8 @@ class Sweep(Sequence[Trajectory]):
         return (self[k] for k in range(len(self)))
 
     def __str__(self) -> str:
-        done = len(self) - len(self.missing)
-        return f"sweep in {self.folder}: {done} of {len(self)} runs, {len(self.failures)} of them failed"
+        complete = len(self) - len(self.missing)
+        return f"sweep in {self.folder}: {complete} of {len(self)} runs, {len(self.failures)} of them failed"
 
     def _repr_html_(self) -> str:
         numbers = ("t_end", "steps", "violation", "wall_s")
@@ -159,12 +159,12 @@ class Sweep(Sequence[Trajectory]):
             By name of the number ("violation", "steps", ..., and the results of `measure`): "mean", "std",
             "count", "quantiles" (by level) and "worst" (the run with the largest value).
         """
-        done = [(k, r) for k, r in enumerate(self.records) if r is not None]
-        names = sorted({key for _, r in done for key, x in r.items() if isinstance(x, (int, float))})
+        complete = [(k, r) for k, r in enumerate(self.records) if r is not None]
+        names = sorted({key for _, r in complete for key, x in r.items() if isinstance(x, (int, float))})
         statistics: Table = {}
         for name in names:
             runs, values = zip(
-                *((k, r[name]) for k, r in done if isinstance(r.get(name), (int, float))), strict=True
+                *((k, r[name]) for k, r in complete if isinstance(r.get(name), (int, float))), strict=True
             )
             x = np.array(values, dtype=float)
             levels = {level: float(np.quantile(x, level)) for level in QUANTILES}

@@ -76,8 +76,8 @@ for _name in RECORD_OF:
 
 def with_defaults(fields: Table) -> Table:
     """Return all fields of a Trajectory except its counters: given fields, and defaults for the others."""
-    made = {name: make() for name, make in _MAKERS.items() if name not in fields}
-    return {**_DEFAULTS, **made, **fields}
+    missing = {name: make() for name, make in _MAKERS.items() if name not in fields}
+    return {**_DEFAULTS, **missing, **fields}
 
 
 def reactions_of(run: RunFields) -> Group:

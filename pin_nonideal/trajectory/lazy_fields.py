@@ -34,9 +34,9 @@ class LazyFields(_Plain):
             make: a function without arguments, called once.
             known: fields that are available at once.
         """
-        made = cls.__new__(cls)
-        _own(made).update(known, **{FACTORY: make})
-        return made
+        instance = cls.__new__(cls)
+        _own(instance).update(known, **{FACTORY: make})
+        return instance
 
     def __getattr__(self, name: str) -> Any:
         # Python calls this method for missing attributes only.

@@ -145,12 +145,12 @@ def _event(scene: Scene, event: core.Event, functions: Sequence[str]) -> Event:
 
 def _ledger(columns: Sequence[str], energy: Array) -> dict[str, Array]:
     """Return the stored energies, the work since the start, and their sums, from the core's columns."""
-    stored, done = ("kinetic", "potential"), (*columns, "projection")
+    stored, works = ("kinetic", "potential"), (*columns, "projection")
     split = len(stored)
-    numbers = energy.reshape(-1, split + len(done))
+    numbers = energy.reshape(-1, split + len(works))
     ledger = dict(zip(stored, numbers.T[:split], strict=True))
     ledger["total"] = ledger["kinetic"] + ledger["potential"]
-    ledger |= dict(zip(done, numbers.T[split:], strict=True))
+    ledger |= dict(zip(works, numbers.T[split:], strict=True))
     ledger["balance"] = ledger["total"] - ledger["total"][:1] - numbers[:, split:].sum(axis=1)
     return ledger
 
@@ -159,5 +159,5 @@ def _columns(program: core.Program) -> list[str]:
     """Return the names of the power columns; laws are renamed if another ledger column has their name."""
     names = program.power_names
     first_law = len(names) - len(program.law_names)
-    taken = {*LEDGER, *names[:first_law], "projection"}
-    return names[:first_law] + [f"law {name}" if name in taken else name for name in names[first_law:]]
+    used_names = {*LEDGER, *names[:first_law], "projection"}
+    return names[:first_law] + [f"law {name}" if name in used_names else name for name in names[first_law:]]

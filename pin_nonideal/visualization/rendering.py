@@ -174,7 +174,9 @@ def _video(pictures: list[bytes], ending: str, fps: float, encoder: str) -> byte
         path = Path(folder) / f"video{ending}"
         read = ["-y", "-loglevel", "error", "-f", "image2pipe", "-framerate", f"{fps:g}", "-i", "-"]
         command = [encoder, *read, *CODECS[ending], *COLORS, str(path)]
-        done = subprocess.run(command, input=b"".join(pictures), capture_output=True, check=False)
-        if done.returncode:
-            raise OutputError(f"render: ffmpeg failed: {done.stderr.decode(errors='replace').strip()[-300:]}")
+        process = subprocess.run(command, input=b"".join(pictures), capture_output=True, check=False)
+        if process.returncode:
+            raise OutputError(
+                f"render: ffmpeg failed: {process.stderr.decode(errors='replace').strip()[-300:]}"
+            )
         return path.read_bytes()

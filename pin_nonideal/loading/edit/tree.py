@@ -212,10 +212,10 @@ def has_joints(model: Model, constraint: Constraint, where: str) -> bool:
     """
     keys = ("joint", "joint1", "joint2")
     names = [getattr(constraint, key) for key in keys if hasattr(constraint, key)]
-    gone = [n for n in names if not model.existJointName(n)]
-    if gone and len(gone) < len(names):
-        left = next(n for n in names if n not in gone)
+    locked = [n for n in names if not model.existJointName(n)]
+    if locked and len(locked) < len(names):
+        left = next(n for n in names if n not in locked)
         raise LoadingError(
-            f'{where}: joint "{left}" follows the locked joint "{gone[0]}"; lock both or neither'
+            f'{where}: joint "{left}" follows the locked joint "{locked[0]}"; lock both or neither'
         )
-    return not gone
+    return not locked

@@ -148,10 +148,10 @@ class Actuators:
         m, i = self._m, self._indices
         on_tendon = m.actuator_trntype[i] == TENDON
         for tendon in np.flatnonzero(m.tendon_actfrclimited):
-            mine = on_tendon & (m.actuator_trnid[i, 0] == tendon)
-            total = float(force[mine].sum())
+            on_this = on_tendon & (m.actuator_trnid[i, 0] == tendon)
+            total = float(force[on_this].sum())
             if total:
-                force[mine] *= float(np.clip(total, *m.tendon_actfrcrange[tendon])) / total
+                force[on_this] *= float(np.clip(total, *m.tendon_actfrcrange[tendon])) / total
 
     def set_control(self, ctrl: Control, act: Array | None = None) -> None:
         """Set the controls, and the activations at t = 0.

@@ -235,12 +235,12 @@ def _place(spec: MjSpec, asset: MjsElement, homes: Sequence[Path]) -> Path | Non
 def _homes(path: Path) -> list[Path]:
     """Return the base folders of relative paths: folders of the file, its includes and attached models."""
     homes: dict[Path, None] = {}
-    left, seen = [(path.resolve(), path.resolve().parent)], set()
+    left, visited = [(path.resolve(), path.resolve().parent)], set()
     while left:
         file, home = left.pop()
-        if file in seen:
+        if file in visited:
             continue
-        seen.add(file)
+        visited.add(file)
         homes[home] = None
         try:
             text = file.read_text(encoding="utf-8", errors="ignore")

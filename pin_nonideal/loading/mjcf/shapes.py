@@ -23,9 +23,9 @@ def geom_names(m: MjModel) -> list[str]:
         m: mujoco.MjModel.
     """
     file_names = [m.names[adr : m.names.index(b"\0", adr)].decode() for adr in m.name_geomadr]
-    taken = set(file_names)
+    used_names = set(file_names)
     return [
-        name or next(n for n in (f"geom_{i}", f"geom_{i}_") if n not in taken)
+        name or next(n for n in (f"geom_{i}", f"geom_{i}_") if n not in used_names)
         for i, name in enumerate(file_names)
     ]
 

@@ -140,13 +140,13 @@ def build_tree(mujoco: Mujoco, compiled: MjModel, name: str) -> Tree:
 def _names(m: MjModel, count: int, addresses: Array, kind: str, barred: str = "") -> list[str]:
     """Return the names of all objects of a kind, with a new name for an unnamed object or a reserved name."""
     names = [m.names[adr : m.names.index(b"\0", adr)].decode() for adr in addresses[:count]]
-    taken = {*names, barred}
+    used_names = {*names, barred}
     for i, old in enumerate(names):
         name = "" if old == barred else old
-        while not name or (name != old and name in taken):
+        while not name or (name != old and name in used_names):
             name = f"{name}_" if name else f"{old or kind}_{i}"
         names[i] = name
-        taken.add(name)
+        used_names.add(name)
     return names
 
 

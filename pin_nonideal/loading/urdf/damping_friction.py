@@ -13,7 +13,7 @@ from pin_nonideal.types import Model
 
 
 def dissipation(
-    model: Model, taken: Sequence[object], couplings: Sequence[object], notes: list[str]
+    model: Model, laws: Sequence[object], couplings: Sequence[object], notes: list[str]
 ) -> list[JointFriction]:
     """Return the joint friction of the robot's file as laws.
 
@@ -23,12 +23,12 @@ def dissipation(
 
     Args:
         model: pinocchio.Model.
-        taken: laws of the user; a JointFriction replaces the file's values for its joint.
+        laws: laws of the user; a JointFriction replaces the file's values for its joint.
         couplings: constraints of the file; mimic joints are `JointCoupling`, or `PrescribedMotion` if they
             are held.
         notes: receives a note for each replacement, and for each joint with several velocities.
     """
-    with_law = {law.joint for law in taken if isinstance(law, JointFriction)}
+    with_law = {law.joint for law in laws if isinstance(law, JointFriction)}
     leaders = {c.joint1: (c.joint2, c.ratio) for c in couplings if isinstance(c, JointCoupling)}
     held = {c.joint for c in couplings if isinstance(c, PrescribedMotion)}
     dry: dict[str, float] = {}

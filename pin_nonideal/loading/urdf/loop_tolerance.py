@@ -78,12 +78,12 @@ def remove_dependent_rows(scene: Scene, tolerance: float) -> IndependentRows | N
         independent, q, gap, nearly = _independent_rows(scene, program, tolerance)
         if independent is None:
             return IndependentRows(model, constraints, scene.q0, nearly) if nearly else None
-    left, gone = _remaining_constraints(constraints, welds, program, independent)
-    if not gone:
+    left, removed_rows = _remaining_constraints(constraints, welds, program, independent)
+    if not removed_rows:
         return None
     note = (
         f"loops close to {gap:.1e} m or rad, within the tolerance of the assembly ({tolerance:g}): rows "
-        f"{', '.join(gone)} depend on others and are left out"
+        f"{', '.join(removed_rows)} depend on others and are left out"
     )
     return IndependentRows(model, left, q, "; ".join(filter(None, (note, nearly))))
 
@@ -118,7 +118,7 @@ def _remaining_constraints(
 ) -> tuple[list[Constraint], list[str]]:
     """Return the remaining constraints, and descriptions of removed rows; complete welds stay welds."""
     left: list[Constraint] = []
-    gone: list[str] = []
+    removed_rows: list[str] = []
     described = iter(program.constraints)
     first = 0
     for c in constraints:
@@ -126,15 +126,15 @@ def _remaining_constraints(
         remaining = []
         for part in parts:
             rows = next(described)
-            mine = independent[first : first + rows.count]
+            of_part = independent[first : first + rows.count]
             first += rows.count
-            stays = part if mine.all() else _select_rows(part, mine)
+            stays = part if of_part.all() else _select_rows(part, of_part)
             if stays is not None:
                 remaining.append(stays)
             if stays is not part:
-                gone.append(f"{rows.name}[{', '.join(map(str, np.flatnonzero(~mine)))}]")
+                removed_rows.append(f"{rows.name}[{', '.join(map(str, np.flatnonzero(~of_part)))}]")
         left += [c] if remaining == list(parts) else remaining
-    return left, gone
+    return left, removed_rows
 
 
 def _select_rows(c: Constraint, independent: NDArray[np.bool_]) -> Constraint | None:
@@ -168,17 +168,17 @@ def _independent_rows(
         if not free.shape[1]:
             break
         step = free @ generator.uniform(-PROBE_RANGE, PROBE_RANGE, free.shape[1])
-        probe, apart = nearest_closure(model, program, runner, pin.integrate(model, q, step), tolerance)
-        if apart <= tolerance:
+        probe, distance = nearest_closure(model, program, runner, pin.integrate(model, q, step), tolerance)
+        if distance <= tolerance:
             at_probe = _independent(model, runner, probe, tolerance)
             rounded = rounded or at_probe[2]
             nearest.append(at_probe[3])
             if at_probe[1] > rank:
                 independent, rank = at_probe[:2]
-    nearly, apart = "", max(nearest)
-    if apart <= MAX_NOTED:
+    nearly, distance = "", max(nearest)
+    if distance <= MAX_NOTED:
         nearly = (
-            f"rows of the loops depend on others to {apart:.1e} m or rad, beyond the tolerance of the "
+            f"rows of the loops depend on others to {distance:.1e} m or rad, beyond the tolerance of the "
             f"assembly ({tolerance:g}): they may lock what should move; "
             f"load(..., assembly_tolerance={MAX_NOTED:g}) leaves such rows out"
         )

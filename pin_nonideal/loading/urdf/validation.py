@@ -97,12 +97,12 @@ def _check_tree(root: ElementTree.Element, path: Path) -> None:
             f'"{path}" must have one root link; got {len(roots)}: {shown}; join them with fixed joints'
         )
     for link in links:
-        seen = {link}
+        visited = {link}
         while link in parent_link:
             link = parent_link[link]
-            if link in seen:
+            if link in visited:
                 raise LoadingError(f'"{path}": the joints around link "{link}" form a ring without a root')
-            seen.add(link)
+            visited.add(link)
 
 
 def _attribute(element: ElementTree.Element, key: str, kind: str, path: Path) -> str:

@@ -42,13 +42,13 @@ def _loader() -> Any:
             return super().compose_node(parent, index)
 
         def construct_mapping(self, node: Any, deep: bool = False) -> Any:
-            seen = set()
+            keys = set()
             for key, _ in node.value:
                 if not isinstance(key, yaml.ScalarNode):
                     raise yaml.YAMLError(f"a key must be a word (line {key.start_mark.line + 1})")
-                if key.value in seen:
+                if key.value in keys:
                     raise yaml.YAMLError(f'key "{key.value}" appears twice (line {key.start_mark.line + 1})')
-                seen.add(key.value)
+                keys.add(key.value)
             return super().construct_mapping(node, deep)
 
         def construct_scalar(self, node: Any) -> Any:

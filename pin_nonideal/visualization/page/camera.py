@@ -152,8 +152,8 @@ def _joints_in_view(njoints: int, clouds: list[tuple[int, Array]], size: float) 
     if np.count_nonzero(far[1:]) * 2 <= njoints - 1:
         near = [cloud for joint, cloud in clouds if not far[joint]]
         if _diagonal(np.array(near)) > 1e-6 * size:
-            return [not gone for gone in far], False
-    return [True] + [bool(gone) for gone in far[1:]], True
+            return [not is_far for is_far in far], False
+    return [True] + [bool(is_far) for is_far in far[1:]], True
 
 
 def _ground(

@@ -226,12 +226,12 @@ def _at_joints(model: pin.Model, motion: Motion, kind: str, force: Array) -> lis
     Consecutive prismatic joints without mass in between move one particle, and their forces are one arrow.
     """
     arrows: list[Arrow] = []
-    taken: set[int] = set()
+    covered: set[int] = set()
     for joint in reversed(range(1, model.njoints)):
-        if joint in taken:
+        if joint in covered:
             continue
         chain = _sliding(model, joint)
-        taken.update(chain)
+        covered.update(chain)
         name = ", ".join(str(model.names[j]) for j in reversed(chain))
         if len(chain) > 1:
             parts = [along(model, motion, name, kind, j, force[:, model.joints[j].idx_v])[0] for j in chain]
