@@ -63,7 +63,7 @@ def render(
         seconds: duration of a video, which shows the whole run [s].
         fps: pictures per second of a video.
         time: time of a single picture [s]; None for a quarter of the run.
-        forces: whether force arrows are shown.
+        forces: whether force arrows and friction cones are shown.
 
     Returns:
         Path of the written file.

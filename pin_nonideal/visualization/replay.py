@@ -132,7 +132,7 @@ def replay(
             "phase JOINT", "friction", "friction LAW", "load" and "load LAW", as in `plot`. None selects tau
             and F_nonideal of a driven robot, then energy, gaps, violation, reactions and q, if recorded.
         compress: False for a page that also opens in browsers older than 2023, and is three times as large.
-        forces: whether the page shows force arrows.
+        forces: whether the page shows force arrows and friction cones.
         viewer: `meshcat.Visualizer` with an open window. The window receives the robot, the animation and the
             force arrows, and no file is written.
         progress: progress bar on standard error if the page takes longer than a second; None shows it on a

@@ -129,6 +129,39 @@ def test_everything_a_file_can_say(tmp_path):
     assert scene.q0[1] == 0.25
 
 
+BALL = '<collision><geometry><sphere radius="0.1"/></geometry></collision>'
+BALL_ARM = robot(*ARM[:3], link("lower", inside=BALL), *ARM[4:])
+
+
+@pytest.mark.parametrize(("height", "closed"), [(-0.1, True), (-0.2, False)])
+def test_the_ground_of_a_contact(tmp_path, height, closed):
+    """The lowest point of a ball of radius 0.1 m is at height -0.1 m."""
+    entry = f"geometry1: lower_0, geometry2: {{ground: {{name: floor, height: {height}}}}}, mu: 0.5"
+    scene = pn.load(folder(tmp_path, f"contacts:\n  - GeometryContact: {{{entry}}}", BALL_ARM))
+    assert list(scene.contact_names) == ["lower_0 on floor"]
+    assert list(scene.solve(scene.q0, scene.v0).closed) == [closed]
+
+
+@pytest.mark.parametrize(
+    ("ground", "message"),
+    [
+        ("{ground: {heigth: 1.0}}", 'geometry2: ground: unknown key "heigth"; nearest: "height"'),
+        ("{ground: {normal: [0, 0, 0]}}", "geometry2: ground: normal must have a direction"),
+        ("{ground: 3}", "geometry2: ground must be a table of arguments; got an int"),
+        ("{plane: {}}", 'geometry2 must be the name of a shape, or a table "{ground: '),
+    ],
+)
+def test_a_ground_that_is_none(tmp_path, ground, message):
+    with refuses(message):
+        pn.load(
+            folder(
+                tmp_path,
+                f"contacts:\n  - GeometryContact: {{geometry1: lower_0, geometry2: {ground}}}",
+                BALL_ARM,
+            )
+        )
+
+
 def test_gains_go_to_the_motors(tmp_path):
     yaml = "name_mot: [elbow]\nactuation:\n  HoldPosition: {kp: 5.0, kd: 0.5}\n"
     actuation = pn.load(folder(tmp_path, yaml)).actuation

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from typing import Any
 
@@ -16,6 +17,7 @@ from pin_nonideal.visualization.page.force_arrows import arrows_of
 from pin_nonideal.visualization.page.frames import sample
 from pin_nonideal.visualization.page.friction_glyphs import elements_of
 from pin_nonideal.visualization.page.markers import marks_of
+from pin_nonideal.visualization.page.payload import packed_runs
 from pin_nonideal.visualization.page.style import MODES
 
 from ..support.replay_browser import Watched, headless_browser
@@ -110,6 +112,17 @@ def test_the_cone_is_drawn_and_can_be_hidden(page: Watched) -> None:
     hidden = page.picture(0.9)
     page.run("() => replay.show('elements', true)")
     assert np.count_nonzero(np.abs(shown - hidden).max(axis=2) > 8) > 300
+
+
+@pytest.mark.parametrize("forces", [True, False])
+def test_a_page_without_forces_has_no_cones(sliding: Any, forces: bool) -> None:
+    """The height of a cone is the normal force; the ring of the mode needs no force."""
+    content = packed_runs([sliding], ["run"], None, "title", None, forces)
+    header = json.loads(content[4 : 4 + int.from_bytes(content[:4], "little")])
+    (element,) = header["elements"]
+    assert (element["normal"] is not None) is forces
+    assert element["share"] is not None
+    assert bool(header["arrows"]) is forces
 
 
 def test_pictures_and_videos_are_taken_in_the_page(page: Watched) -> None:

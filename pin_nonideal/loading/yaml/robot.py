@@ -7,6 +7,7 @@ only; no content is executed.
 from __future__ import annotations
 
 import dataclasses
+import inspect
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, get_args
@@ -17,7 +18,8 @@ from pin_nonideal.description.constraints import Constraint
 from pin_nonideal.description.time_functions import TimeFunction
 from pin_nonideal.errors import InputError, LoadingError, nearest, short_repr
 from pin_nonideal.geometry.from_model import GeometryContact
-from pin_nonideal.types import Table
+from pin_nonideal.geometry.ground import ground
+from pin_nonideal.types import GeometryObject, Table
 from pin_nonideal.validation import number
 
 from .plain_values import plain_yaml
@@ -130,10 +132,34 @@ def build(kind: type, values: object, where: str) -> Any:
     for key in ("function", "length"):
         if isinstance(arguments.get(key), dict):
             arguments[key] = time_function(arguments[key], where)
+    if kind is GeometryContact and isinstance(arguments["geometry2"], dict):
+        arguments["geometry2"] = _ground(arguments["geometry2"], where)
     if kind.__name__ == "PrescribedMotion" and isinstance(arguments["function"], (int, float)):
         arguments["function"] = timefunctions.Constant(arguments["function"])
     try:
         return kind(**arguments)
+    except InputError as error:
+        raise LoadingError(f"{where}: {error}") from None
+
+
+def _ground(table: Table, where: str) -> GeometryObject:
+    """Return a half-space on the world from a table such as `{ground: {height: 0.1}}`.
+
+    Raises:
+        LoadingError: the table is no ground, or an argument is invalid.
+    """
+    kind, values = one_entry(table, f"{where}: GeometryContact: geometry2")
+    where = f"{where}: GeometryContact: geometry2"
+    if kind != "ground":
+        raise LoadingError(
+            f'{where} must be the name of a shape, or a table "{{ground: {{height: ..., normal: ...}}}}"; '
+            f'got "{kind}"'
+        )
+    if not isinstance(values, dict):
+        raise LoadingError(f"{where}: ground must be a table of arguments; got {_kind(values)}")
+    check_keys(values, inspect.signature(ground).parameters, f"{where}: ground")
+    try:
+        return ground(**values)
     except InputError as error:
         raise LoadingError(f"{where}: {error}") from None
 

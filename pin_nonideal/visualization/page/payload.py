@@ -59,7 +59,7 @@ def packed_runs(
         fps: frames per second of simulated time; None for frames by the motion.
         title: heading of the page.
         plots: plots, as in `signals.plots_of`.
-        forces: whether force arrows are shown.
+        forces: whether force arrows and friction cones are shown.
         stage: function that is called with the name of each stage at its begin: "motion" for each run, and
             `STAGES`.
     """
@@ -114,7 +114,7 @@ def packed_runs(
         "events": _events(payload, run),
         "modes": _modes(payload, run),
         "elements": [
-            _stored_element(payload, motion, element)
+            _stored_element(payload, motion, element if forces else replace(element, normal=None))
             for element in elements_of(finer, motion, marks, touches)
         ],
         "view": _plain(looking),
