@@ -14,11 +14,13 @@ from pin_nonideal.description.actuation import (
     SampledControl,
     Table,
     drives_of,
+    held_tables,
     requesting_drives,
+    sampled_drives,
 )
 from pin_nonideal.description.scene_drive import SceneDrive
 from pin_nonideal.description.scene_spec import SceneSpec
-from pin_nonideal.errors import InputError
+from pin_nonideal.errors import InputError, UserFunctionError
 from pin_nonideal.states.joint_layout import joint_places
 from pin_nonideal.states.parsing import (
     joint_named,
@@ -32,7 +34,16 @@ from pin_nonideal.validation import by_name
 from .callbacks import checked
 from .delay import DelayedTorque
 from .resolver import Resolver, words
-from .torques import Called, Constant, Part, Spring, Timed, kind_of_drive, sum_of_torques
+from .torques import (
+    SAMPLE_ROUNDING,
+    Called,
+    Constant,
+    Part,
+    Spring,
+    Timed,
+    kind_of_drive,
+    sum_of_torques,
+)
 
 Mask = NDArray[np.bool_]
 
@@ -56,17 +67,26 @@ def lower_actuation(u: object, out: core.Builder, resolver: Resolver, spec: Scen
     model, drives = resolver.model, requesting_drives(u)
     if not drives:
         return
-    listed = len(drives) > 1
-    lowered = [
-        _lowered(drive, resolver, spec, f"actuation[{k}]" if listed else "actuation")
-        for k, drive in enumerate(drives)
-    ]
-    if listed:
+    lowered = _lowered_drives(drives, resolver, spec)
+    if len(drives) > 1:
         _require_separate(model, drives, [acts for _, acts in lowered])
-    _write(lowered[0][0] if not listed else sum_of_torques([part for part, _ in lowered], drives, model), out)
+        _require_one_delay(drives)
+    _write(_sum([part for part, _ in lowered], drives, model), out)
     limits = _limits(u, model, [acts for _, acts in lowered])
     if limits is not None:
         out.limit_effort(least=limits[0], most=limits[1])
+
+
+def _lowered_drives(drives: Sequence[object], resolver: Resolver, spec: SceneSpec) -> list[tuple[Part, Mask]]:
+    listed = len(drives) > 1
+    return [
+        _lowered(drive, resolver, spec, f"actuation[{k}]" if listed else "actuation")
+        for k, drive in enumerate(drives)
+    ]
+
+
+def _sum(parts: Sequence[Part], drives: Sequence[object], model: Model) -> Part:
+    return parts[0] if len(parts) == 1 else sum_of_torques(parts, drives, model)
 
 
 def _write(part: Part, out: core.Builder) -> None:
@@ -91,10 +111,11 @@ def _lowered(u: object, resolver: Resolver, spec: SceneSpec, who: str) -> tuple[
     """Return the torques of one drive, and the mask of the degrees of freedom that it commands, (nv,)."""
     model, everything = resolver.model, np.ones(resolver.model.nv, dtype=bool)
     if isinstance(u, SampledControl):
+        acts = _commanded_by_control(u, model)
         if u.delay_in_samples:  # runs have their own delayed torques, see `delayed_torque`
             initial = initial_torque(u, model)
-            return Called(lambda t, q, v: initial, u.period), everything
-        return Called(_sampled_torque(u, model), u.period), everything
+            return Called(lambda t, q, v: initial, u.period), acts
+        return Called(_sampled_torque(u, model), u.period), acts
     if isinstance(u, SceneDrive):
         function, acts, breaks = u.bound(model, resolver.q0, spec)
         return Called(_Identified(checked(function, words(u), (model.nv,)), u), u.period, breaks), acts
@@ -114,22 +135,85 @@ def _lowered(u: object, resolver: Resolver, spec: SceneSpec, who: str) -> tuple[
     return Constant(named_joint_values(model, u, who)), commanded(model, u)
 
 
-def delayed_torque(u: SampledControl, model: Model, t0: float, by_thread: bool) -> DelayedTorque:
-    """Return the delayed torques of one run, or of the runs of a rollout.
+def delayed_torque(
+    u: SampledControl, resolver: Resolver, spec: SceneSpec, t0: float, by_thread: bool
+) -> tuple[DelayedTorque, Called]:
+    """Return the delayed torques of one run or of the runs of a rollout, and their sum with other drives.
 
     Args:
-        u: a sampled control with a delay.
-        model: pinocchio.Model.
+        u: the sampled control with a delay.
+        resolver: frames and joints by name.
+        spec: descriptions of the scene.
         t0: start time of the runs [s].
         by_thread: whether several threads run at once, each with runs of its own.
     """
+    model, drives = resolver.model, requesting_drives(spec.actuation)
     function, initial = _sampled_torque(u, model), initial_torque(u, model)
-    return DelayedTorque(function, u.delay_in_samples, initial, t0, by_thread)
+    delayed = DelayedTorque(function, u.delay_in_samples, initial, t0, by_thread)
+    if len(drives) == 1:
+        return delayed, Called(delayed, u.period)
+    parts = [part for part, _ in _lowered_drives(drives, resolver, spec)]
+    parts = [Called(delayed, u.period) if d is u else part for d, part in zip(drives, parts, strict=True)]
+    total = _sum(parts, drives, model)
+    assert isinstance(total, Called)
+    return delayed, total
+
+
+def require_samples(u: object, t0: float) -> None:
+    """Check that held tables beside a sampled control change at samples of the control.
+
+    Args:
+        u: the actuation of a scene.
+        t0: start time of a run [s], the first sample.
+
+    Raises:
+        InputError: see above.
+    """
+    sampled, tables = sampled_drives(u), held_tables(u)
+    for table in tables if sampled else ():
+        period = sampled[0].period
+        times = np.asarray(table.times)[1:]
+        times = times[times > t0]
+        off = np.abs((times - t0) / period - np.round((times - t0) / period))
+        late = np.flatnonzero(off > SAMPLE_ROUNDING + np.spacing(np.abs(times) + abs(t0)) / period)
+        if late.size:
+            raise InputError(
+                f"{words(table)}: times must be samples t0 + k period of {words(sampled[0])} in the list "
+                f"(t0 = {t0:g} s, period = {period:g} s); got {times[late[0]]:.12g} s; move the time to a "
+                "sample, or read the table in the function of the control"
+            )
 
 
 def _sampled_torque(u: SampledControl, model: Model) -> Callable[..., object]:
     who = f"{words(u)}: function"
-    return checked(_torques_of(u.function, model, who), who, (model.nv,))
+    function = checked(_torques_of(u.function, model, who), who, (model.nv,))
+    if u.joints is None:
+        return function
+    others = ~_commanded_by_control(u, model)
+
+    def torques(*arguments: object) -> Array:
+        tau: Array = function(*arguments)
+        if tau[others].any():
+            raise UserFunctionError(f"{who} must return {_other_torque(tau, others, model)}")
+        return tau
+
+    return torques
+
+
+def _other_torque(tau: Array, others: Mask, model: Model) -> str:
+    """Return words on the first torque of a joint that a control does not command."""
+    dof = int(np.flatnonzero(others & (tau != 0.0))[0])
+    name = next(p.name for p in joint_places(model) if p.v_first <= dof < p.v_first + p.nv)
+    return f'no torque for joints that are not in joints; got {tau[dof]:g} for "{name}"; add it to joints'
+
+
+def _commanded_by_control(u: SampledControl, model: Model) -> Mask:
+    """Return the mask of the degrees of freedom that a sampled control commands, (nv,)."""
+    acts = np.full(model.nv, u.joints is None)
+    for name in u.joints or ():
+        j = joint_named(model, name, f"{words(u)}: joints")
+        acts[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]] = True
+    return acts
 
 
 def initial_torque(u: SampledControl, model: Model) -> Array:
@@ -138,10 +222,17 @@ def initial_torque(u: SampledControl, model: Model) -> Array:
     Args:
         u: a sampled control.
         model: pinocchio.Model.
+
+    Raises:
+        InputError: the torque does not fit, or acts on a joint that the control does not command.
     """
     if u.initial is None:
         return np.zeros(model.nv)
-    return np.ascontiguousarray(named_joint_values(model, u.initial, f"{words(u)}: initial"))
+    tau = np.ascontiguousarray(named_joint_values(model, u.initial, f"{words(u)}: initial"))
+    others = ~_commanded_by_control(u, model)
+    if tau[others].any():
+        raise InputError(f"{words(u)}: initial must hold {_other_torque(tau, others, model)}")
+    return tau
 
 
 class _Identified:
@@ -178,7 +269,8 @@ def _held(times: Array, values: Array) -> Timed:
     """
     ends = times[1:] - np.spacing(np.maximum(np.abs(times[1:]), np.diff(times)))
     both = np.column_stack([times[:-1], np.maximum(ends, times[:-1])]).ravel()
-    return Timed(np.append(both, times[-1]), np.vstack([np.repeat(values[:-1], 2, axis=0), values[-1:]]))
+    values = np.vstack([np.repeat(values[:-1], 2, axis=0), values[-1:]])
+    return Timed(np.append(both, times[-1]), values, held=True)
 
 
 def gains_of(model: Model, gain: object, who: str) -> Array:
@@ -274,6 +366,20 @@ def _efforts(u: EffortLimits, model: Model) -> tuple[Array, Array]:
 # --- several drives -----------------------------------------------------------------------------------------
 
 
+def _require_one_delay(drives: Sequence[object]) -> None:
+    """Check that at most one sampled control of a list has a delay.
+
+    Raises:
+        InputError: see above.
+    """
+    late = [words(d) for d in drives if isinstance(d, SampledControl) and d.delay_in_samples]
+    if len(late) > 1:
+        raise InputError(
+            f"actuation: at most one SampledControl of a list may have a delay; {late[0]} and {late[1]} have "
+            "one; compute the torques of both in one function"
+        )
+
+
 def _require_separate(model: Model, drives: Sequence[object], acts: Sequence[Mask]) -> None:
     """Check that no joint is commanded by two drives.
 
@@ -291,5 +397,6 @@ def _require_separate(model: Model, drives: Sequence[object], acts: Sequence[Mas
             f'actuation: each joint must be commanded by one drive; "{place.name}" is commanded by drive '
             f"{first} ({kind_of_drive(drives[first])}) and drive {second} "
             f"({kind_of_drive(drives[second])}) of the list; "
-            "drives by joint name command the joints that they name, and the others command all joints"
+            "drives by joint name, and a SampledControl with joints, command the joints that they name; the "
+            "others command all joints"
         )

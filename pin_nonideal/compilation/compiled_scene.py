@@ -17,7 +17,7 @@ from pin_nonideal.states.report import ProjectionReport
 from pin_nonideal.states.rows import block_names, row_slices
 from pin_nonideal.types import Array, Model
 
-from .actuation import delayed_torque
+from .actuation import delayed_torque, require_samples
 from .analysis import check_user_functions, has_rates, without_functions, zero_rows
 from .constraints import anchor_frames
 from .delay import DelayedTorque
@@ -106,9 +106,9 @@ class CompiledScene:
         idle_names = {name for name, _, _ in self.dropped}
         self.projection = Projection(model, self.program, q0, idle_names, is_start or plain is None)
         control = delayed_control(spec.actuation)
-        self._delayed: tuple[SampledControl, core.Builder] | None = None
+        self._delayed: tuple[SampledControl, Resolver, core.Builder] | None = None
         if control is not None:
-            self._delayed, self._building = (control, builder), threading.Lock()
+            self._delayed, self._building = (control, resolver, builder), threading.Lock()
 
     def program_of_runs(
         self, t0: float, by_thread: bool = False
@@ -120,13 +120,17 @@ class CompiledScene:
         Args:
             t0: start time of the run [s].
             by_thread: whether the program serves runs in several threads, each run in one thread.
+
+        Raises:
+            InputError: a held table beside a sampled control changes between samples.
         """
+        require_samples(self.spec.actuation, t0)
         if self._delayed is None:
             return self.program, None
-        control, builder = self._delayed
-        delayed = delayed_torque(control, self.model, t0, by_thread)
+        control, resolver, builder = self._delayed
+        delayed, total = delayed_torque(control, resolver, self.spec, t0, by_thread)
         with self._building:
-            builder.set_sampled_torque(delayed, control.period)
+            builder.set_sampled_torque(total.function, control.period)
             return builder.finish(), delayed
 
     def check_functions(self, q: Array, v: Array, t: float) -> None:

@@ -21,10 +21,14 @@ class Constant(NamedTuple):
 
 
 class Timed(NamedTuple):
-    """Torques `values`, (nt, nv), at `times` [s], (nt,), linear in between. Steps end at every time."""
+    """Torques `values`, (nt, nv), at `times` [s], (nt,), linear in between. Steps end at every time.
+
+    With `held` the times come in pairs with equal values, one pair for each value of a zero-order hold.
+    """
 
     times: Array
     values: Array
+    held: bool = False
 
 
 class Spring(NamedTuple):
@@ -47,6 +51,9 @@ class Called(NamedTuple):
 
 
 Part = Constant | Timed | Spring | Called
+
+# Samples of a control and times of a held table that differ by less than this part of a period are equal.
+SAMPLE_ROUNDING = 1e-9
 
 
 def kind_of_drive(drive: object) -> str:
@@ -78,7 +85,11 @@ def sum_of_torques(parts: Sequence[Part], drives: Sequence[object], model: Model
     springs = [part for part in parts if isinstance(part, Spring)]
     if len(springs) == len(parts):
         return _sum_of_springs(springs, model)
-    functions = [_function_of(part, model) for part in parts]
+    periods = sorted({part.period for part in parts if isinstance(part, Called) and part.period is not None})
+    if periods:
+        _require_steady(parts, drives)
+    late = SAMPLE_ROUNDING * periods[0] if periods else 0.0
+    functions = [_function_of(part, model, late) for part in parts]
 
     def total(t: float, q: Array, v: Array) -> Array:
         tau = np.zeros(model.nv)
@@ -86,22 +97,36 @@ def sum_of_torques(parts: Sequence[Part], drives: Sequence[object], model: Model
             tau += function(t, q, v)
         return tau
 
-    periods = {part.period for part in parts if isinstance(part, Called)} - {None}
-    if not periods:
-        times = [part.times for part in parts if isinstance(part, Timed)]
-        times += [part.breaks for part in parts if isinstance(part, Called)]
-        return Called(total, None, np.unique(np.concatenate([np.zeros(0), *times])))
-    steady = [isinstance(part, Constant) or getattr(part, "period", None) is not None for part in parts]
-    if len(periods) > 1 or not all(steady):
-        sampled = next(k for k, part in enumerate(parts) if getattr(part, "period", None) is not None)
-        other = steady.index(False) if not all(steady) else None
-        got = "several periods" if other is None else kind_of_drive(drives[other])
+    if periods:
+        return Called(total, periods[0])
+    times = [part.times for part in parts if isinstance(part, Timed)]
+    times += [part.breaks for part in parts if isinstance(part, Called)]
+    return Called(total, None, np.unique(np.concatenate([np.zeros(0), *times])))
+
+
+def _require_steady(parts: Sequence[Part], drives: Sequence[object]) -> None:
+    """Check that torques beside sampled torques are constant between the samples.
+
+    Raises:
+        InputError: see above.
+    """
+    periods = [part.period if isinstance(part, Called) else None for part in parts]
+    sampled = next(k for k, period in enumerate(periods) if period is not None)
+    for part, period, drive in zip(parts, periods, drives, strict=True):
+        if (
+            isinstance(part, Constant)
+            or (isinstance(part, Timed) and part.held)
+            or period == periods[sampled]
+        ):
+            continue
+        advice = "give all drives one period, or compute their sum in one function"
+        if isinstance(part, Timed):
+            advice = 'give the Table times at the samples and interpolation="hold"'
+        got = kind_of_drive(drive) + ("" if period is None else f" with a period of {period:g} s")
         raise InputError(
-            f"actuation: torques that {kind_of_drive(drives[sampled])} holds between samples add to "
-            f"constant torques and to torques of the same period only; got {got}; give all drives one "
-            "period, or compute their sum in one function"
+            f"actuation: torques that {kind_of_drive(drives[sampled])} holds between samples of "
+            f"{periods[sampled]:g} s add only to torques that change at these samples; got {got}; {advice}"
         )
-    return Called(total, periods.pop())
 
 
 def _sum_of_tables(parts: Sequence[Part]) -> Timed:
@@ -119,10 +144,12 @@ def _sum_of_tables(parts: Sequence[Part]) -> Timed:
 
 def _interpolated(table: Timed, t: float) -> Array:
     """Return the torques of a table at a time, as the core computes them, (nv,)."""
-    times, values = table
+    times, values, held = table
     if t <= times[0] or t >= times[-1]:
         return np.asarray(values[0] if t <= times[0] else values[-1])
     k = int(np.searchsorted(times, t, side="right")) - 1
+    if held:
+        return np.asarray(values[k])
     s = (t - times[k]) / (times[k + 1] - times[k])
     return np.asarray((1.0 - s) * values[k] + s * values[k + 1])
 
@@ -138,12 +165,12 @@ def _sum_of_springs(springs: Sequence[Spring], model: Model) -> Spring:
     return Spring(np.sum([s.kp for s in springs], axis=0), np.sum([s.kd for s in springs], axis=0), q)
 
 
-def _function_of(part: Part, model: Model) -> Callable[..., object]:
-    """Return the torques of a part as a function (t, q, v) -> tau."""
+def _function_of(part: Part, model: Model, late: float) -> Callable[..., object]:
+    """Return the torques of a part as a function (t, q, v) -> tau; a table is read `late` [s] after t."""
     if isinstance(part, Called):
         return part.function
     if isinstance(part, Timed):
-        return lambda t, q, v: _interpolated(part, t)
+        return lambda t, q, v: _interpolated(part, t + late)
     if isinstance(part, Constant):
         return lambda t, q, v: part.tau
     return lambda t, q, v: part.kp * pin.difference(model, q, part.q) - part.kd * v

@@ -27,6 +27,8 @@ from pin_nonideal.validation import (
     nonnegative,
     optional_text,
     positive,
+    sequence,
+    text,
 )
 
 from .scene_drive import SceneDrive
@@ -54,13 +56,19 @@ class SampledControl:
     (`Scene.acceleration`, `Scene.solve`, `Scene.step`) have no earlier samples, so `initial` acts there.
     Torques that replace the actuation, as those of `Stepper.step` and of a callback, act without delay.
 
+    A control with `joints` may stand in a list of drives, beside drives whose torques change at its samples
+    only: constant torques, controls of the same period, a `TrackTrajectory` with this period, and a `Table`
+    with interpolation "hold" at times t0 + k period. One control of a list may have a delay.
+
     Args:
-        function: (t, q, v) -> tau, shape (nv,), called once per period.
+        function: (t, q, v) -> tau, shape (nv,) or by joint name, called once per period.
         period: sample period [s].
         delay: delay of the torque [s], not negative. It is rounded up to a whole number of periods.
         delay_samples: delay as a number of samples instead.
         initial: torque before the first delayed torque [N m or N], (nv,) or by joint name; None for zero.
         name: used in messages and results.
+        joints: names of the joints that the control commands; the torques of all others must be zero. None
+            for all joints.
 
     Raises:
         InputError: an argument does not fit, or both delays are given.
@@ -72,6 +80,7 @@ class SampledControl:
     delay_samples: int = 0
     initial: State | None = None
     name: str | None = None
+    joints: Sequence[str] | None = None
 
     def __post_init__(self) -> None:
         optional_text("SampledControl: name", self.name)
@@ -95,6 +104,11 @@ class SampledControl:
             named = by_name(self.initial)
             torques = array(f"{who}: initial", self.initial, (None,)).tolist() if named is None else []
             object.__setattr__(self, "initial", tuple(torques) if named is None else named)
+        if self.joints is not None:
+            names = [text(f"{who}: joints", name) for name in sequence(f"{who}: joints", self.joints)]
+            if not names:
+                raise InputError(f"{who}: joints must name at least one joint; got none")
+            object.__setattr__(self, "joints", tuple(names))
 
     @property
     def delay_in_samples(self) -> int:
@@ -338,7 +352,7 @@ def sampled_drives(actuation: object) -> list[Any]:
 
 
 def delayed_control(actuation: object) -> SampledControl | None:
-    """Return the sampled control with a delay, or None; it commands all joints, so there is one at most.
+    """Return the sampled control with a delay, or None; `lower_actuation` refuses a second one.
 
     Args:
         actuation: the actuation of a scene, as returned by `given_actuation`.
@@ -347,11 +361,19 @@ def delayed_control(actuation: object) -> SampledControl | None:
     return next((d for d in controls if d.delay_in_samples), None)
 
 
+def held_tables(actuation: object) -> list[Table]:
+    """Return the tables that hold each torque until the next time.
+
+    Args:
+        actuation: the actuation of a scene, as returned by `given_actuation`.
+    """
+    return [d for d in requesting_drives(actuation) if isinstance(d, Table) and d.interpolation == "hold"]
+
+
 def switching_drives(actuation: object) -> list[object]:
     """Return the drives whose torques jump at times that end steps.
 
     Args:
         actuation: the actuation of a scene, as returned by `given_actuation`.
     """
-    held = [d for d in requesting_drives(actuation) if isinstance(d, Table) and d.interpolation == "hold"]
-    return sampled_drives(actuation) + held
+    return sampled_drives(actuation) + held_tables(actuation)

@@ -217,6 +217,150 @@ def test_steps_end_where_a_reference_begins_and_ends_in_motion():
             np.testing.assert_allclose(one.tau[at, 0] - one.tau[at + 1, 0], 3.0 * v[-1], atol=1e-9)
 
 
+# --- sampled controls in a list -----------------------------------------------------------------------------
+
+PERIOD = 0.01
+STEPS = PERIOD * np.arange(0, 100, 7)  # times of a log, also samples of the control
+LOG = 3.0 * np.cos(5.0 * STEPS)
+
+
+def speed(t, q, v):
+    return {"shoulder": 2.0 * (1.0 - v[0]) - q[1]}
+
+
+def log_in_function(t, q, v):
+    """The sum of `speed` and of the log in one function of all joints."""
+    k = max(int(np.searchsorted(STEPS, t + 1e-9, side="right")) - 1, 0)
+    return {**speed(t, q, v), "elbow": LOG[k]}
+
+
+def beside_log(t0=0.0, **delay):
+    control = pn.SampledControl(speed, PERIOD, joints=["shoulder"], **delay)
+    return [pn.Table(STEPS + t0, {"elbow": LOG}, interpolation="hold"), control]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_held_table_beside_a_sampled_control_is_their_sum_in_one_function(method):
+    one, other = (
+        run(actuation, FRICTION, record="tau", **METHODS[method])
+        for actuation in (beside_log(), pn.SampledControl(log_in_function, PERIOD))
+    )
+    for key in ("t", "q", "v", "tau"):
+        np.testing.assert_array_equal(getattr(one, key), getattr(other, key))
+    assert np.ptp(one.tau[:, 1]) > 4.0
+
+
+def test_a_list_with_a_sampled_control_runs_by_each_way_of_running():
+    """Runs of a rollout, of a stepper and of a checkpoint are the run of simulate."""
+    scene = pn.Scene(pendulum(), actuation=beside_log())
+    options = {"method": "rk4", "dt": PERIOD}
+    whole = pn.simulate(scene, 0.5, progress=False, **options)
+    q, v = scene.q0, scene.v0
+    for each in pn.rollout(scene, [q, q], [v, v], 0.5, jobs=2, **options):
+        np.testing.assert_array_equal(each.q, whole.q)
+    stepper = scene.stepper(PERIOD, **options)
+    for _ in range(50):
+        stepper.step()
+    np.testing.assert_allclose(stepper.q, whole.q[-1], rtol=0.0, atol=1e-12)
+
+
+def test_samples_of_a_later_start_are_counted_from_there():
+    later = pn.simulate(pn.Scene(pendulum(), actuation=beside_log(0.123)), END, t0=0.123, record="tau")
+    now = run(beside_log(), record="tau")
+    np.testing.assert_allclose(later.q[-1], now.q[-1], rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("samples", [1, 3])
+def test_one_control_of_a_list_has_a_delay(samples, tmp_path):
+    """The late torque is that of an earlier sample, and the log beside it is not late."""
+    drives = beside_log(delay_samples=samples, initial={"shoulder": 0.5})
+    scene = pn.Scene(pendulum(), actuation=drives)
+    one = pn.simulate(
+        scene, END, progress=False, record="tau", output_dt=PERIOD / 2, method="rk4", dt=PERIOD / 2
+    )
+    middle = one.tau[np.flatnonzero(one.grid)[1::2]]
+    at = np.flatnonzero(one.grid)[::2][:100]
+    asked = np.array([speed(0.0, one.q[k], one.v[k])["shoulder"] for k in at])
+    np.testing.assert_array_equal(middle[:samples, 0], 0.5)
+    np.testing.assert_allclose(middle[samples:, 0], asked[:-samples], rtol=0.0, atol=1e-12)
+    held = LOG[np.searchsorted(STEPS, PERIOD * np.arange(100) + 1e-9, side="right") - 1]
+    np.testing.assert_array_equal(middle[:, 1], held)
+    again = pn.simulate(
+        scene, END, progress=False, record="tau", output_dt=PERIOD / 2, method="rk4", dt=PERIOD / 2
+    )
+    np.testing.assert_array_equal(again.tau, one.tau)
+
+
+def test_controls_of_one_period_command_joints_of_their_own():
+    arm = pn.SampledControl(speed, PERIOD, joints=["shoulder"])
+    hand = pn.SampledControl(lambda t, q, v: [0.0, -q[1]], PERIOD, joints=["elbow"], name="hand")
+    both = pn.SampledControl(lambda t, q, v: {**speed(t, q, v), "elbow": -q[1]}, PERIOD)
+    np.testing.assert_array_equal(run([arm, hand, {}]).q, run(both).q)
+    reference = {"elbow": [0.0, 0.3, 0.1]}
+    track = pn.TrackTrajectory([0.0, 0.5, 0.9], reference, kp=30.0, kd=3.0, period=PERIOD)
+    assert np.abs(run([arm, track]).joint("elbow").q).max() > 0.1
+
+
+CONTROL = pn.SampledControl(speed, PERIOD, joints=["shoulder"], name="servo")
+
+
+@pytest.mark.parametrize(
+    ("drives", "message"),
+    [
+        (
+            [CONTROL, pn.Table(STEPS, {"elbow": LOG}, name="log")],
+            'SampledControl "servo" holds between samples of 0.01 s add only to torques that change at these '
+            'samples; got Table "log"; give the Table times at the samples and interpolation="hold"',
+        ),
+        ([CONTROL, pn.HoldPosition({"elbow": 1.0}, {"elbow": 1.0})], "got HoldPosition; give all drives one"),
+        (
+            [CONTROL, pn.SampledControl(speed, 0.02, joints=["elbow"])],
+            "got SampledControl with a period of 0.02 s; give all drives one period",
+        ),
+        ([CONTROL, {"shoulder": 1.0}], '"shoulder" is commanded by drive 0 (SampledControl "servo")'),
+        (pn.SampledControl(speed, PERIOD, joints=["sholder"]), 'no joint "sholder"; nearest: "shoulder"'),
+        (
+            pn.SampledControl(speed, PERIOD, delay=0.1, initial=[1.0, 2.0], joints=["shoulder"]),
+            'initial must hold no torque for joints that are not in joints; got 2 for "elbow"',
+        ),
+        (
+            [
+                pn.SampledControl(speed, PERIOD, delay=0.1, joints=[name], name=name)
+                for name in ("shoulder", "elbow")
+            ],
+            "at most one SampledControl of a list may have a delay",
+        ),
+    ],
+)
+def test_errors_of_sampled_controls_in_a_list(drives, message):
+    with pytest.raises((pn.InputError, pn.UnknownNameError)) as error:
+        pn.Scene(pendulum(), actuation=drives)
+    assert message in str(error.value)
+
+
+def test_times_of_a_table_between_samples_are_refused_before_the_run():
+    table = pn.Table([0.0, 0.02, 0.035], {"elbow": [1.0, 2.0, 3.0]}, interpolation="hold", name="log")
+    scene = pn.Scene(pendulum(), actuation=[CONTROL, table])
+    for act in (
+        lambda: pn.simulate(scene, 1.0),
+        lambda: pn.rollout(scene, [scene.q0], [scene.v0], 1.0),
+        lambda: scene.stepper(0.1),
+    ):
+        with pytest.raises(
+            pn.InputError, match=r'Table "log": times must be samples .*"servo".*got 0\.035 s'
+        ):
+            act()
+
+
+def test_torques_of_joints_that_a_control_does_not_command_are_refused():
+    wrong = pn.SampledControl(lambda t, q, v: [1.0, 2.0], PERIOD, joints=["shoulder"])
+    with pytest.raises(pn.UserFunctionError, match='got 2 for "elbow"; add it to joints'):
+        run(wrong)
+    for joints, message in (([], "at least one joint"), ("elbow", "joints"), ([3], "joints")):
+        with pytest.raises(pn.InputError, match=message):
+            pn.SampledControl(speed, PERIOD, joints=joints)
+
+
 def test_limits_of_one_drive_apply_to_its_joints():
     drives = [pn.EffortLimits(SHOULDER, effort=1.0), {"elbow": 3.0}]
     tau = run(drives, record="tau").tau
