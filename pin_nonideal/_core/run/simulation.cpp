@@ -47,7 +47,7 @@ Simulation::Simulation(const Program& program, Workspace& workspace, const Optio
       stepper(options.method, system, norm), control(options.method, options.rtol),
       choice(system, stepper, *this, run_options), stiffness(system, stepper, *this, run_options),
       floor(system, stepper, norm, *this, recording), growth(system, *this, run_options, recording),
-      watch(system, gaps), locator(system, stepper, norm, slip_at_start, pulls, watch),
+      watch(system, gaps), locator(system, stepper, norm, slip_at_start, pulls, watch), hand_over(system, *this),
       output(system, stepper, *this, run_options, recording), notices(system, stepper, *this, recording),
       value_events(run_options.events, system, stepper, *this), breaks(system, *this, output, recording),
       torques(system, *this, run_options, output, breaks),
@@ -107,8 +107,9 @@ void Simulation::run() {
             growth.look();
             continue;
         }
-        Proposal proposal = propose();
+        Proposal proposal;
         try {
+            proposal = propose();
             while (!control_error(proposal, integrate(proposal)) || !locate_event(proposal)) proposal = propose();
         } catch (const Failure& failure) {
             if (!goes_on(failure)) throw;
@@ -172,6 +173,7 @@ Simulation::Proposal Simulation::propose() {
     if (breaks.reached()) pass_break();
     torques.sample();
     const bool adaptive = options.method.adaptive();
+    const std::optional<double> before_hand_over = to_hand_over();
     if (p.searches_breaks) breaks.look(std::min(t_end, t + (adaptive ? h : options.dt)), adaptive);
     double stop = torques.next_stop(t, t_end);
     if (!adaptive)  // stay on the fixed grid, also after an event inside a step
@@ -194,7 +196,26 @@ Simulation::Proposal Simulation::propose() {
         last &= shorter == size;
         size = shorter;
     }
+    if (before_hand_over && *before_hand_over < size) {
+        size = *before_hand_over;
+        last = false;
+    }
     return {size, stop, last};
+}
+
+// Steps without error control are searched always. Other steps are searched after a rejection, as a hand-over causes one.
+std::optional<double> Simulation::to_hand_over() {
+    const bool adaptive = options.method.adaptive();
+    if (system.ng == 0 || (adaptive && !hands_over)) return std::nullopt;
+    for (;;) {
+        const std::optional<double> time = hand_over.first(adaptive ? h : options.dt);
+        hands_over = time.has_value();
+        if (!time) return std::nullopt;
+        if (!hand_over.is_reached(*time)) return HandOver::step_before(*time);
+        hand_over.pass(*time);
+        modes.change({FoundEvent::Kind::lift, -1, t});
+        output.now();
+    }
 }
 
 void Simulation::pass_break() {
@@ -273,6 +294,7 @@ bool Simulation::control_error(const Proposal& proposal, std::optional<double> e
     const bool accepted = control.accepts(error, proposal.size, proposal.last, h);
     if (accepted) opened.reset();
     else ++out.rejected;
+    hands_over |= !accepted;
     if (accepted || !error || h >= least_spacings * std::abs(std::nextafter(t, t_end) - t)) return accepted;
     if (opened) throw *opened;
     throw Failure(Failure::Kind::step_size, t);
@@ -300,6 +322,7 @@ bool Simulation::locate_event(const Proposal& proposal) {
         if (!options.method.adaptive() || proposal.size < tiny || failure.kind == Failure::Kind::interrupted) throw;
     }
     ++out.rejected;
+    hands_over = true;
     h = shortened * proposal.size;
     back_to_start();
     return false;

@@ -6,6 +6,7 @@
 
 #include "run/events/event_location.hpp"
 #include "run/integrators/growth.hpp"
+#include "run/events/hand_over.hpp"
 #include "run/events/mode_switch.hpp"
 #include "run/integrators/rounding_floor.hpp"
 #include "run/integrators/step_control.hpp"
@@ -32,9 +33,9 @@ public:
 
 protected:
     struct Proposal {
-        double size;
-        double stop;  // latest end time of the step
-        bool last;    // the step ends at `stop`
+        double size = 0.0;
+        double stop = 0.0;  // latest end time of the step
+        bool last = false;  // the step ends at `stop`
     };
 
     // Six phases of a step. `integrate` returns the error norm, 1 at the tolerance. It returns nothing if the step
@@ -48,6 +49,8 @@ protected:
     void record(const std::optional<FoundEvent>& event);
 
     void pass_break();
+    // Return the length of a step up to the next hand-over of a closed contact, after passing the hand-overs at this time.
+    std::optional<double> to_hand_over();
     void find_event();
     bool goes_on(const Failure& failure);
     void back_to_start();
@@ -77,6 +80,7 @@ protected:
     GrowthGuard growth;
     GapWatch watch;
     EventLocator locator;
+    HandOver hand_over;
     Output output;
     Notices notices;
     ValueEvents value_events;

@@ -39,6 +39,7 @@ struct Progress {
     // Time stepping: the last step left the state unchanged; accelerations and forces are those at its end.
     bool stands = false, evaluated = false;
     int turning_steps = 0;  // consecutive stiff steps with turning slip, negative: not counted yet
+    bool hands_over = false;  // a closed contact may pass to the next feature in the next step
 };
 
 std::string to_bytes(Workspace& w, Progress& progress, Recording& out);

@@ -1,0 +1,99 @@
+#include "run/events/hand_over.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "contact/queries.hpp"
+#include "dynamics/evaluation.hpp"
+#include "dynamics/projection.hpp"
+#include "tree/lie_group.hpp"
+
+namespace pn {
+
+namespace {
+
+// Minimum jump of a gap's bias acceleration, relative to all accelerations. Error control covers smaller jumps.
+constexpr double min_bias_jump = 1e-6;
+// A jump keeps at least this part of a change in one half of each bisected interval. A smooth function keeps less.
+constexpr double kept_bias_change = 0.3;
+// Longest time [s, or relative to the time above 1 s] in which the change of the acceleration is negligible.
+constexpr double steady_time = 1e-12;
+// Part of the time to a hand-over that is left to the next step, since the acceleration changes on the way.
+constexpr double left_before_hand_over = 1e-3;
+// Width [s, or relative to the time above 1 s] of the interval that contains a hand-over. It is below the spacing of times,
+// so the state after it lies at the feature up to rounding.
+constexpr double hand_over_width = 1e-18;
+
+// Check if a gap belongs to a plane without edges, or to a joint.
+bool has_one_feature(const Program& p, int gap) {
+    const Kind& kind = p.blocks[p.gaps[gap].block].kind;
+    return std::holds_alternative<ContactRow>(kind) || std::holds_alternative<EllipsoidRow>(kind) ||
+           std::holds_alternative<LimitRow>(kind);
+}
+
+}  // namespace
+
+HandOver::HandOver(System& system, Progress& progress)
+    : system_(system), now_(progress), p(system.p), w(system.w), move_(VecX::Zero(system.nv)), y_(VecX::Zero(system.ny)) {}
+
+bool HandOver::is_reached(double time) const { return time <= steady_time * std::max(1.0, std::abs(now_.t)); }
+
+double HandOver::step_before(double time) { return (1.0 - left_before_hand_over) * time; }
+
+// Set y_ to the state after a time.
+void HandOver::move(double time) {
+    system_.read(now_.y);
+    const auto a = system_.velocity(now_.rate);
+    move_ = time * (system_.v + 0.5 * time * a);
+    y_ = now_.y + time * now_.rate;
+    retract(p.mechanism, system_.q.data(), move_.data(), y_.data());
+}
+
+double HandOver::drift(int gap) {
+    follow_gap(p, w, now_.t, system_.v, gap);
+    return w.now.values[p.gaps[gap].block].drift[0];
+}
+
+double HandOver::drift_after(double time, int gap) {
+    move(time);
+    system_.read(y_);
+    update_kinematics(p, w, now_.t + time, system_.q, system_.v);
+    return drift(gap);
+}
+
+// Check if the bias of a gap jumps within `size`, and reduce `size` to the first time after the jump.
+bool HandOver::find(int gap, double& size) {
+    double low = 0.0, high = size, at_low = drift_after(low, gap), at_high = drift_after(high, gap);
+    const double scale = p.mechanism.gravity.norm() + system_.velocity(now_.rate).cwiseAbs().maxCoeff() + std::abs(at_low);
+    const double least = std::max(kept_bias_change * std::abs(at_high - at_low), min_bias_jump * scale);
+    const double width = hand_over_width * std::max(1.0, std::abs(now_.t));
+    while (high - low > width) {
+        const double middle = 0.5 * (low + high);
+        if (!(low < middle && middle < high)) break;
+        const double there = drift_after(middle, gap);
+        const double before = std::abs(there - at_low), behind = std::abs(at_high - there);
+        if (!(std::max(before, behind) >= least)) return false;
+        const bool is_before = before >= least;
+        (is_before ? high : low) = middle;
+        (is_before ? at_high : at_low) = there;
+    }
+    size = high;
+    return true;
+}
+
+std::optional<double> HandOver::first(double size) {
+    std::optional<double> found;
+    for (int gap : w.now.touching) {
+        if (is_bare(p, gap) || p.is_users(gap) || has_one_feature(p, gap)) continue;
+        if (find(gap, size)) found = size;
+    }
+    return found;
+}
+
+void HandOver::pass(double time) {
+    move(time);
+    now_.y = y_;
+    now_.t += time;
+}
+
+}  // namespace pn
