@@ -10,7 +10,17 @@ import numpy as np
 import pin_nonideal as pn
 
 from . import timing
-from .contact_scenes import ContactScene, balls_in_box, dominoes, heavy_on_light, mujocos, ours, sliding, stack, wall
+from .contact_scenes import (
+    ContactScene,
+    balls_in_box,
+    dominoes,
+    heavy_on_light,
+    mujocos,
+    ours,
+    sliding,
+    stack,
+    wall,
+)
 
 STEP = 1e-3  # [s]
 SCENES = (
