@@ -13,7 +13,7 @@ from ..support.mechanisms import GRAVITY, at
 
 TABLE = (0.4, 0.4, 0.1)  # edges of the table, with its middle at the origin [m]
 TIME, ENERGY = 1e-9, 1e-9  # tolerances [s], [J]
-# A gap of 1e-14 m counts as open. A body of 0.1 m turns into it at 300 rad/s^2 and reaches this speed [rad/s].
+# A gap of 1e-14 m counts as open. A body of 0.1 m that turns into it reaches this speed [rad/s].
 TURNING = 1e-5
 
 
@@ -24,7 +24,7 @@ def on_a_table(
     turn: float = 0.0,
     mu: float = 0.0,
 ) -> pn.Scene:
-    """Return a body of 1 kg on a table, turned about z, with its origin at a height and a velocity in the world."""
+    """Return a body of 1 kg on a table, turned about z, with a height and a velocity in the world."""
     model, shapes = pin.Model(), pin.GeometryModel()
     model.gravity.linear[:] = 0.0, 0.0, -GRAVITY
     pn.free_body(model, "body", shape, mass=1.0, collision_model=shapes)
