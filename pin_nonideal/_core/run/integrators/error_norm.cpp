@@ -13,6 +13,9 @@ namespace {
 
 // Tolerance of the force of a sticking element over a step, relative to its limit.
 constexpr double share_part = 1e-4;
+// Rounding of the force of a sticking element, relative to the largest given force. Far from the loads of a long chain
+// limits are as small as that.
+constexpr double stuck_force_rounding = 64 * std::numeric_limits<double>::epsilon();
 // Shortest step [s] that resolves a load. The error of a load that jumps does not decrease with the step, so shorter
 // steps skip it.
 constexpr double shortest_resolved = 1e-9;
@@ -70,6 +73,7 @@ void ErrorNorm::set_tolerances(const VecX& y0, const VecX& y1, double h) {
         tolerance_[k] = std::max(tolerance_[k], least);
     }
     resolves_shares_ = std::abs(h) >= shortest_resolved;
+    share_rounding_ = stuck_force_rounding * std::abs(h) * system_.w.now.F.cwiseAbs().maxCoeff();
     share_tolerance_ = share_part * std::max(std::abs(h), shortest_resolved);
 }
 
@@ -103,7 +107,8 @@ double ErrorNorm::operator()(const VecX& dy, const VecX& y) {
         if (system_.w.state.mode[e] != sticking) continue;
         // The load of a contact can jump at an edge. Steps too short to resolve the jump skip it.
         if (system_.p.frictions[e].gap >= 0 && !resolves_shares_) continue;
-        const double x = system_.share(dy, e) / share_tolerance_;
+        const double limit = std::max(system_.w.now.load[e].reach(), min_scale);
+        const double x = system_.share(dy, e) / std::max(share_tolerance_, share_rounding_ / limit);
         sum += x * x;
         ++n;
     }

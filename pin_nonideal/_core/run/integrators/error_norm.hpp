@@ -35,7 +35,7 @@ private:
     void magnitude(const VecX& y);
 
     System& system_;
-    double rtol_, share_tolerance_ = 1.0;
+    double rtol_, share_tolerance_ = 1.0, share_rounding_ = 0.0;
     bool resolves_shares_ = true;  // the step is long enough to resolve contact loads
     VecX atol_, tolerance_, tangent_;
     const VecX& rounding_;
