@@ -90,10 +90,8 @@ void ModeChanges::bridge(int element) {
     if (clusters_.bridge(element, options_.end())) go_on_with_new_modes();
 }
 
-// Check if the solver failed in a scene with unilateral contacts, which proves nothing.
-bool ModeChanges::undecided(const Failure& failure) const {
-    return failure.kind == Failure::Kind::not_converged && system_.ng > 0;
-}
+// Check if the solver failed, which proves nothing.
+bool ModeChanges::undecided(const Failure& failure) { return failure.kind == Failure::Kind::not_converged; }
 
 bool ModeChanges::step_over(const Failure& failure) {
     if (options_.method.outside() || system_.ne == 0) return false;

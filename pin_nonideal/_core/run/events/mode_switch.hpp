@@ -35,7 +35,7 @@ public:
 private:
     void end_bouncing();
     void keep_last(const RunState& before, bool struck);
-    bool undecided(const Failure& failure) const;
+    static bool undecided(const Failure& failure);
     bool creeps() const;
     void go_on_with_new_modes();
 

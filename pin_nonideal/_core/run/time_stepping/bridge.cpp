@@ -87,13 +87,12 @@ void TimeStepping::take_part(double end, double t_end, double least) {
         out_.events.back().miss = relaxed.miss;
     }
     relaxes_ = relaxed.block >= 0;
-    const bool goes_through = options_.method.scheme == Method::Scheme::moreau;
     const bool asks = now_.evaluated = whole && asks_for_motion(end, t_end);
     if (moreau_contacts_.project(t, now_.y, now_.moved_energy)) {
-        if (asks) system_.evaluate_step_end(t, now_.y, now_.rate, goes_through);
+        if (asks) system_.evaluate_step_end(t, now_.y, now_.rate, true);
         return;
     }
-    system_.settle(t, now_.y, now_.rate, asks, goes_through);
+    system_.settle(t, now_.y, now_.rate, asks, true);
     now_.moved_energy += system_.moved_energy;
 }
 
@@ -126,7 +125,8 @@ void TimeStepping::take(double end, double t_end) {
     t = end;
     const bool held = rested && std::equal(before.begin(), before.end(), w.state.mode.begin());
     if (!held) {
-        system_.settle(t, y, now_.rate, asks_for_motion(end, t_end), false);
+        const bool bridges = options_.method.scheme != Method::Scheme::moreau;
+        system_.settle(t, y, now_.rate, asks_for_motion(end, t_end), bridges);
         now_.moved_energy += system_.moved_energy;
         return;
     }
@@ -158,7 +158,7 @@ void TimeStepping::begin(double size) {
     ModeQuestion first = first_question(p, w, now_.t, system_.q, system_.v);
     for (int e : first.at_rest) first.modes[e] = modes[e];
     set_contacts(p, w, closed, first.modes);
-    system_.evaluate_step_end(now_.t, now_.y, now_.rate, options_.method.scheme == Method::Scheme::moreau);
+    system_.evaluate_step_end(now_.t, now_.y, now_.rate, true);
 }
 
 void TimeStepping::step(double size, double stop, double t_end) {
