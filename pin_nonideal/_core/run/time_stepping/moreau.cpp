@@ -19,6 +19,8 @@ namespace pn {
 namespace {
 
 constexpr double element_load_tolerance = 1e-13;  // change of limits that counts as rounding, relative to the largest limit
+// Change of limits that counts as rounding if it no longer falls by half a pass: loads of long chains have more rounding.
+constexpr double stalled_load_tolerance = 1e-9, min_load_decrease = 0.5;
 constexpr double box_force_rounding = 1e-12;  // distance of a force at its limit, relative to the limit
 constexpr double slip_rest_rounding = 1e-9;    // slip at the end that counts as none, relative to that without friction
 
@@ -145,12 +147,15 @@ void Moreau::solve_friction(double t) {
     for (const Friction& friction : p.frictions)
         for (int k = 0; k < friction.dim; ++k) near_[at++] = w.state.percussion[p.blocks[friction.block].row + k];
     force_.setZero(problem_.rows);
+    double last_change = HUGE_VAL;
     for (int pass = 0; pass < max_load_passes; ++pass) {
         // Limits that depend on no load need no motion.
         if (pass == 0 || p.needs_reactions) apply_forces();
         const double change = update_limits(t);
         const double largest = system_.ne > 0 ? std::max(0.0, limit_.size.maxCoeff()) : 0.0;
-        if (pass > 0 && (change <= element_load_tolerance * largest || !p.needs_reactions)) return;
+        const bool stalls = change > min_load_decrease * last_change && change <= stalled_load_tolerance * largest;
+        last_change = change;
+        if (pass > 0 && (change <= element_load_tolerance * largest || stalls || !p.needs_reactions)) return;
         if (!even_) force_ = friction_program(problem_.W, problem_.alpha0, problem_.dims, limit_);
         else if (problem_.rows > 0 && boxes_) box_.solve(problem_.W, problem_.alpha0, limit_.size, &near_, force_);
         else force_ = friction_program(problem_.W, problem_.alpha0, problem_.dims, limit_.size, &near_);
