@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "dynamics/evaluation.hpp"
 #include "dynamics/implicit_friction.hpp"
@@ -20,6 +21,9 @@ namespace pn {
 namespace {
 
 constexpr double limit_tolerance = 1e-12;  // relative change of the limits at convergence
+// Change of a limit that counts as rounding, relative to the largest given force. Far from the loads of a long chain limits
+// are as small as that.
+constexpr double limit_force_rounding = 64 * std::numeric_limits<double>::epsilon();
 constexpr int max_limit_iterations = 100;  // maximum iterations of forces and limits
 
 bool contains(const std::vector<int>& list, int e) { return std::find(list.begin(), list.end(), e) != list.end(); }
@@ -211,13 +215,14 @@ struct Search {
         problem.alpha0 = problem.slip_accelerations(p, w) - problem.W * f;
         for (int i = 0; i < problem.rows; ++i)
             if (problem.W(i, i) == 0.0) problem.alpha0[i] = driven[i];
+        const double least = limit_force_rounding / limit_tolerance * w.now.F.cwiseAbs().maxCoeff();
         double change = 0.0;
         for (size_t i = 0, at = 0; i < list.size(); at += problem.dims[i], ++i) {
             const Friction& friction = p.frictions[list[i]];
             SlipLimits now = static_limits(p, w, list[i], t, q, v);
             if (modes[list[i]] != sticking) now = w.now.load[list[i]] * friction.speed_factor(0.0);
             const double missed = std::max(std::abs(now.reach() - limits[i]), std::abs(now.middle() - limits.middle[at]));
-            change = std::max(change, missed / std::max(now.reach(), min_scale));
+            change = std::max(change, missed / std::max({now.reach(), least, min_scale}));
             limits.size[i] = now.reach();
             limits.middle[at] = now.middle();
         }
