@@ -59,7 +59,11 @@ def test_slides_on(mu, v0):
         np.testing.assert_allclose(friction, mu * force[slips, 2], atol=1e-9)
 
 
-def test_legs_that_are_straight_end_in_a_named_error():
+def test_straight_legs_go_on_by_time_stepping():
     """There the rows of the feet lose their rank, and the loads beside it are as large as one likes."""
-    with pytest.raises(pn.FrictionConvergenceError, match="it was not found at t ="):
-        pn.simulate(biped(0.1, (1.0, 0.5, 0.0), 0.0), 1.0)
+    scene = biped(0.1, (1.0, 0.5, 0.0), 0.0)
+    run = pn.simulate(scene, 0.5)
+    assert any(event.kind == "chatter" for event in run.events)
+    steps = pn.simulate(scene, 0.5, method="moreau", dt=1e-3)
+    np.testing.assert_allclose(run.q[-1], steps.q[-1], atol=1e-3)
+    np.testing.assert_allclose(run.v[-1], steps.v[-1], atol=1e-3)
