@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Collection, Iterator, Sequence
 from typing import cast
 
@@ -10,7 +11,7 @@ import numpy as np
 from pin_nonideal.states.joint_layout import JointPlace
 from pin_nonideal.types import Array
 
-from .by_name import joint_record, law_record
+from .by_name import joint_record
 from .fields import RunFields
 
 # Kinds of joints by prefix, with the units of their positions as `JointRecord` has them and of their rates.
@@ -27,6 +28,7 @@ KINDS = (
     ("JointModelH", ("rad",), ("rad",)),
     ("JointModelP", ("m",), ("m",)),
 )
+Place = tuple[str, int, int, list[str]]  # name of a joint, first dof, nv, units of its generalized forces
 FORCE_OF = {"m": "N", "rad": "N m"}  # unit of a force by that of the motion on which it does work
 RATES = {"v": "/s", "a": "/s^2"}
 EITHER_FORCE = (
@@ -41,6 +43,15 @@ def columns(run: RunFields) -> dict[str, Array]:
         run: trajectory of the run.
     """
     return {name: values for name, (values, _) in _with_units(_all(run)).items()}
+
+
+def acting_columns(run: RunFields) -> dict[str, Array]:
+    """Return the columns of a run without forces of laws in joints on which the laws do not act, (nt,) each.
+
+    Args:
+        run: trajectory of the run.
+    """
+    return {name: values for name, (values, _) in _with_units(_all(run, acting=True)).items()}
 
 
 def motion_columns(run: RunFields, fields: Collection[str]) -> dict[str, Array]:
@@ -97,16 +108,23 @@ def _with_units(entries: Iterator[tuple[str, Array, str]]) -> dict[str, tuple[Ar
     return table
 
 
-def _all(run: RunFields) -> Iterator[tuple[str, Array, str]]:
-    """Each column as its name, its values and its unit."""
+def _all(run: RunFields, acting: bool = False) -> Iterator[tuple[str, Array, str]]:
+    """Each column as its name, its values and its unit; forces of laws only where they act if `acting`."""
     yield "t", run.t, "s"
     yield from _joints(run)
     places = [(p.name, p.v_first, p.nv, [FORCE_OF.get(u, "") for u in _motion(p)[1]]) for p in run.joints]
-    for field, values in _by_dof(run):
-        for joint, first, nv, forces in places:
+    for field, values, dofs in _by_dof(run):
+        for joint, first, nv, forces in places if dofs is None or not acting else _among(places, dofs):
             part = values[:, first] if nv == 1 else values[:, first : first + nv]
             yield from _numbered(f"{joint}.{field}", part, forces)
     yield from _others(run)
+
+
+def _among(places: Sequence[Place], dofs: Collection[int]) -> Iterator[Place]:
+    """Yield the joints with one of some degrees of freedom."""
+    ends = [first + nv for _, first, nv, _ in places]
+    for k in sorted({bisect_right(ends, dof) for dof in dofs}):
+        yield places[k]
 
 
 def _joints(run: RunFields) -> Iterator[tuple[str, Array, str]]:
@@ -150,15 +168,16 @@ def _motion(place: JointPlace) -> tuple[tuple[str, ...], tuple[str, ...]]:
     return (), ("",) * place.nv
 
 
-def _by_dof(run: RunFields) -> Iterator[tuple[str, Array]]:
-    """Yield the fields that have a column for each degree of freedom."""
+def _by_dof(run: RunFields) -> Iterator[tuple[str, Array, Sequence[int] | None]]:
+    """Yield the fields that have a column for each degree of freedom, with the dofs on which a law acts."""
     for field in ("F_ideal", "F_nonideal"):
         if getattr(run, field) is not None:
-            yield field, getattr(run, field)
-    for name in run.law_forces or ():
-        force = law_record(run, name).force
-        assert force is not None
-        yield f"C.{name}", np.asarray(force)
+            yield field, getattr(run, field), None
+    dofs = dict(zip(run.law_names, run.law_dofs, strict=True)) if run.law_forces else {}
+    for name, part in (run.law_forces or {}).items():
+        force = np.zeros(run.v.shape)
+        force[:, dofs[name]] = part
+        yield f"C.{name}", force, np.asarray(dofs[name]).tolist()
 
 
 def _numbered(name: str, values: Array | None, units: Sequence[str]) -> Iterator[tuple[str, Array, str]]:

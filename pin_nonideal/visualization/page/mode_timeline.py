@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 
 # Maximum number of samples at which gaps are computed.
 MAX_GAP_SAMPLES = 5000
+# Maximum of numbers in the matrices A of all samples of the gaps, about half a second of work. Scenes of many
+# contacts have fewer samples, but at least `MIN_GAP_SAMPLES`.
+MAX_GAP_NUMBERS = 1e8
+MIN_GAP_SAMPLES = 100
 
 Bands = list[tuple[float, float, int]]
 
@@ -79,7 +83,9 @@ def gaps_of(run: Trajectory) -> tuple[Array, dict[str, Array]]:
         run: run of the replay.
     """
     t = np.asarray(run.t)
-    chosen = np.unique(np.linspace(0, len(t) - 1, min(len(t), MAX_GAP_SAMPLES)).astype(int))
+    each = max(1, compiled_scene(run.scene).program.rows * run.v.shape[1])
+    count = int(np.clip(MAX_GAP_NUMBERS / each, MIN_GAP_SAMPLES, MAX_GAP_SAMPLES))
+    chosen = np.unique(np.linspace(0, len(t) - 1, min(len(t), count)).astype(int))
     runner = compiled_scene(run.scene).program.runner()
     residuals = np.array([rows_at(runner, run.q[k], run.v[k], float(t[k]))[2] for k in chosen])
     slices = run.scene.constraint_slices

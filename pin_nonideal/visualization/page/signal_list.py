@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pin_nonideal.trajectory.columns import column_name, columns, motion_columns
+from pin_nonideal.trajectory.columns import acting_columns, column_name, motion_columns
 from pin_nonideal.types import Array
 
 from .coordinates import positions, velocities
@@ -80,12 +80,12 @@ def signals_of(run: Trajectory, finer: Trajectory) -> list[Signal]:
     signals = [*_labelled(run, finer), *_loads(run)]
     known = {word for item in signals for word in item.words.split("\n")}
     fine, reader = motion_columns(finer, SMOOTH), _Columns(run)
-    for name, values in columns(run).items():
-        if name == "t" or name in known or reader.is_idle(name):
+    for name, values in acting_columns(run).items():
+        if name == "t" or name in known:
             continue
         item = reader.signal(name, values)
         smooth = item.words.split("\n")[-1] in SMOOTH and name in fine
-        signals.append(replace(item, values=fine[name] if smooth else item.values, smooth=smooth))
+        signals.append(replace(item, values=fine[name], smooth=True) if smooth else item)
     order = {section: place for place, section in enumerate(SECTIONS)}
     signals.sort(key=lambda item: order[item.section])
     each = int(np.clip(POINTS // max(len(signals), 1), LEAST, MOST))
@@ -146,20 +146,8 @@ class _Columns:
             for field in ("energy", "power")
             for own in getattr(run, field, None) or {}
         }
+        self._units: dict[tuple[str, str], str] = {}  # by joint and number of the component
         self._laws = {column_name(law): str(law) for law in getattr(run, "law_forces", None) or {}}
-        joint_of = np.repeat(np.arange(len(run.joints)), [place.nv for place in run.joints])
-        dofs = dict(zip(run.law_names, run.law_dofs, strict=True)) if self._laws else {}
-        # Pairs of a law and a joint on which it acts.
-        self._acting = {
-            (law, column_name(run.joints[joint].name))
-            for law in self._laws.values()
-            for joint in set(joint_of[dofs[law]].tolist())
-        }
-
-    def is_idle(self, name: str) -> bool:
-        """Check if a column is the force of a law in a joint on which the law does not act."""
-        owner, law, _ = self._law_force(name)
-        return law is not None and (law, owner) not in self._acting
 
     def signal(self, name: str, values: Array) -> _RecordedSignal:
         """Return the signal of a column; its words end with the field."""
@@ -216,6 +204,11 @@ class _Columns:
 
     def _unit(self, joint: str, number: str) -> str:
         """Return the unit of a generalized force in a joint, or of one component."""
+        if (joint, number) not in self._units:
+            self._units[joint, number] = self._unit_in_model(joint, number)
+        return self._units[joint, number]
+
+    def _unit_in_model(self, joint: str, number: str) -> str:
         model = self.run.scene.model
         if not model.existJointName(joint):
             return "N, N m"
@@ -237,11 +230,10 @@ def _signal_of(
 
 def _thinned(item: _RecordedSignal, t: Array, points: int) -> Signal:
     """Return the signal with few points; two points if its value is constant."""
-    values, label = item.values, item.label
+    values, label, words = item.values, item.label, item.words.replace("\n", " ")
     if len(t) > 2 and (values == values[0]).all():
-        t, values = t[[0, -1]], values[[0, -1]]
+        return Signal(label, item.unit, item.section, words, t[[0, -1]], values[[0, -1]])
     plot = Plot(label, item.unit, t, {label: values}).thinned(points // 2)
-    words = item.words.replace("\n", " ")
     return Signal(label, item.unit, item.section, words, plot.t, plot.curves[label])
 
 

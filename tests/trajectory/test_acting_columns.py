@@ -1,0 +1,67 @@
+"""Columns of forces of laws: all joints in `columns`, the joints on which a law acts in a replay."""
+
+from __future__ import annotations
+
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import pin_nonideal as pn
+from pin_nonideal.trajectory.columns import acting_columns
+from pin_nonideal.visualization.page import mode_timeline
+from pin_nonideal.visualization.page.frames import sample
+from pin_nonideal.visualization.page.signal_list import signals_of
+
+
+@pytest.fixture(scope="module")
+def pile():
+    """Two boxes side by side on the ground, a third one on both."""
+    model, shapes = pin.Model(), pin.GeometryModel()
+    shapes.addGeometryObject(pn.ground())
+    places = {"left": (-0.06, 0, 0.05), "right": (0.06, 0, 0.05), "top": (0, 0, 0.155)}
+    for name, place in places.items():
+        pn.free_body(
+            model, name, coal.Box(0.1, 0.1, 0.1), 500.0, collision_model=shapes, place=np.array(place)
+        )
+    scene = pn.Scene(model, contacts=pn.geometry_contacts(model, shapes, mu=0.5), collision_model=shapes)
+    return pn.simulate(scene, 0.06, method="moreau", dt=2e-3, record="forces", output_dt=6e-3, progress=False)
+
+
+def test_columns_that_are_left_out_are_zero(pile):
+    every, acting = pile.columns(), acting_columns(pile)
+    assert list(acting) == [name for name in every if name in acting]
+    for name, values in acting.items():
+        np.testing.assert_array_equal(values, every[name])
+    rest = [name for name in every if name not in acting]
+    assert len(rest) > 1000
+    assert all(".C." in name and not every[name].any() for name in rest)
+    assert sum(".C." in name and values.any() for name, values in every.items()) > 10
+
+
+def test_a_replay_has_a_signal_for_each_of_them(pile):
+    words = {word for signal in signals_of(pile, pile) for word in signal.words.split()}
+    forces = {name for name in acting_columns(pile) if ".C." in name}
+    assert forces <= words
+
+
+def test_bodies_that_touch_are_drawn_on_the_cubics_of_the_run(pile):
+    """Frames at samples are the samples; no loop moves the frames between them."""
+    motion = sample(pile)
+    at = np.flatnonzero(motion.part == 0.0)
+    assert len(at) >= len(pile.t) - 1
+    np.testing.assert_array_equal(motion.q[at], pile.q[motion.before[at]])
+    assert not motion.held.any()
+
+
+def test_gaps_of_many_contacts_have_fewer_samples(pile, monkeypatch):
+    long = pn.simulate(pile.scene, 0.5, method="moreau", dt=2e-3, output_dt=2e-3, progress=False)
+    t, gaps = mode_timeline.gaps_of(long)
+    assert len(t) == len(long.t)
+    monkeypatch.setattr(mode_timeline, "MAX_GAP_NUMBERS", 1.0)
+    fewer, some = mode_timeline.gaps_of(long)
+    assert len(fewer) == mode_timeline.MIN_GAP_SAMPLES
+    assert (fewer[0], fewer[-1]) == (t[0], t[-1])
+    at = np.searchsorted(t, fewer)
+    for name, values in some.items():
+        np.testing.assert_array_equal(values, gaps[name][at])
