@@ -21,7 +21,7 @@ ring = pn.UserConstraint(
 friction = pn.UserLaw(  # mu |N| against the velocity, Eq. (68)
     lambda t, q, v, reactions: -mu * abs(reactions.lam[0]) * R * v / np.linalg.norm(v), reaction="ideal"
 )
-scene = pn.Scene(model, constraints=[ring], laws=[friction], q0=[0.0, -R], v0=[start, 0.0])
+scene = pn.Scene(model, constraints=[ring], laws=[friction], q0=[0.0, -R], v0=[start, 0.0], name="ring")
 run = pn.simulate(scene, 1.2, rtol=1e-10, atol=1e-11, output_dt=0.01, record="forces")
 # The equation of v^2 along the ring has constant coefficients: d(v^2)/da + 2 mu v^2 = -2 g R (sin + mu cos).
 a = np.unwrap(np.arctan2(run.q[:, 0], -run.q[:, 1]))

@@ -24,7 +24,7 @@ friction = pn.UserLaw(  # mu |F_ideal| uphill, Eqs. (77), (78); |F_ideal| = |lam
     lambda t, q, v, reactions: -mu * abs(reactions.lam[0]) * slope, reaction="ideal"
 )
 v0 = 0.1 * np.cos(alpha) * slope - [0.0, beta * omega]
-scene = pn.Scene(model, constraints=[plane], laws=[friction], q0=[0.0, 0.0], v0=v0)
+scene = pn.Scene(model, constraints=[plane], laws=[friction], q0=[0.0, 0.0], v0=v0, name="incline")
 run = pn.simulate(scene, 1.0, rtol=1e-10, atol=1e-11, output_dt=0.005, record="forces")
 fall = g * run.t**2 / 2 + beta * np.sin(omega * run.t) - beta * omega * run.t
 expected = 0.1 * run.t + (np.sin(alpha) - mu * np.cos(alpha)) * fall

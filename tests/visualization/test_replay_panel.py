@@ -180,6 +180,32 @@ def test_panels_cover_no_control_and_curves_are_tall(loop: Watched, size: tuple[
     assert list_height > 60
 
 
+COVERED = """() => {
+  const box = (e) => e.getBoundingClientRect();
+  const shown = (e) => box(e).width > 0 && getComputedStyle(e).visibility !== "hidden";
+  const cards = [...document.querySelectorAll("#heading, #forces, #tools")].filter(shown).map(box);
+  const labels = [...document.querySelectorAll("#labels span")].filter((e) => shown(e) && e.textContent);
+  const meet = (a, b) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+  const covered = labels.filter((e) => cards.some((card) => meet(box(e), card)));
+  return [labels.length, covered.map((e) => e.textContent)];
+}"""
+
+
+@pytest.mark.parametrize("size", [(1400, 900), (900, 500), (420, 800)])
+def test_values_of_forces_are_beside_the_cards(loop: Watched, size: tuple[int, int]) -> None:
+    """A value under the heading or under the table of forces would be illegible."""
+    loop.page.set_viewport_size({"width": size[0], "height": size[1]})
+    loop.run("() => { replay.showForces(true); replay.resetView(); }")
+    count = 0
+    for k in range(12):
+        loop.run("k => replay.seek(replay.start + k / 12 * replay.duration)", k)
+        number, covered = loop.run(COVERED)
+        assert covered == []
+        count += number
+    assert count > 5
+    loop.page.set_viewport_size({"width": 1000, "height": 720})
+
+
 def test_the_splitter_gives_room_to_the_plots(loop: Watched) -> None:
     height = "() => document.getElementById('dock').offsetHeight"
     before, stage = loop.run(height), loop.page.locator("#stage").bounding_box()["height"]

@@ -94,8 +94,11 @@ class Arrows {
     arrow.tip.copy(from).addScaledVector(arrow.along, 7 * small);
   }
 
-  /** Places numbers beyond the tips, or beside or before covered tips, larger ones first; numbers without space are hidden. */
-  placeLabels(onScreen) {
+  /**
+   * Places numbers beyond the tips, or beside or before covered tips, larger ones first; numbers without space are hidden.
+   * cards: boxes over the view, as left, top, right, bottom in pixels, which no number overlaps.
+   */
+  placeLabels(onScreen, cards) {
     const drawn = this.items.filter((arrow) => arrow.drawn).sort((a, b) => b.share - a.share), taken = [];
     const ends = drawn.map((arrow) => [onScreen(arrow.place), onScreen(arrow.tip)]), spots = ends.flat().filter(Boolean);
     for (const span of this.spans) span.style.visibility = "hidden";
@@ -104,7 +107,8 @@ class Arrows {
       if (!tip || !base || taken.length >= this.spans.length) return;
       const way = Math.hypot(tip[0] - base[0], tip[1] - base[1]) || 1, dx = (tip[0] - base[0]) / way, dy = (tip[1] - base[1]) / way;
       const text = `${steady(arrow.value)} ${arrow.unit}`, half = 3.3 * text.length + 4;
-      const free = ([x, y]) => !taken.some(([a, b, w]) => Math.abs(x - a) < half + w && Math.abs(y - b) < 17) && !spots.some(([a, b]) => Math.abs(x - a) < half && Math.abs(y - b) < 12);
+      const beside = ([x, y]) => !cards.some(([left, top, right, bottom]) => x + half > left && x - half < right && y + 9 > top && y - 9 < bottom);
+      const free = ([x, y]) => beside([x, y]) && !taken.some(([a, b, w]) => Math.abs(x - a) < half + w && Math.abs(y - b) < 17) && !spots.some(([a, b]) => Math.abs(x - a) < half && Math.abs(y - b) < 12);
       const found = [[dx, dy], [dy, -dx], [-dy, dx], [-dx, -dy]].map(([u, v]) => [tip[0] + u * (half + 8), tip[1] + v * 18]).find(free);
       if (!found) return;
       const span = this.spans[taken.length], [x, y] = found;

@@ -171,7 +171,14 @@ class Stage {
     this.overlays.update(0.35 * link, Math.max(0.06 * link, 3 * pixel));
     this.renderer.info.reset();
     this.renderer.render(this.world, this.camera);
-    this.arrows.placeLabels((point) => this.onScreen(point));
+    this.arrows.placeLabels((point) => this.onScreen(point), this.cards());
+  }
+
+  /** Boxes of the cards and buttons over the view, in pixels: left, top, right, bottom. */
+  cards() {
+    const own = this.canvas.getBoundingClientRect();
+    return ["heading", "forces", "panel", "tools"].map((name) => element(name).getBoundingClientRect()).filter((box) => box.width)
+      .map((box) => [box.left - own.left, box.top - own.top, box.right - own.left, box.bottom - own.top]);
   }
 
   /** Bounding box on the canvas of all bodies in view, in pixels: left, top, right, bottom. */
