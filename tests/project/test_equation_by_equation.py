@@ -119,3 +119,16 @@ def test_sources_of_the_core_with_a_number_are_listed() -> None:
     }
     assert {2, 3, 39, 40} <= computed
     assert computed - listed == set()
+
+
+@pytest.mark.parametrize(("ending", "comment"), [("py", "#"), ("cpp", "//")])
+def test_a_search_for_the_equation_of_motion_finds_the_lines_that_compute_it(
+    ending: str, comment: str
+) -> None:
+    code = [
+        line.split(comment)[0].strip()
+        for path in (ROOT / "pin_nonideal").rglob(f"*.{ending}")
+        for line in path.read_text(encoding="utf-8").splitlines()
+        if f"{comment} " in line and "Eq. (40)" in line.split(comment)[-1]
+    ]
+    assert any(code)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from types import SimpleNamespace
 
 import numpy as np
@@ -172,3 +173,50 @@ def test_descriptions_show_torques_and_gains_by_name(robot):
     held = pn.Scene(robot, actuation=pn.HoldPosition({"elbow": 20.0}, 1.0)).describe()
     assert held.to_dict()["actuation"]["made_with"]["kp"] == {"elbow": 20.0}
     assert "elbow" in str(held)
+
+
+# --- cost ---------------------------------------------------------------------------------------------------
+
+
+def python_calls(function):
+    """Names of the Python functions that a call runs."""
+    names = []
+
+    def note(frame, event, argument):
+        if event == "call":
+            names.append(frame.f_code.co_name)
+
+    sys.setprofile(note)
+    try:
+        function()
+    finally:
+        sys.setprofile(None)
+    return names[1:]  # without the function itself
+
+
+def test_arrays_take_no_part_in_names():
+    """Calls with arrays run the same few Python functions as before there were names."""
+    scene = pn.load("four_bar")
+    q, v = scene.initial_state()
+    tau, stepper = np.zeros(3), scene.stepper(1e-3, q, v)
+    calls = {
+        "acceleration": lambda: scene.acceleration(q, v, tau),
+        "step": lambda: scene.step(q, v, tau, 1e-3),
+        "stepper": lambda: stepper.step(tau),
+    }
+    for name, call in calls.items():
+        call()
+        names = python_calls(call)
+        assert len(names) <= 6, (name, names)
+        assert not {"by_name", "named_joint_values", "configuration", "velocity"} & set(names)
+
+
+def test_each_run_of_a_rollout_costs_no_python():
+    scene = pn.load("four_bar")
+    q, v = scene.initial_state()
+
+    def run(count):
+        pn.rollout(scene, [q] * count, [v] * count, 1e-3, method="rk4", dt=1e-3, as_arrays=True)
+
+    run(1)
+    assert len(python_calls(lambda: run(50))) <= len(python_calls(lambda: run(2))) + 10

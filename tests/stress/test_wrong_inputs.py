@@ -156,6 +156,32 @@ ACTUATION = {
     "gain of a table with NaN": ("kd", lambda g: pn.HoldPosition(1.0, {"crank_joint": NAN})),
     "period of a controller": ("period", lambda g: pn.SampledControl(lambda t, q, v: 0.0, 0.0)),
     "controller": ("function", lambda g: pn.SampledControl(3, 0.1)),
+    "joints of a controller": ("joints", lambda g: pn.SampledControl(never_made, 0.1, joints="crank")),
+    "unknown joint of a controller": (
+        "crank",
+        lambda g: g.scene.replace(actuation=pn.SampledControl(lambda t, q, v: {}, 0.1, joints=["crank"])),
+    ),
+    "linear table beside a controller": (
+        "Table",
+        lambda g: g.scene.replace(
+            actuation=[
+                pn.SampledControl(lambda t, q, v: {}, 0.1, joints=["crank_joint"]),
+                pn.Table([0.0, 1.0], {"rocker_joint": [0.0, 1.0]}),
+            ]
+        ),
+    ),
+    "table between samples of a controller": (
+        "times",
+        lambda g: pn.simulate(
+            g.scene.replace(
+                actuation=[
+                    pn.SampledControl(lambda t, q, v: {}, 0.1, joints=["crank_joint"]),
+                    pn.Table([0.0, 0.25], {"rocker_joint": [0.0, 1.0]}, interpolation="hold"),
+                ]
+            ),
+            1.0,
+        ),
+    ),
     "limits without torques": ("actuation", lambda g: pn.EffortLimits(None, 1.0)),
     "effort": ("effort", lambda g: pn.EffortLimits([1.0, 1.0, 1.0], -1.0)),
 }  # fmt: skip
