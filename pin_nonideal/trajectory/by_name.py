@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 import pinocchio as pin
 
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
+from pin_nonideal.scene.scene import compiled_scene
 from pin_nonideal.states.joint_layout import CIRCLES
 from pin_nonideal.states.kinematics import frame_motion
 from pin_nonideal.types import Array
@@ -79,7 +82,21 @@ def law_record(run: RunFields, name: str) -> LawRecord:
     columns = own[0] if len(own) == 1 else own
     limit = run.limits[:, columns] if own and run.limits is not None else None
     mode = run.modes[:, columns] if own and run.modes is not None else None
-    return LawRecord(name, force, power, limit, mode)
+    return LawRecord(name, force, power, limit, mode, functools.partial(_slip_velocity, run, own))
+
+
+def _slip_velocity(run: RunFields, elements: list[int]) -> Array | None:
+    """Return the slip velocities of some friction elements, (nt,) or (nt, n), or None without any."""
+    if run.scene is None or not elements:
+        return None
+    program = compiled_scene(run.scene).program
+    runner, ends = program.runner(), np.cumsum(program.element_sizes)
+    chosen = [row for e in elements for row in range(ends[e] - program.element_sizes[e], ends[e])]
+    states = zip(run.q, run.v, run.t, strict=True)
+    found = np.array(
+        [runner.slip_rows(q, v, float(t)).reshape(-1, len(v))[chosen] @ v for q, v, t in states]
+    ).reshape(len(run.t), len(chosen))
+    return found[:, 0] if len(chosen) == 1 else found
 
 
 def reaction_of(run: RunFields, name: str, axes: str) -> Array:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import functools
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from types import SimpleNamespace
 
 import numpy as np
@@ -112,6 +114,16 @@ class LawRecord:
     power: Array | None
     limit: Array | None
     mode: NDArray[np.int8] | None
+    _slip: Callable[[], Array | None] = field(default=lambda: None, repr=False)
+
+    @functools.cached_property
+    def slip_velocity(self) -> Array | None:
+        """Slip velocity of the law's element [rad/s or m/s], (nt,), positive in mode +1.
+
+        Laws of several directions, such as contacts in space, have the shape (nt, n). It is None without
+        elements, and for a run without a scene. It is computed at the first access.
+        """
+        return self._slip()
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -330,3 +332,32 @@ def test_other_methods_record_them(method):
     run = pn.simulate(SCENES["loop"](), 0.2, method=method, output_dt=0.1, record=RECORD, **dt)
     test_power_of_a_law_is_its_force_times_the_velocity(run)
     assert np.isfinite(run.reaction(run.scene.model.names[1])).all()
+
+
+def test_slip_velocity_of_friction_in_joints_and_anchors():
+    """Positive in mode +1 beyond rounding at reversals; in a joint it is the velocity of the joint."""
+    panda = pn.simulate(pn.load("panda_friction"), 0.3, output_dt=0.01, record="laws")
+    for k, name in enumerate(panda.law_names):
+        law = panda.law(name)
+        np.testing.assert_array_equal(law.slip_velocity, panda.v[:, k])
+        moving = np.abs(law.slip_velocity) > 1e-6
+        np.testing.assert_array_equal(np.sign(law.slip_velocity[moving]), law.mode[moving])
+    pins = pn.simulate(pn.load("rough_four_bar"), 0.5, output_dt=0.01, record=("laws", "power"))
+    for name in pins.law_names:
+        law = pins.law(name)
+        moving = np.abs(law.slip_velocity) > 1e-6
+        np.testing.assert_array_equal(np.sign(law.slip_velocity[moving]), law.mode[moving])
+        np.testing.assert_allclose(law.power, -law.limit * np.abs(law.slip_velocity), rtol=1e-9, atol=1e-12)
+
+
+def test_slip_velocity_of_a_contact():
+    """A particle that slides in the plane has the velocity of its joint."""
+    model = pin.Model()
+    model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "body")
+    model.appendBodyToJoint(1, pin.Inertia(1.0, np.zeros(3), 0.1 * np.eye(3)), pin.SE3.Identity())
+    scene = pn.Scene(model, contacts=[pn.PointContact("body", mu=0.4, name="foot")], v0=[2.0, 1.0, 0.0])
+    run = pn.simulate(scene, 0.1, record="laws")
+    slip = run.law("foot").slip_velocity
+    assert slip.shape == (len(run.t), 2)
+    np.testing.assert_allclose(slip, run.v[:, :2], rtol=0.0, atol=1e-14)
+    assert dataclasses.replace(run, scene=None).law("foot").slip_velocity is None
