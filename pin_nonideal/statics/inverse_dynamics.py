@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any
@@ -73,7 +73,7 @@ def inverse_dynamics(
     a: State,
     actuated: Sequence[str] | None = None,
     *,
-    bounds: tuple[object, object] | None = None,
+    bounds: tuple[object, object] | Mapping[str, tuple[object, object]] | None = None,
     t: float = 0.0,
 ) -> InverseDynamics:
     """Compute the torques of least norm that give the scene the acceleration a.
@@ -94,7 +94,7 @@ def inverse_dynamics(
         a: acceleration, (nv,) or by joint name (zero for missing joints); it must satisfy the constraints.
         actuated: names of the driven joints; all when None.
         bounds: lower and upper torque limits: numbers, arrays of the actuated degrees of freedom, or by joint
-            name, without limit for missing joints.
+            name, without limit for missing joints; or one table by joint name of such pairs.
         t: time [s].
 
     Returns:
@@ -141,6 +141,15 @@ def _driven(scene: Scene, actuated: Sequence[str] | None) -> list[int]:
 
 def _bounds(scene: Scene, bounds: object, dofs: list[int]) -> tuple[Array, Array]:
     """Least and largest torque of each actuated degree of freedom."""
+    pairs = by_name(bounds)
+    if pairs is not None:
+        for name, pair in pairs.items():
+            if not isinstance(pair, (tuple, list)) or len(pair) != 2:
+                raise InputError(
+                    f'inverse_dynamics: bounds of "{name}" must be a pair (least, largest); '
+                    f"got {short_repr(pair)}"
+                )
+        bounds = tuple({name: pair[k] for name, pair in pairs.items()} for k in range(2))
     if not isinstance(bounds, (tuple, list)) or len(bounds) != 2:
         raise InputError(
             f"inverse_dynamics: bounds must be a pair (least, largest); got {short_repr(bounds)}"

@@ -107,6 +107,12 @@ def test_bounds_of_inverse_dynamics():
     by_name = pn.inverse_dynamics(scene, q, still, still, actuated=["crank_joint"], bounds=pair)
     plain = pn.inverse_dynamics(scene, q, still, still, actuated=["crank_joint"], bounds=([-50.0], [50.0]))
     np.testing.assert_array_equal(by_name.tau, plain.tau)
+    pairs = {"crank_joint": (-50.0, 50.0)}
+    in_pairs = pn.inverse_dynamics(scene, q, still, still, actuated=["crank_joint"], bounds=pairs)
+    np.testing.assert_array_equal(in_pairs.tau, plain.tau)
+    for wrong, message in (({"crank_joint": 50.0}, "pair"), ({"crank": (-1.0, 1.0)}, "crank")):
+        with pytest.raises((pn.InputError, pn.UnknownNameError), match=message):
+            pn.inverse_dynamics(scene, q, still, still, bounds=wrong)
 
 
 def test_a_series_and_a_frame_of_pandas_are_tables():
