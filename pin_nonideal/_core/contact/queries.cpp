@@ -61,6 +61,10 @@ bool rub_and_bounce_the_same(const Program& p, const Gap& a, const Gap& b) {
 
 }  // namespace
 
+bool same_bodies(const Program& p, int gap, int other) {
+    return bodies(p.blocks[p.gaps[gap].block]) == bodies(p.blocks[p.gaps[other].block]);
+}
+
 bool are_copies(const Program& p, int gap, int other) {
     const Gap &a = p.gaps[gap], &b = p.gaps[other];
     return a.alike == b.alike && (gap == other || rub_and_bounce_the_same(p, a, b));
@@ -100,6 +104,13 @@ double load(const Program& p, Workspace& w, int gap) {
 double load_rounding(const Program& p, const Workspace& w, int gap) {
     const double scale = w.now.rows.scale[p.blocks[p.gaps[gap].block].row];  // squared: mass that the row moves
     return gap_sum_rounding * scale * scale * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
+}
+
+bool bodies_press(const Program& p, Workspace& w, int gap) {
+    const std::vector<int>& touching = w.now.touching;
+    return std::any_of(touching.begin(), touching.end(), [&](int i) {
+        return same_bodies(p, i, gap) && !is_bare(p, i) && load(p, w, i) > load_rounding(p, w, i);
+    });
 }
 
 int pulling_contact(const Program& p, Workspace& w) {

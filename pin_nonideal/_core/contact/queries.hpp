@@ -22,6 +22,8 @@ double gap_acceleration(const Program& p, const Workspace& w, int gap);
 // Rounding of the gap acceleration.
 double acceleration_rounding(const Program& p, const Workspace& w, int gap);
 
+// Check if two gaps are between the same two bodies.
+bool same_bodies(const Program& p, int gap, int other);
 // Check if two gaps are duplicate declarations.
 bool are_copies(const Program& p, int gap, int other);
 // Check if two gaps coincide up to rounding: same bodies, same line of action, same friction point and same laws. Their
@@ -34,6 +36,8 @@ void leave_one_of_each_place(const Program& p, const Workspace& w, const std::ve
 double load(const Program& p, Workspace& w, int gap);
 // Rounding of the normal force.
 double load_rounding(const Program& p, const Workspace& w, int gap);
+// Check if some contact of the bodies of a gap has a load.
+bool bodies_press(const Program& p, Workspace& w, int gap);
 // Return the contact with the largest tension in the current motion, or -1 if all contacts can be in compression.
 // Redundant contacts have minimum-norm loads here.
 int pulling_contact(const Program& p, Workspace& w);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "dynamics/evaluation.hpp"
 #include "dynamics/projection.hpp"
@@ -204,15 +205,21 @@ Simulation::Proposal Simulation::propose() {
 }
 
 // Steps without error control are searched always. Other steps are searched after a rejection, as a hand-over causes one.
+// Contacts of bodies without a load open at once: near a hand-over their rows can turn singular.
 std::optional<double> Simulation::to_hand_over() {
     const bool adaptive = options.method.adaptive();
     if (system.ng == 0 || (adaptive && !hands_over)) return std::nullopt;
+    bool asks = true;
     for (;;) {
-        const std::optional<double> time = hand_over.first(adaptive ? h : options.dt);
-        hands_over = time.has_value();
-        if (!time) return std::nullopt;
-        if (!hand_over.is_reached(*time)) return HandOver::step_before(*time);
-        hand_over.pass(*time);
+        const double size = std::min(adaptive ? h : options.dt, torques.next_stop(t, t_end) - t);
+        const std::optional<HandOver::Found> next = hand_over.first(size);
+        hands_over = next.has_value();
+        if (!next || next->time >= size * whole_way) return std::nullopt;  // passed in the step after a stop
+        if (hand_over.is_reached(next->time)) {
+            hand_over.pass(next->time);
+        } else if (!std::exchange(asks, false) || !hand_over.is_unloaded(next->gap)) {
+            return HandOver::step_before(next->time);
+        }
         modes.change({FoundEvent::Kind::lift, -1, t});
         output.now();
     }
@@ -245,6 +252,7 @@ std::optional<double> Simulation::integrate(const Proposal& proposal) {
             failure.kind == Failure::Kind::interrupted)
             throw;
         if (failure.kind == Failure::Kind::closure) opened = failure;
+        back_to_start();  // rows and warm starts of the failed step do not serve the next trial
         return failed_error;
     }
 }

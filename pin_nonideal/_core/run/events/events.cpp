@@ -4,6 +4,7 @@
 
 #include "contact/active_set.hpp"
 #include "contact/impact.hpp"
+#include "contact/queries.hpp"
 #include "dynamics/evaluation.hpp"
 #include "dynamics/projection.hpp"
 #include "dynamics/friction_limit.hpp"
@@ -166,6 +167,24 @@ void close_and_find(System& system, double t, bool starts, FrictionSwitch& frict
     });
 }
 
+// Open the contacts of two bodies if none of these contacts has a load. They would hold the bodies by rounding only, and
+// on features that may end.
+std::vector<int> open_unloaded(System& system, double t) {
+    const Program& p = system.p;
+    Workspace& w = system.w;
+    std::vector<int> out;
+    std::vector<char> closed = w.state.closed;
+    for (int i : w.now.touching) {
+        if (bodies_press(p, w, i)) continue;
+        closed[i] = 0;
+        out.push_back(i);
+    }
+    if (out.empty()) return out;
+    set_closed(p, w, closed);
+    begin_step(p, w, t, system.q, system.v);
+    return out;
+}
+
 }  // namespace
 
 std::vector<Event> changes_since(const System& system, double t, const std::vector<char>& closed,
@@ -185,7 +204,8 @@ std::vector<Event> changes_since(const System& system, double t, const std::vect
     return changes;
 }
 
-std::vector<Event> switch_modes(System& system, double t, VecX& y, VecX& dy, const std::optional<FoundEvent>& event) {
+std::vector<Event> switch_modes(System& system, double t, VecX& y, VecX& dy, const std::optional<FoundEvent>& event,
+                                std::vector<int>* let_go) {
     const Program& p = system.p;
     Workspace& w = system.w;
     system.read(y);
@@ -196,6 +216,7 @@ std::vector<Event> switch_modes(System& system, double t, VecX& y, VecX& dy, con
     FrictionSwitch friction{system, t, event, before, {}};
     if (p.gaps.empty()) friction.find(nullptr);
     else close_and_find(system, t, !event, friction);
+    if (let_go && event && (event->kind == FoundEvent::Kind::lift || event->in_vain)) *let_go = open_unloaded(system, t);
     if (!p.frictions.empty() || !p.gaps.empty()) {
         seek_directions(system, friction.asked.at_rest, event.has_value());
         system.write(y);

@@ -12,7 +12,11 @@ namespace pn {
 // Select new modes at (t, y), and project y onto the constraints. Without an event, as at the start of a run, every
 // element gets its mode from its velocity. The workspace ends evaluated there, with the rate in dy. Return the changes,
 // empty without an event.
-std::vector<Event> switch_modes(System& system, double t, VecX& y, VecX& dy, const std::optional<FoundEvent>& event);
+//
+// The contacts of two bodies open if none of them has a load at a lift, or at a touch in vain. `let_go` receives their
+// gaps.
+std::vector<Event> switch_modes(System& system, double t, VecX& y, VecX& dy, const std::optional<FoundEvent>& event,
+                                std::vector<int>* let_go = nullptr);
 
 // Return the changes of modes since `before`. Contacts that open or close come first, then elements that stick or slip.
 // The element `turned` has reversed.

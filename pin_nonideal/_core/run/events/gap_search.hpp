@@ -40,10 +40,10 @@ private:
     Look above(Look look, double level) const;
     double level_here(int gap, double part) const;
     bool stays_open(int gap, const Look& a, const Look& b, double bound) const;
+    bool stays_on_plane(int gap, const Look& a, const Look& b);
     std::optional<Touch> search(int gap, const Look& a, const Look& b, const Bends& bends);
     Touch between(int gap, const Look& a, const Look& b);
     void bound_rates();
-    bool same_bodies(int gap, int other) const;
     bool has_held_copy(int gap) const;
     bool slides_on(int gap) const;  // the same two bodies touch at another point
     void look_at_starts(const std::vector<int>& gaps);

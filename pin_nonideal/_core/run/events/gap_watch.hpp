@@ -43,6 +43,7 @@ struct GapState {
     void keep(int gap, const GapLook& look);
     void find_near();
     void ask_in_vain(int gap, double t);
+    bool is_in_vain(int gap) const { return rests_until[gap] > -HUGE_VAL; }
     // Retry all blocked gaps, after a change of contacts.
     void ask_anew() { std::fill(rests_until.begin(), rests_until.end(), -HUGE_VAL); }
 };

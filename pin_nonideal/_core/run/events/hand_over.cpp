@@ -6,6 +6,7 @@
 #include "contact/queries.hpp"
 #include "dynamics/evaluation.hpp"
 #include "dynamics/projection.hpp"
+#include "dynamics/step_start.hpp"
 #include "tree/lie_group.hpp"
 
 namespace pn {
@@ -81,13 +82,19 @@ bool HandOver::find(int gap, double& size) {
     return true;
 }
 
-std::optional<double> HandOver::first(double size) {
-    std::optional<double> found;
+std::optional<HandOver::Found> HandOver::first(double size) {
+    std::optional<Found> found;
     for (int gap : w.now.touching) {
         if (is_bare(p, gap) || p.is_users(gap) || has_one_feature(p, gap)) continue;
-        if (find(gap, size)) found = size;
+        if (find(gap, size)) found = Found{size, gap};
     }
     return found;
+}
+
+bool HandOver::is_unloaded(int gap) {
+    system_.read(now_.y);
+    begin_step(p, w, now_.t, system_.q, system_.v);
+    return !bodies_press(p, w, gap);
 }
 
 void HandOver::pass(double time) {

@@ -13,9 +13,15 @@ class HandOver {
 public:
     HandOver(System& system, Progress& progress);
 
-    // Return the time from the current state to the first hand-over of a closed contact within `size`, on a motion with
-    // the current acceleration. The state after this time is the first one with the next feature.
-    std::optional<double> first(double size);
+    struct Found {
+        double time;  // from the current state
+        int gap;
+    };
+    // Return the first hand-over of a closed contact within `size`, on a motion with the current acceleration. The state
+    // after its time is the first one with the next feature.
+    std::optional<Found> first(double size);
+    // Check if the bodies of a gap have no load in the current state, so that their contacts need no hand-over.
+    bool is_unloaded(int gap);
     // Check if the motion with the current acceleration is exact up to this time.
     bool is_reached(double time) const;
     // Return the length of a step that ends just before a hand-over.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "contact/queries.hpp"
 #include "dynamics/evaluation.hpp"
 #include "dynamics/friction_limit.hpp"
 #include "dynamics/step_start.hpp"
@@ -25,10 +26,12 @@ ModeChanges::ModeChanges(System& system, Progress& progress, const Options& opti
 void ModeChanges::change(FoundEvent event) {
     const RunState before = w.state;
     bool struck = false;
+    std::vector<int> let_go;
+    event.in_vain = event.kind == FoundEvent::Kind::touch && event.index >= 0 && has_let_go(event.index);
     try {
         if (contacts_land(system_, now_.t, now_.y)) event = {FoundEvent::Kind::touch, -1, now_.t};
         struck = event.kind == FoundEvent::Kind::touch && landing_.strike(false);
-        for (const Event& found : switch_modes(system_, now_.t, now_.y, now_.rate, event)) {
+        for (const Event& found : switch_modes(system_, now_.t, now_.y, now_.rate, event, &let_go)) {
             out_.events.push_back(found);
             if (!struck) clusters_.count();
         }
@@ -42,11 +45,19 @@ void ModeChanges::change(FoundEvent event) {
     const bool same_modes = std::equal(before.mode.begin(), before.mode.end(), w.state.mode.begin());
     if (!same_modes || before.closed != w.state.closed) now_.gaps.ask_anew();
     else if (in_vain && !w.state.closed[event.index]) now_.gaps.ask_in_vain(event.index, now_.t);
+    for (int gap : let_go) now_.gaps.ask_in_vain(gap, now_.t);
     landing_.remember_gaps();
     if (struck) return end_bouncing();
     if (same_modes) clusters_.count();
     output_.configured_now();
     bridge(event.of_gap() ? 0 : event.index);
+}
+
+// Check if a contact of the same two bodies was let go, because no contact of theirs had a load.
+bool ModeChanges::has_let_go(int gap) const {
+    for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i)
+        if (now_.gaps.is_in_vain(i) && same_bodies(p, gap, i)) return true;
+    return false;
 }
 
 // End the bouncing. If the motion of a low flight is not found, bridge it by time stepping if possible.
@@ -102,7 +113,7 @@ bool ModeChanges::step_over(const Failure& failure) {
             go_on_with_new_modes();
             return true;
         } catch (const Failure& again) {  // the solver fails again a little later
-            if (!undecided(again)) throw;
+            if (system_.ng == 0 || !of_modes(again) || !leads_on(again)) throw;
         }
         if (now_.t >= options_.end()) return true;
     }

@@ -34,6 +34,7 @@ public:
 
 private:
     void end_bouncing();
+    bool has_let_go(int gap) const;
     void keep_last(const RunState& before, bool struck);
     static bool undecided(const Failure& failure);
     bool creeps() const;

@@ -118,17 +118,23 @@ void System::project_and_evaluate(double t, VecX& y, VecX& dy) {
 }
 
 // Act at the end of a time step whose modes may allow no motion. If they do not, and the run `goes_through`, the motion
-// is that of the step's friction.
+// is that of the step's friction. In other runs it is so if the solver found no motion of contacts, which proves nothing.
+// Return false if the motion is that of the step's friction.
 template <class Act>
-void System::go_through(double t, bool goes_through, const Act& act) {
+bool System::go_through(double t, bool goes_through, const Act& act) {
     try {
         act();
+        return true;
     } catch (const Failure& failure) {
         const bool of_modes = failure.kind == Failure::Kind::paradox || failure.kind == Failure::Kind::not_converged;
-        if (!goes_through || !of_modes) throw;
-        w.now.no_motion = true;
-        w.now.several_element = failure.elements.empty() ? 0 : failure.elements.front();
+        const bool undecided = failure.solutions == Failure::Solutions::not_told && ng > 0;
+        if (!of_modes || !(goes_through || undecided)) throw;
+        if (goes_through) {
+            w.now.no_motion = true;
+            w.now.several_element = failure.elements.empty() ? 0 : failure.elements.front();
+        }
         solve_with_step_friction(p, w, t, q, v);
+        return false;
     }
 }
 
@@ -137,11 +143,12 @@ void System::evaluate_step_end(double t, const VecX& y, VecX& dy, bool goes_thro
     read_law_states(y);
     w.now.no_motion = false;
     begin_rows(p, w, t, q, v);
-    go_through(t, goes_through, [&] {  // closed contacts that others hold apart may contradict each other
+    // Closed contacts that others hold apart may contradict each other.
+    const bool found = go_through(t, goes_through, [&] {
         assemble_forces(p, w, t, v);
         solve_dynamics(p, w, t, v);
     });
-    write_rate(t, dy, !goes_through);
+    write_rate(t, dy, found && !goes_through);
 }
 
 void System::settle(double t, VecX& y, VecX& dy, bool evaluates, bool goes_through) {
@@ -173,10 +180,11 @@ void System::settle(double t, VecX& y, VecX& dy, bool evaluates, bool goes_throu
     require_closed(p, w, t);
     if (past_sticking || (moved && evaluates)) chosen = configure_step(p, w);
     moved |= past_sticking;
-    go_through(t, goes_through, [&] { moved |= begin_step_on_rates(p, w, t, v, chosen, evaluates); });
-    moved |= w.now.no_motion;
+    const bool found =
+        go_through(t, goes_through, [&] { moved |= begin_step_on_rates(p, w, t, v, chosen, evaluates); });
+    moved |= !found;
     write(y);
-    if (evaluates) write_rate(t, dy, !goes_through);
+    if (evaluates) write_rate(t, dy, found && !goes_through);
     if (moved && energy) moved_energy = total() - before;
 }
 

@@ -79,7 +79,7 @@ private:
     void watch_loads(VecX& dy);
     double energy_at(const VecX& y);
     template <class Act>
-    void go_through(double t, bool goes_through, const Act& act);
+    bool go_through(double t, bool goes_through, const Act& act);
 
     VecX q_before_;
 };
