@@ -1,4 +1,4 @@
-"""Long chains of joints whose friction follows their loads, released level: far from the base loads are rounding."""
+"""Long chains of joints whose friction follows loads, from rest: far from the base loads are rounding."""
 
 from __future__ import annotations
 

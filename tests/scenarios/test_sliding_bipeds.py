@@ -8,7 +8,7 @@ import pytest
 
 import pin_nonideal as pn
 
-from ..support.mechanisms import GRAVITY, body, empty, frame
+from ..support.mechanisms import body, empty, frame
 
 SHANK, SOLE = 0.35, 0.07  # length of thigh and shank, and of the ankle above the ground [m]
 BALANCED = 1e-7  # energy balance relative to the energy

@@ -208,6 +208,7 @@ Simulation::Proposal Simulation::propose() {
 // Contacts of bodies without a load open at once: near a hand-over their rows can turn singular.
 std::optional<double> Simulation::to_hand_over() {
     const bool adaptive = options.method.adaptive();
+    hand_over_ahead = false;
     if (system.ng == 0 || (adaptive && !hands_over)) return std::nullopt;
     bool asks = true;
     for (;;) {
@@ -217,10 +218,12 @@ std::optional<double> Simulation::to_hand_over() {
         if (!next || next->time >= size * whole_way) return std::nullopt;  // passed in the step after a stop
         if (hand_over.is_reached(next->time)) {
             hand_over.pass(next->time);
+            handed_over = t;
         } else if (!std::exchange(asks, false) || !hand_over.is_unloaded(next->gap)) {
+            hand_over_ahead = true;
             return HandOver::step_before(next->time);
         }
-        modes.change({FoundEvent::Kind::lift, -1, t});
+        modes.change({FoundEvent::Kind::lift, -1, t, false, true});
         output.now();
     }
 }
@@ -347,7 +350,10 @@ bool Simulation::leaves_rate(const Proposal& proposal) const {
 // If no step is short enough, continue from the step's start with other modes or by time stepping. Return false if
 // neither applies.
 bool Simulation::goes_on(const Failure& failure) {
-    const bool may_end = modes.may_end(failure), leads_on = ModeChanges::leads_on(failure);
+    const bool may_end = modes.may_end(failure);
+    const bool at_hand_over = hand_over_ahead || t - handed_over <= chatter_time;
+    const bool of_hand_over = at_hand_over && ModeChanges::of_closed_contacts(failure);
+    const bool leads_on = of_hand_over || ModeChanges::leads_on(failure);
     if (!may_end && !leads_on) return false;
     try {
         back_to_start();
@@ -355,7 +361,7 @@ bool Simulation::goes_on(const Failure& failure) {
     } catch (const Failure& at_start) {  // the current modes have no motion at the step's start
         if (at_start.kind == Failure::Kind::interrupted) throw;
     }
-    return leads_on && modes.step_over(failure);
+    return leads_on && modes.step_over(failure, of_hand_over);
 }
 
 // Restore the modes and the dependent rows and forces of the step's start.

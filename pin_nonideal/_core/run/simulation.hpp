@@ -97,6 +97,7 @@ protected:
     std::optional<FoundEvent> event;  // event in the step just taken
     RunState before_step;      // run state at the step's start, set if `watched`
     bool watched = false;      // a contact was closed or an element active at the step's start
+    bool hand_over_ahead = false;  // the step ends before a hand-over
     bool stops_there = false;  // no other period continues from the state at t_end
     std::optional<Failure> opened;  // loop that a trial of this step could not close
 };

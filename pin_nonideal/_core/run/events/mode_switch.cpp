@@ -37,7 +37,8 @@ void ModeChanges::change(FoundEvent event) {
         }
     } catch (const Failure& failure) {
         keep_last(before, struck);
-        if (!leads_on(failure) || !step_over(failure)) throw;
+        const bool of_hand_over = event.of_hand_over && !struck && of_closed_contacts(failure);
+        if (!(of_hand_over || leads_on(failure)) || !step_over(failure, of_hand_over)) throw;
         return;
     }
     clusters_.remember();
@@ -104,11 +105,19 @@ void ModeChanges::bridge(int element) {
 // Check if the solver failed, which proves nothing.
 bool ModeChanges::undecided(const Failure& failure) { return failure.kind == Failure::Kind::not_converged; }
 
-bool ModeChanges::step_over(const Failure& failure) {
-    if (options_.method.outside() || system_.ne == 0) return false;
-    if (!(undecided(failure) || clusters_.dwindles() || creeps())) return false;
+bool ModeChanges::of_closed_contacts(const Failure& failure) {
+    using Kind = Failure::Kind;
+    return failure.kind == Kind::closure || failure.kind == Kind::inconsistent || failure.kind == Kind::not_finite ||
+           failure.kind == Kind::step_size;
+}
+
+bool ModeChanges::step_over(const Failure& failure, bool of_hand_over) {
+    if (options_.method.outside() || !(system_.ne > 0 || system_.ng > 0)) return false;
+    const bool of_elements = system_.ne > 0 && of_modes(failure) && !failure.elements.empty();
+    const int element = of_elements ? failure.elements.front() : 0;
+    if (!(of_hand_over || undecided(failure) || clusters_.dwindles() || creeps())) return false;
     for (;;) {
-        clusters_.step_over(failure.elements.empty() ? 0 : failure.elements.front(), options_.end());
+        clusters_.step_over(element, options_.end());
         try {
             go_on_with_new_modes();
             return true;

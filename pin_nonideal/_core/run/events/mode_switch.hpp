@@ -27,8 +27,10 @@ public:
     // Check if the failure only means that no motion or no step was found, which proves nothing.
     static bool leads_on(const Failure& failure);
     // Bridge by time stepping if no motion or no short enough step was found. Applies to an accumulation of events, to
-    // creeping slip, and to unilateral contacts without a solution. Return false if it does not apply.
-    bool step_over(const Failure& failure);
+    // creeping slip, to unilateral contacts without a solution, and beside a hand-over. Return false if it does not apply.
+    bool step_over(const Failure& failure, bool of_hand_over = false);
+    // Check if a step failed because closed contacts contradict each other or the accuracy.
+    static bool of_closed_contacts(const Failure& failure);
     // Bridge crowded events, and select modes at the new state.
     void bridge(int element);
 

@@ -47,10 +47,10 @@ static void fields(Archive& a, Progress& x) {
     auto& [t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, found_break, recent_events,
            last_changes, sides, bridged_time, bridged_end, slip_at_start, pulls, gaps, left, impact_energy, several,
            stiff_steps, quiet_steps, rounding, next_look, growth_times, growth_speeds, growth_steps, stands,
-           evaluated, turning_steps, hands_over] = x;
+           evaluated, turning_steps, hands_over, handed_over] = x;
     a(t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, found_break, sides, bridged_time,
       bridged_end, slip_at_start, pulls, left, impact_energy, several, stiff_steps, quiet_steps, rounding, next_look,
-      stands, evaluated, turning_steps, hands_over);
+      stands, evaluated, turning_steps, hands_over, handed_over);
     fields(a, gaps);
     a.list(recent_events);
     a.list(growth_times);

@@ -40,6 +40,7 @@ struct Progress {
     bool stands = false, evaluated = false;
     int turning_steps = 0;  // consecutive stiff steps with turning slip, negative: not counted yet
     bool hands_over = false;  // a closed contact may pass to the next feature in the next step
+    double handed_over = -HUGE_VAL;  // time of the last hand-over
 };
 
 std::string to_bytes(Workspace& w, Progress& progress, Recording& out);
