@@ -14,7 +14,7 @@ from ..support.seeds import seeds
 
 PAD = (0.1, 0.2, 0.1)  # edges of a pad [m]
 # A gap of rounding turns a body that leaves a pad. This is its largest effect on the position [m].
-# Boxes that an unsymmetric choice of closed corners turns between the pads, by 1e-5 m (docs/reference/limits.md).
+# Boxes that an unsymmetric choice of closed corners turns between pads, by 1e-5 m (docs/reference/limits.md).
 TURNING = {("box", 3)}
 POSITION = 1e-7
 KINDS = ("box", "capsule", "ball")
