@@ -102,6 +102,30 @@ bool BlockNewton::project(const BlockProblem& p, const Island& island, VecX& f) 
     return changes;
 }
 
+void BlockNewton::sweep(const BlockProblem& p, const Island& island, int sweeps, VecX& f, VecX& x, VecX& w) {
+    compliance_ = 0.0;
+    move(p, island, f, x, w);
+    for (int sweep = 0; sweep < sweeps; ++sweep)
+        for (int i : island.elements) {
+            const BlockElement& e = p.elements[i];
+            p.respond(e, x, w);
+            for (int r = e.row; r < e.row + e.dim(); ++r) y_[r] = f[r] - rho_[r] * (w[r] + p.offset[r]);
+            const Projection there = projection(e, y_.data() + e.row);
+            for (int k = 0; k < e.dim(); ++k) {
+                df_[e.row + k] = there.P[k] - f[e.row + k];
+                f[e.row + k] = there.P[k];
+            }
+            for (int n : e.node)
+                if (n >= 0) dx_.segment(p.nodes[n].first, p.nodes[n].size).setZero();
+            p.push(e, df_, dx_);
+            for (int n : e.node) {
+                if (n < 0) continue;
+                p.solve_mass(n, dx_);
+                x.segment(p.nodes[n].first, p.nodes[n].size) += dx_.segment(p.nodes[n].first, p.nodes[n].size);
+            }
+        }
+}
+
 // Evaluate the errors e and their squared length in units of energy. Return the largest error of an element relative to
 // its forces, or to those of the largest free velocity.
 double BlockNewton::evaluate(const BlockProblem& p, const Island& island, const VecX& f, const VecX& w, double& merit) {

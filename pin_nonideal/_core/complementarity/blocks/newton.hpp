@@ -37,6 +37,8 @@ public:
     // `factor` keeps the order of elimination of the island.
     double solve(const BlockProblem& p, const Island& island, BlockFactor& factor, Search search, double compliance,
                  VecX& f, VecX& x, VecX& w);
+    // Improve f and x by sweeps of projected Gauss-Seidel, one element after another.
+    void sweep(const BlockProblem& p, const Island& island, int sweeps, VecX& f, VecX& x, VecX& w);
     // Compute x and w of the island under the forces f.
     void move(const BlockProblem& p, const Island& island, const VecX& f, VecX& x, VecX& w) const;
     // Find the element of an island with the largest relative error, and that error as a velocity.

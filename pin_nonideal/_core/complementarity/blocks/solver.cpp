@@ -14,6 +14,7 @@ constexpr double first_block_compliance = 1.0, min_block_compliance = 1e-7;  // 
 constexpr double first_factor = 0.1, last_factor = 0.95;           // ratio of successive compliances
 constexpr double attempted_from = 1e-2;    // largest compliance from which a solution is attempted
 constexpr int most_stages = 30;
+constexpr int most_rounds = 8, sweeps_a_round = 50;
 
 }  // namespace
 
@@ -71,12 +72,23 @@ bool BlockSolver::stiffen(int island, VecX& f) {
     return false;
 }
 
+// Alternate sweeps and Newton's method: sweeps leave the set of sliding elements in which Newton's method goes round.
+bool BlockSolver::settle(int island, VecX& f) {
+    on_path_ = best_;
+    for (int round = 0; round < most_rounds; ++round) {
+        newton_.sweep(problem, islands_[island], sweeps_a_round, on_path_, x_, w_);
+        f = on_path_;
+        if (attempt(island, f) || least_ <= tolerated) return true;
+    }
+    return false;
+}
+
 // Solve an island by Newton's method from the guess, else along the path of compliances. Return the error.
 double BlockSolver::solve(int island, VecX& f) {
     least_ = newton(island, BlockNewton::Search::bold, 0.0, f);
     if (least_ <= accepted) return least_;
     best_ = f;
-    if (!attempt(island, f) && least_ > tolerated) stiffen(island, f);
+    if (!attempt(island, f) && least_ > tolerated && !settle(island, f)) stiffen(island, f);
     f = best_;
     newton_.move(problem, islands_[island], f, x_, w_);
     return least_;

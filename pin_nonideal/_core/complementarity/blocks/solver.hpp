@@ -33,6 +33,7 @@ public:
 
 private:
     double solve(int island, VecX& f);
+    bool settle(int island, VecX& f);
     bool stiffen(int island, VecX& f);
     bool attempt(int island, VecX& f);
     double newton(int island, BlockNewton::Search search, double compliance, VecX& f);
