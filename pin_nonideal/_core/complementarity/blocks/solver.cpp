@@ -72,7 +72,7 @@ bool BlockSolver::stiffen(int island, VecX& f) {
     return false;
 }
 
-// Alternate sweeps and Newton's method: sweeps leave the set of sliding elements in which Newton's method goes round.
+// Alternate sweeps and Newton's method. Newton's method may cycle between sets of sliding elements, which sweeps leave.
 bool BlockSolver::settle(int island, VecX& f) {
     on_path_ = best_;
     for (int round = 0; round < most_rounds; ++round) {
@@ -83,7 +83,8 @@ bool BlockSolver::settle(int island, VecX& f) {
     return false;
 }
 
-// Solve an island by Newton's method from the guess, else along the path of compliances. Return the error.
+// Solve an island by Newton's method from the guess, else after sweeps, else along the path of compliances. Return the
+// error.
 double BlockSolver::solve(int island, VecX& f) {
     least_ = newton(island, BlockNewton::Search::bold, 0.0, f);
     if (least_ <= accepted) return least_;
