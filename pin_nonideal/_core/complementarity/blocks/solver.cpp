@@ -14,7 +14,7 @@ constexpr double first_block_compliance = 1.0, min_block_compliance = 1e-7;  // 
 constexpr double first_factor = 0.1, last_factor = 0.95;           // ratio of successive compliances
 constexpr double attempted_from = 1e-2;    // largest compliance from which a solution is attempted
 constexpr int most_stages = 30;
-constexpr int most_rounds = 8, sweeps_a_round = 50;
+constexpr int most_sweep_rounds = 8, sweeps_a_round = 50;
 
 }  // namespace
 
@@ -75,7 +75,7 @@ bool BlockSolver::stiffen(int island, VecX& f) {
 // Alternate sweeps and Newton's method. Newton's method may cycle between sets of sliding elements, which sweeps leave.
 bool BlockSolver::settle(int island, VecX& f) {
     on_path_ = best_;
-    for (int round = 0; round < most_rounds; ++round) {
+    for (int round = 0; round < most_sweep_rounds; ++round) {
         newton_.sweep(problem, islands_[island], sweeps_a_round, on_path_, x_, w_);
         f = on_path_;
         if (attempt(island, f) || least_ <= tolerated) return true;
