@@ -8,13 +8,10 @@
 #include "dynamics/evaluation.hpp"
 #include "dynamics/power.hpp"
 #include "dynamics/projection.hpp"
-#include "dynamics/friction_limit.hpp"
 #include "dynamics/acceleration.hpp"
 #include "dynamics/step_start.hpp"
-#include "friction/problem.hpp"
 #include "friction/stick_slip.hpp"
 #include "run/time_stepping/moreau.hpp"
-#include "tree/mass_factor.hpp"
 #include "tree/lie_group.hpp"
 #include "tree/terms.hpp"
 
@@ -22,10 +19,6 @@ namespace pn {
 
 namespace {
 
-constexpr double contact_load_tolerance = 1e-12;  // change of limits that counts as rounding, relative to the largest limit
-// Maximum ratio of two changes of limits from passes that converge. Slower limits follow force components that the
-// cones leave open, such as the direction of slow slip.
-constexpr double max_load_contraction = 0.5;
 constexpr double cone_force_rounding = 1e-9;  // distance of a force at its limit, relative to the limit
 constexpr double width_rounding = 1e-12;  // uncertainty of a gap at rest, relative to the scene's size
 // Accepted residual relative to the velocities. A step of a turning body can have no exact solution if corners share
@@ -39,24 +32,17 @@ constexpr double most_relaxed = 1e-2;
 
 MoreauContacts::MoreauContacts(System& system, GapWatch& watch)
     : system_(system), p(system.p), w(system.w), mean_(p), drives_(p), flight_(p, drives_), watch_(watch),
-      was_closed_(system.ng, 0), closed_(system.ng, 0), open_(system.ng, 0), modes_(system.ne, unloaded),
+      elements_(p), was_closed_(system.ng, 0), closed_(system.ng, 0), open_(system.ng, 0), modes_(system.ne, unloaded),
       unloaded_(modes_), q_mid_(VecX::Zero(system.nq)), v0_(VecX::Zero(system.nv)), v1_(v0_), a_free_(v0_),
-      power_(VecX::Zero(system.nw)), trees_(system.p), projection_(system.p), zero_(VecX::Zero(p.layout.rows)), force_(v0_) {
+      power_(VecX::Zero(system.nw)), trees_(system.p), projection_(system.p), responses_(system.p), force_(v0_) {
     projection_.energy = system.energy;
     if (system.ng == 0) return;
     solver_.take_misses(most_miss);
     for (const Gap& gap : p.gaps) rounded_by_.push_back(rounded_by(p.blocks[gap.block].kind));
     rounded_ = std::any_of(rounded_by_.begin(), rounded_by_.end(), [](double r) { return r < HUGE_VAL; });
-    for (int e = 0; e < system.ne; ++e)
-        if (p.frictions[e].gap < 0) own_.push_back(e);
-    const int most = p.layout.rows;
-    unit_ = lam_ = lam_free_ = zero_;
-    w0_ = w1_ = f_ = offset_ = middle_ = free_response_ = VecX::Zero(most);
+    lam_free_ = VecX::Zero(p.layout.rows);
+    w0_ = w1_ = f_ = offset_ = middle_ = lam_free_;
     touching_.reserve(system.ng);
-    rubbing_.reserve(system.ne);
-    rows_.reserve(most);
-    parts_.reserve(most);
-    cones_.reserve(most);
 }
 
 double MoreauContacts::allowed(double t, double h, const VecX& y) {
@@ -106,14 +92,14 @@ void MoreauContacts::step(double t, double h, VecX& y, double& moved_energy, dou
     sweep(middle, drives, true);
     while (mean_.move() && correct(middle, drives)) {}
     flight_.begin();
-    for (const StepRow& row : rows_) flight_.touch(p.blocks[row.block]);
+    for (const StepRow& row : elements_.rows) flight_.touch(p.blocks[row.block]);
     flight_.move(p, w, h, y.data(), v0_, mean_.value(), v1_);
     if (system_.energy) {
         moved_energy += drives.energy(mean_.start(), mean_.finish());
         book_work(y, moved_energy, impact_energy);
     }
-    select(closed_, modes_, rows_.empty());
-    marked_ = watched || !rows_.empty();
+    select(closed_, modes_, elements_.rows.empty());
+    marked_ = watched || !elements_.rows.empty();
     if (system_.nz > 0) y.segment(system_.nq + system_.nv, system_.nz) += h * w.now.dz;
     force_ = 0.5 * h * v1_;
     retract(m, q_mid_.data(), force_.data(), y.data());
@@ -139,16 +125,19 @@ void MoreauContacts::sweep(double t, JointDrives::Step& drives, bool first) {
     solve_free(t);
     if (first) {
         find_touching(t);
-        add_rows();
+        elements_.gather(p, w, touching_, modes_, v0_);
     } else {
         move_touching(t);
     }
     measure_free();
-    const bool anew = first || p.has_user_rows;
-    if (anew) separate_ = !limits_follow_loads() && trees_.pose(p, w, rows_, cones_, a_free_, offset_);
-    else if (separate_) trees_.release(a_free_, offset_);
-    responded_ &= !anew;
-    if (!separate_) respond();
+    if (first || p.has_user_rows) {
+        responses_.forget();
+        separate_ = !elements_.limits_follow_loads(p) &&
+                    trees_.pose(p, w, elements_.rows, elements_.cones, a_free_, offset_);
+    } else if (separate_) {
+        trees_.release(a_free_, offset_);
+    }
+    if (!separate_) responses_.find(p, w, elements_.rows);
     recall_forces();
     solve(t);
     end_velocity();
@@ -184,11 +173,10 @@ void MoreauContacts::solve_free(double t) {
         w.now.rows.distance = 1.0;
         return;
     }
-    unit_ = w.now.b;
-    mean_.meet_at_end(p, w, unit_);
+    b_ = w.now.b;
+    mean_.meet_at_end(p, w, b_);
     lam_free_ = w.now.lam;
-    solve_motion(p, w, p.has_laws(), unit_, a_free_, lam_free_);
-    unit_.setZero();
+    solve_motion(p, w, p.has_laws(), b_, a_free_, lam_free_);
 }
 
 // Return the travel of each dof since the last sample of the gaps, including projections. It is at least that of the
@@ -226,205 +214,81 @@ void MoreauContacts::move_touching(double t) {
         move_block(p, w, t, mean_.value(), p.gaps[i].block);
         for (int e : p.gaps[i].elements) move_block(p, w, t, mean_.value(), p.frictions[e].block);
     }
-    for (size_t e = 0; e < parts_.size(); ++e)
-        if (parts_[e].gap >= 0 && parts_[e].element >= 0) cones_[e].bound = coefficient(parts_[e]);
-}
-
-// Return the coefficient of a contact: the static one if it sticks or comes to rest.
-double MoreauContacts::coefficient(const Part& part) const {
-    const Friction& friction = p.frictions[part.element];
-    return part.rests ? friction.holding_limit(friction.mu)
-                      : friction.kinetic_limit(friction.mu, slip_velocity(w.now, friction).norm());
-}
-
-void MoreauContacts::add_part(Part part, int block, int kept, ConeElement element) {
-    for (int k = 0; k < kept; ++k) rows_.push_back({block, k});
-    if (part.gap >= 0 && part.element >= 0) {
-        const int slip = p.frictions[part.element].block;
-        for (size_t k = 0; k < p.blocks[slip].kept.size(); ++k) rows_.push_back({slip, static_cast<int>(k)});
-    }
-    parts_.push_back(part);
-    cones_.push_back(element);
-}
-
-// Add the rows of contacts with their sliding, then the rows of other dry friction.
-void MoreauContacts::add_rows() {
-    rows_.clear();
-    parts_.clear();
-    cones_.clear();
-    rubbing_ = own_;
-    for (int i : touching_) {
-        const Gap& gap = p.gaps[i];
-        const int slides = gap.sliding < 0 ? 0 : static_cast<int>(p.blocks[p.frictions[gap.sliding].block].kept.size());
-        Part part{i, gap.sliding, gap.restitution * std::min(0.0, gap_rate(p, w, i))};
-        part.rests = gap.sliding >= 0 && (modes_[gap.sliding] == sticking ||
-                                          slip_velocity(w.now, p.frictions[gap.sliding]).norm() <= rest_rate(v0_));
-        const double mu = gap.sliding < 0 ? 0.0 : coefficient(part);
-        add_part(part, gap.block, 1, ConeElement::contact(1 + slides, mu));
-        for (int e : gap.elements)
-            if (e != gap.sliding) rubbing_.push_back(e);
-    }
-    std::sort(rubbing_.begin(), rubbing_.end());
-    for (int e : rubbing_) {
-        const int block = p.frictions[e].block, kept = static_cast<int>(p.blocks[block].kept.size());
-        if (kept > 0) add_part({-1, e, 0.0}, block, kept, ConeElement::box(kept, 0.0));
-    }
-}
-
-// Check if a limit of dry friction follows a load. The loads must then be those of minimum norm among all that share
-// them alike: other ones need not settle.
-bool MoreauContacts::limits_follow_loads() const {
-    return std::any_of(rubbing_.begin(), rubbing_.end(), [&](int e) {
-        return p.frictions[e].gap >= 0 || p.frictions[e].load != Friction::Load::none;
-    });
-}
-
-// Compute the response to a unit of each force.
-void MoreauContacts::respond() {
-    const int n = static_cast<int>(rows_.size());
-    if (n == 0 || responded_) return;
-    responded_ = true;
-    if (W_.rows() < n) {
-        W_.resize(n, n);
-        response_.resize(system_.nv, n);
-        multipliers_.resize(p.layout.rows, n);
-    }
-    scaled_ = !w.now.rows.refine;
-    for (int column = 0; column < n; ++column) {
-        const StepRow& row = rows_[column];
-        const Block& block = p.blocks[row.block];
-        force_.setZero();
-        unit_[block.row + row.k] = 1.0;
-        add_transpose(block, w.now.A, unit_, force_);
-        unit_[block.row + row.k] = 0.0;
-        double free;
-        if (scaled_) {
-            free = solve_scaled(p, w, force_, nullptr, zero_, lam_);
-            response_.col(column) = force_;
-        } else {
-            solve_acceleration(p, w, force_, zero_, v1_, lam_);
-            response_.col(column) = v1_;
-            solve_R(p.mechanism, w.now.terms, force_);
-            free = force_.squaredNorm();
-            for (int i = 0; i < n; ++i) {
-                multiply(p.blocks[rows_[i].block], w.now.A, v1_, w.scratch.r);
-                W_(i, column) = w.scratch.r[p.blocks[rows_[i].block].row + rows_[i].k];
-            }
-        }
-        if (!w.now.rows.blocks.empty()) multipliers_.col(column) = lam_;
-        free_response_[column] = free;
-    }
-    if (scaled_) gram(response_, n, W_);
-    for (int i = 0; i < n; ++i)
-        if (W_(i, i) <= min_constrained_response * free_response_[i]) W_(i, i) = 0.0;
-    for (int i = 0; i < n; ++i)
-        for (int j = 0; j < i; ++j) {
-            const bool held = W_(i, i) == 0.0 || W_(j, j) == 0.0;
-            W_(i, j) = W_(j, i) = held ? 0.0 : 0.5 * (W_(i, j) + W_(j, i));
-        }
+    elements_.move(p, w);
 }
 
 // Compute the velocities at the step's end without the forces, over h.
 void MoreauContacts::measure_free() {
-    const int n = static_cast<int>(rows_.size());
+    const int n = static_cast<int>(elements_.rows.size());
     for (int i = 0; i < n; ++i) {
-        const Block& block = p.blocks[rows_[i].block];
-        if (i == 0 || rows_[i].block != rows_[i - 1].block) mean_.start_rates(p, w, rows_[i].block);
-        const double drift = w.now.values[rows_[i].block].drift[block.kept[rows_[i].k]];
-        offset_[i] = w.scratch.r[block.row + rows_[i].k] / h_ + 0.5 * drift;
+        const Block& block = p.blocks[elements_.rows[i].block];
+        if (i == 0 || elements_.rows[i].block != elements_.rows[i - 1].block) mean_.start_rates(p, w, elements_.rows[i].block);
+        const double drift = w.now.values[elements_.rows[i].block].drift[block.kept[elements_.rows[i].k]];
+        offset_[i] = w.scratch.r[block.row + elements_.rows[i].k] / h_ + 0.5 * drift;
     }
-    for (size_t e = 0, at = 0; e < parts_.size(); at += cones_[e].dim, ++e) offset_[at] += parts_[e].approach / h_;
+    for (size_t e = 0, at = 0; e < elements_.parts.size(); at += elements_.cones[e].dim, ++e)
+        offset_[at] += elements_.parts[e].approach / h_;
     for (int i = 0; i < n; ++i) {
-        const Block& block = p.blocks[rows_[i].block];
-        if (i == 0 || rows_[i].block != rows_[i - 1].block) multiply(block, w.now.A, a_free_, w.scratch.r);
-        w0_[i] = offset_[i] + w.scratch.r[block.row + rows_[i].k];
+        const Block& block = p.blocks[elements_.rows[i].block];
+        if (i == 0 || elements_.rows[i].block != elements_.rows[i - 1].block) multiply(block, w.now.A, a_free_, w.scratch.r);
+        w0_[i] = offset_[i] + w.scratch.r[block.row + elements_.rows[i].k];
     }
 }
 
 // Guess the forces of the last step.
 void MoreauContacts::recall_forces() {
-    for (size_t i = 0; i < rows_.size(); ++i) f_[i] = w.state.percussion[p.blocks[rows_[i].block].row + rows_[i].k];
+    for (size_t i = 0; i < elements_.rows.size(); ++i) {
+        const StepRow& row = elements_.rows[i];
+        f_[i] = w.state.percussion[p.blocks[row.block].row + row.k];
+    }
 }
 
 // Compute the motion under the forces f.
 void MoreauContacts::apply() {
-    const int n = static_cast<int>(rows_.size());
+    const int n = static_cast<int>(elements_.rows.size());
     w.now.a = a_free_;
     w.now.renew();
     if (n == 0) return;
     if (separate_) {
         trees_.move(f_, w.now.a, w1_);
     } else {
-        force_.noalias() = response_.leftCols(n) * f_.head(n);
-        if (scaled_) solve_Rt(p.mechanism, w.now.terms, force_);
-        w.now.a += force_;
+        responses_.add_motion(p, w, f_, n, w.now.a);
     }
     if (w.now.rows.blocks.empty()) w.now.lam.setZero();
     else {
         w.now.lam = lam_free_;
-        w.now.lam.noalias() += multipliers_.leftCols(n) * f_.head(n);
+        responses_.add_multipliers(f_, n, w.now.lam);
     }
-    for (size_t e = 0, at = 0; e < parts_.size(); at += cones_[e].dim, ++e) {
-        const int head = parts_[e].gap >= 0;
-        if (head) w.now.lam[p.blocks[p.gaps[parts_[e].gap].block].row] = f_[at];
-        if (parts_[e].element < 0) continue;
-        Vec3& force = w.now.slip_force[parts_[e].element];
+    for (size_t e = 0, at = 0; e < elements_.parts.size(); at += elements_.cones[e].dim, ++e) {
+        const int head = elements_.parts[e].gap >= 0;
+        if (head) w.now.lam[p.blocks[p.gaps[elements_.parts[e].gap].block].row] = f_[at];
+        if (elements_.parts[e].element < 0) continue;
+        Vec3& force = w.now.slip_force[elements_.parts[e].element];
         force = Vec3::Zero();
-        for (int k = head; k < cones_[e].dim; ++k) force[k - head] = f_[at + k];
+        for (int k = head; k < elements_.cones[e].dim; ++k) force[k - head] = f_[at + k];
     }
-}
-
-// Update the limits of dry friction to the loads of the current motion. Return true if they have converged.
-bool MoreauContacts::limits_settle(double t) {
-    double change = 0.0, largest = 0.0;
-    for (size_t e = 0; e < parts_.size(); ++e) {
-        if (!cones_[e].is(ConeElement::Kind::box)) continue;
-        const Friction& friction = p.frictions[parts_[e].element];
-        const bool rests = mean_.start_speed(p, w, friction) == 0.0;
-        const double speed = slip_velocity(w.now, friction).norm();
-        const SlipLimits load = friction.gap >= 0 ? SlipLimits(friction.constant + friction.mu * w.now.lam[friction.row])
-                                                  : load_limits(p, w, friction, t, w.now.terms.q, mean_.value());
-        const SlipLimits limits = load * (rests ? friction.static_ratio : friction.speed_factor(speed));
-        const double limit = limits.reach();
-        change = std::max({change, std::abs(limit - cones_[e].bound), std::abs(limits.middle() - parts_[e].middle)});
-        largest = std::max(largest, limit);
-        cones_[e].bound = std::max(0.0, limit);
-        parts_[e].middle = limits.middle();
-    }
-    const bool settles = change <= contact_load_tolerance * largest ||
-                         (change > max_load_contraction * last_change_ &&
-                          change <= most_miss * f_.head(static_cast<int>(rows_.size())).cwiseAbs().maxCoeff());
-    last_change_ = change;
-    return settles;
-}
-
-// Collect the middles of the limits. Boxes of the cone problem are centered at zero force.
-void MoreauContacts::collect_middles() {
-    middle_.head(static_cast<Eigen::Index>(rows_.size())).setZero();
-    for (size_t e = 0, at = 0; e < parts_.size(); at += cones_[e].dim, ++e)
-        if (parts_[e].middle != 0.0) middle_[at] = parts_[e].middle;
 }
 
 // Solve the laws tree by tree if possible, else with the responses of all rows.
 bool MoreauContacts::solve_laws() {
-    const int n = static_cast<int>(rows_.size());
-    collect_middles();
+    const int n = static_cast<int>(elements_.rows.size());
+    elements_.middles(middle_);
     guess_ = f_.head(n);
-    const double error = separate_ ? trees_.solve(cones_, middle_, f_) : HUGE_VAL;
+    const double error = separate_ ? trees_.solve(elements_.cones, middle_, f_) : HUGE_VAL;
     bool solved = error <= most_miss;
     const bool starts = v0_.cwiseAbs().maxCoeff() <= rest_speed && !(unheld_.size() > 0 && unheld_ == q0_);
     if (solved && !(starts && moves())) return true;
-    respond();
+    responses_.find(p, w, elements_.rows);
     if (!solved) {
         relaxed_f_ = f_.head(n);
         f_.head(n) = guess_;
     }
-    const auto W = W_.topLeftCorner(n, n);
+    const auto W = responses_.matrix(n);
     f_.head(n) -= middle_.head(n);
     w1_.head(n) = w0_.head(n);
     w1_.head(n).noalias() += W * middle_.head(n);
     solver_.search_briefly(error <= most_relaxed);
-    if (!solved) solved = solver_.solve(W, w1_.head(n), cones_, true, f_.head(n), true) == ConeStatus::solved;
+    if (!solved) solved = solver_.solve(W, w1_.head(n), elements_.cones, true, f_.head(n), true) == ConeStatus::solved;
     if (starts) solved = keep_rest(solved) || solved;
     f_.head(n) += middle_.head(n);
     if (!solved && error <= most_relaxed) {
@@ -438,20 +302,20 @@ bool MoreauContacts::solve_laws() {
 // Accept the best forces found, although they miss the laws of contact.
 void MoreauContacts::relax() {
     const BlockSolver::Miss& miss = trees_.miss();
-    const Part& part = parts_[miss.element];
+    const StepElements::Part& part = elements_.parts[miss.element];
     relaxed_ = {part.gap >= 0 ? p.gaps[part.gap].block : p.frictions[part.element].block, h_ * miss.velocity};
 }
 
 // Compute the rows under the forces f.
 void MoreauContacts::measure_end() {
-    const int n = static_cast<int>(rows_.size());
+    const int n = static_cast<int>(elements_.rows.size());
     if (separate_) return trees_.move(f_, v1_, w1_);
     w1_.head(n) = w0_.head(n);
-    w1_.head(n).noalias() += W_.topLeftCorner(n, n) * f_.head(n);
+    w1_.head(n).noalias() += responses_.matrix(n) * f_.head(n);
 }
 
 bool MoreauContacts::moves() {
-    const int n = static_cast<int>(rows_.size());
+    const int n = static_cast<int>(elements_.rows.size());
     measure_end();
     if (separate_) return !trees_.rests(v1_);
     return w1_.head(n).cwiseAbs().maxCoeff() > cone_force_rounding * w0_.head(n).cwiseAbs().maxCoeff();
@@ -460,23 +324,24 @@ bool MoreauContacts::moves() {
 // Rest goes on if forces within all cones hold it. Returns whether they do, with these forces in place of others. The
 // rows without forces are in w1.
 bool MoreauContacts::keep_rest(bool solved) {
-    const int n = static_cast<int>(rows_.size());
-    const auto W = W_.topLeftCorner(n, n);
+    const int n = static_cast<int>(elements_.rows.size());
+    const auto W = responses_.matrix(n);
     const bool moves = (w1_.head(n) + W * f_.head(n)).cwiseAbs().maxCoeff() >
                        cone_force_rounding * w1_.head(n).cwiseAbs().maxCoeff();
     if (solved && !moves) return false;
-    const bool holds = solver_.hold(W, w1_.head(n), cones_, f_.head(n));
+    const bool holds = solver_.hold(W, w1_.head(n), elements_.cones, f_.head(n));
     if (!holds) unheld_ = q0_;  // the next sweeps and the step after the start need not ask again
     return holds;
 }
 
 void MoreauContacts::solve(double t) {
-    const int n = static_cast<int>(rows_.size());
-    const bool loads = n > 0 && cones_.back().is(ConeElement::Kind::box);  // limits that may depend on the motion
-    last_change_ = HUGE_VAL;
+    const int n = static_cast<int>(elements_.rows.size());
+    const bool loads = n > 0 && elements_.cones.back().is(ConeElement::Kind::box);  // limits that may depend on the motion
+    elements_.begin_passes();
     for (int pass = 0; n > 0; ++pass) {
         if (loads || pass > 0) apply();
-        if (limits_settle(t) && pass > 0) break;
+        const double allowed = most_miss * f_.head(n).cwiseAbs().maxCoeff();
+        if (elements_.limits_settle(p, w, t, mean_, allowed) && pass > 0) break;
         if (pass == max_load_passes) throw Failure(Failure::Kind::not_converged, t);
         if (!solve_laws()) throw Failure(Failure::Kind::not_converged, t);
         ++w.counters.iterations;
@@ -484,7 +349,7 @@ void MoreauContacts::solve(double t) {
     if (n == 0) apply();
     if (presses_ || n > 0) w.state.percussion.setZero();
     presses_ = n > 0;
-    for (int i = 0; i < n; ++i) w.state.percussion[p.blocks[rows_[i].block].row + rows_[i].k] = f_[i];
+    for (int i = 0; i < n; ++i) w.state.percussion[p.blocks[elements_.rows[i].block].row + elements_.rows[i].k] = f_[i];
     if (n == 0) return;
     const ConeResiduals r = residuals();
     w.counters.signorini = std::max(w.counters.signorini, r.signorini);
@@ -493,18 +358,18 @@ void MoreauContacts::solve(double t) {
 }
 
 ConeResiduals MoreauContacts::residuals() {
-    const int n = static_cast<int>(rows_.size());
+    const int n = static_cast<int>(elements_.rows.size());
     if (separate_) return trees_.residuals(middle_, f_);
-    const auto W = W_.topLeftCorner(n, n);
+    const auto W = responses_.matrix(n);
     w1_.head(n) = w0_.head(n);
     w1_.head(n).noalias() += W * middle_.head(n);
-    return ConeComplementarity::residuals(W, w1_.head(n), cones_, f_.head(n) - middle_.head(n));
+    return ConeComplementarity::residuals(W, w1_.head(n), elements_.cones, f_.head(n) - middle_.head(n));
 }
 
 // Compute the velocity, the closed contacts and the modes at the step's end. An element sticks if its force stays below
 // its limit, or if its slip is zero.
 void MoreauContacts::end_velocity() {
-    const int n = static_cast<int>(rows_.size());
+    const int n = static_cast<int>(elements_.rows.size());
     if (n > 0) measure_end();
     mean_.end(w.now.a, v1_);
     if (marked_) {
@@ -514,12 +379,12 @@ void MoreauContacts::end_velocity() {
     if (n == 0) return;
     const double still = rest_rate(v1_), clear = cone_force_rounding * f_.head(n).cwiseAbs().maxCoeff();
     w1_.head(n) *= h_;
-    for (size_t e = 0, at = 0; e < parts_.size(); at += cones_[e].dim, ++e) {
-        const Part& part = parts_[e];
-        const int head = part.gap >= 0, dim = cones_[e].dim - head;
+    for (size_t e = 0, at = 0; e < elements_.parts.size(); at += elements_.cones[e].dim, ++e) {
+        const StepElements::Part& part = elements_.parts[e];
+        const int head = part.gap >= 0, dim = elements_.cones[e].dim - head;
         if (head) closed_[part.gap] = w1_[at] - part.approach <= still;
         if (part.element < 0 || (head && !closed_[part.gap])) continue;
-        const double limit = cones_[e].bound * (head ? f_[at] : 1.0);
+        const double limit = elements_.cones[e].bound * (head ? f_[at] : 1.0);
         const double size = dim == 1 ? std::abs(f_[at + head] - part.middle) : f_.segment(at + head, dim).norm();
         const bool rests = w1_.segment(at + head, dim).norm() <= still;
         const bool held = limit - size > clear || rests;
@@ -532,7 +397,7 @@ void MoreauContacts::end_velocity() {
     const auto rest = [&](int e) {  // elements held by the constraints stick
         if (modes_[e] == unloaded && (p.frictions[e].gap < 0 || closed_[p.frictions[e].gap])) modes_[e] = sticking;
     };
-    for (int e : own_) rest(e);
+    for (int e : elements_.alone()) rest(e);
     for (int i : touching_)
         for (int e : p.gaps[i].elements) rest(e);
     marked_ = true;
@@ -541,25 +406,25 @@ void MoreauContacts::end_velocity() {
 // Add the work over the step, by the mean velocity. If a slip reverses inside the step, the friction that opposes its
 // end can do positive work on its mean velocity. This work is due to the scheme, not to friction.
 void MoreauContacts::book_work(VecX& y, double& moved_energy, double& impact_energy) {
-    const int n = static_cast<int>(rows_.size());
+    const int n = static_cast<int>(elements_.rows.size());
     if (!w.now.rows.blocks.empty()) {
         w.now.lam = lam_free_;
-        w.now.lam.noalias() += multipliers_.leftCols(n) * f_.head(n);
+        responses_.add_multipliers(f_, n, w.now.lam);
     }
     force_ = 0.5 * (mean_.start() + mean_.finish());
     powers(p, w, force_, power_.data());
-    for (size_t e = 0, at = 0; e < parts_.size(); at += cones_[e].dim, ++e) {
+    for (size_t e = 0, at = 0; e < elements_.parts.size(); at += elements_.cones[e].dim, ++e) {
         double power = 0.0;
-        for (int k = 0; k < cones_[e].dim; ++k) {
-            const StepRow& row = rows_[at + k];
+        for (int k = 0; k < elements_.cones[e].dim; ++k) {
+            const StepRow& row = elements_.rows[at + k];
             multiply(p.blocks[row.block], w.now.A, force_, w.scratch.r);
             const double part = w.scratch.r[p.blocks[row.block].row + row.k] * f_[at + k];
-            if (k == 0 && parts_[e].gap >= 0) impact_energy += h_ * part;
+            if (k == 0 && elements_.parts[e].gap >= 0) impact_energy += h_ * part;
             else power += part;
         }
-        if (parts_[e].element < 0) continue;
+        if (elements_.parts[e].element < 0) continue;
         if (power > 0.0) moved_energy += h_ * power;
-        else power_[first_law_power + p.frictions[parts_[e].element].law] += power;
+        else power_[first_law_power + p.frictions[elements_.parts[e].element].law] += power;
     }
     system_.work(y) += h_ * power_;
 }

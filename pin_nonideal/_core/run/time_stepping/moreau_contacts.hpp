@@ -12,6 +12,8 @@
 #include "run/time_stepping/joint_drives.hpp"
 #include "run/time_stepping/mean_velocity.hpp"
 #include "run/time_stepping/separate_trees.hpp"
+#include "run/time_stepping/step_elements.hpp"
+#include "run/time_stepping/step_responses.hpp"
 
 namespace pn {
 
@@ -47,14 +49,6 @@ public:
     const Relaxed& relaxed() const { return relaxed_; }
 
 private:
-    struct Part {              // part of the cone problem
-        int gap = -1;          // gap of a contact, -1 if none
-        int element = -1;      // friction element: sliding of the contact, or a box
-        double approach = 0.0; // restitution times the closing rate of the gap, at most 0
-        double middle = 0.0;   // middle of the limits of a box with one direction
-        bool rests = false;    // the contact sticks at the step's start
-    };
-
     bool tells_way_out(int gap, double width) const { return width > -nearly_all * rounded_by_[gap]; }
     void select(const std::vector<char>& closed, const std::vector<Mode>& modes, bool flies);
     void sweep(double t, JointDrives::Step& drives, bool first);
@@ -63,12 +57,8 @@ private:
     const VecX& way_since_last();
     void find_touching(double t);
     void move_touching(double t);
-    void add_rows();
-    void add_part(Part part, int first_block, int kept, ConeElement element);
-    void respond();
     void measure_free();
     void recall_forces();
-    void collect_middles();
     bool solve_laws();
     void relax();
     void measure_end();
@@ -77,11 +67,8 @@ private:
     ConeResiduals residuals();
     void solve(double t);
     void apply();
-    bool limits_follow_loads() const;
-    bool limits_settle(double t);
     void end_velocity();
     void book_work(VecX& y, double& moved_energy, double& impact_energy);
-    double coefficient(const Part& part) const;
 
     System& system_;
     const Program& p;
@@ -90,29 +77,24 @@ private:
     MeanVelocity mean_;
     JointDrives drives_;
     FreeFlight flight_;
-    double h_ = 0.0, last_change_ = 0.0;  // step, and last change of the limits between passes
-    double t0_ = 0.0;         // start of the step
+    double h_ = 0.0, t0_ = 0.0;  // length and start of the step
     VecX q0_;
     GapWatch& watch_;
-    std::vector<int> touching_, own_;  // gaps that take part, and friction elements of no unilateral contact
-    std::vector<int> rubbing_;         // friction elements that take part, except the sliding of contacts
+    std::vector<int> touching_;  // gaps that take part
+    StepElements elements_;
     std::vector<char> was_closed_, closed_, open_;
     std::vector<Mode> modes_, unloaded_;
     std::vector<double> rounded_by_;   // rounding of each gap
     bool rounded_ = false;             // a gap has rounding
     bool marked_ = false;  // the last step had a closed contact or an active element
-    std::vector<StepRow> rows_;
-    std::vector<Part> parts_;
-    std::vector<ConeElement> cones_;
-    bool scaled_ = true;   // the response is a_s = R^T a
     bool presses_ = true;  // percussions of the last step may be nonzero
     VecX q_mid_, q_looked_, unheld_, v0_, v1_, a_free_, lam_free_, w0_, w1_, f_, power_;
-    VecX offset_, middle_, free_response_, guess_, relaxed_f_;
+    VecX offset_, middle_, guess_, relaxed_f_;
     SeparateTrees trees_;
     ContactProjection projection_;
-    bool separate_ = false, responded_ = false;  // solved tree by tree, responses of all rows are known
-    VecX unit_, zero_, force_, lam_;
-    MatX W_, response_, multipliers_;
+    bool separate_ = false;  // solved tree by tree
+    StepResponses responses_;
+    VecX b_, force_;
     ConeComplementarity solver_;
 };
 

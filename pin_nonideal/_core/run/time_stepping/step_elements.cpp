@@ -1,0 +1,113 @@
+#include "run/time_stepping/step_elements.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "contact/impact.hpp"
+#include "contact/queries.hpp"
+#include "dynamics/friction_limit.hpp"
+#include "friction/stick_slip.hpp"
+#include "tree/terms.hpp"
+
+namespace pn {
+
+namespace {
+
+constexpr double contact_load_tolerance = 1e-12;  // change of limits that counts as rounding, relative to the largest limit
+// Maximum ratio of two changes of limits from passes that converge. Slower limits follow force components that the
+// cones leave open, such as the direction of slow slip.
+constexpr double max_load_contraction = 0.5;
+
+}  // namespace
+
+StepElements::StepElements(const Program& p) {
+    for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e)
+        if (p.frictions[e].gap < 0) alone_.push_back(e);
+    const int most = p.layout.rows;
+    rows.reserve(most);
+    parts.reserve(most);
+    cones.reserve(most);
+    rubbing_.reserve(p.frictions.size());
+}
+
+// Return the coefficient of a contact: the static one if it sticks or comes to rest.
+double StepElements::coefficient(const Program& p, const Workspace& w, const Part& part) const {
+    const Friction& friction = p.frictions[part.element];
+    return part.rests ? friction.holding_limit(friction.mu)
+                      : friction.kinetic_limit(friction.mu, slip_velocity(w.now, friction).norm());
+}
+
+void StepElements::add(const Program& p, const Part& part, int block, int kept, const ConeElement& cone) {
+    for (int k = 0; k < kept; ++k) rows.push_back({block, k});
+    if (part.gap >= 0 && part.element >= 0) {
+        const int slip = p.frictions[part.element].block;
+        for (size_t k = 0; k < p.blocks[slip].kept.size(); ++k) rows.push_back({slip, static_cast<int>(k)});
+    }
+    parts.push_back(part);
+    cones.push_back(cone);
+}
+
+void StepElements::gather(const Program& p, Workspace& w, const std::vector<int>& touching,
+                          const std::vector<Mode>& modes, const VecX& v0) {
+    rows.clear();
+    parts.clear();
+    cones.clear();
+    rubbing_ = alone_;
+    for (int i : touching) {
+        const Gap& gap = p.gaps[i];
+        const int slides = gap.sliding < 0 ? 0 : static_cast<int>(p.blocks[p.frictions[gap.sliding].block].kept.size());
+        Part part{i, gap.sliding, gap.restitution * std::min(0.0, gap_rate(p, w, i))};
+        part.rests = gap.sliding >= 0 && (modes[gap.sliding] == sticking ||
+                                          slip_velocity(w.now, p.frictions[gap.sliding]).norm() <= rest_rate(v0));
+        const double mu = gap.sliding < 0 ? 0.0 : coefficient(p, w, part);
+        add(p, part, gap.block, 1, ConeElement::contact(1 + slides, mu));
+        for (int e : gap.elements)
+            if (e != gap.sliding) rubbing_.push_back(e);
+    }
+    std::sort(rubbing_.begin(), rubbing_.end());
+    for (int e : rubbing_) {
+        const int block = p.frictions[e].block, kept = static_cast<int>(p.blocks[block].kept.size());
+        if (kept > 0) add(p, {-1, e, 0.0}, block, kept, ConeElement::box(kept, 0.0));
+    }
+}
+
+void StepElements::move(const Program& p, const Workspace& w) {
+    for (size_t e = 0; e < parts.size(); ++e)
+        if (parts[e].gap >= 0 && parts[e].element >= 0) cones[e].bound = coefficient(p, w, parts[e]);
+}
+
+bool StepElements::limits_follow_loads(const Program& p) const {
+    return std::any_of(rubbing_.begin(), rubbing_.end(), [&](int e) {
+        return p.frictions[e].gap >= 0 || p.frictions[e].load != Friction::Load::none;
+    });
+}
+
+bool StepElements::limits_settle(const Program& p, Workspace& w, double t, const MeanVelocity& mean, double allowed) {
+    double change = 0.0, largest = 0.0;
+    for (size_t e = 0; e < parts.size(); ++e) {
+        if (!cones[e].is(ConeElement::Kind::box)) continue;
+        const Friction& friction = p.frictions[parts[e].element];
+        const bool rests = mean.start_speed(p, w, friction) == 0.0;
+        const double speed = slip_velocity(w.now, friction).norm();
+        const SlipLimits load = friction.gap >= 0 ? SlipLimits(friction.constant + friction.mu * w.now.lam[friction.row])
+                                                  : load_limits(p, w, friction, t, w.now.terms.q, mean.value());
+        const SlipLimits limits = load * (rests ? friction.static_ratio : friction.speed_factor(speed));
+        const double limit = limits.reach();
+        change = std::max({change, std::abs(limit - cones[e].bound), std::abs(limits.middle() - parts[e].middle)});
+        largest = std::max(largest, limit);
+        cones[e].bound = std::max(0.0, limit);
+        parts[e].middle = limits.middle();
+    }
+    const bool settles = change <= contact_load_tolerance * largest ||
+                         (change > max_load_contraction * last_change_ && change <= allowed);
+    last_change_ = change;
+    return settles;
+}
+
+void StepElements::middles(VecX& f) const {
+    f.head(static_cast<Eigen::Index>(rows.size())).setZero();
+    for (size_t e = 0, at = 0; e < parts.size(); at += cones[e].dim, ++e)
+        if (parts[e].middle != 0.0) f[at] = parts[e].middle;
+}
+
+}  // namespace pn

@@ -1,0 +1,59 @@
+// Contacts and dry friction that take part in a time step, as elements of a cone problem.
+//
+// A contact has the row of its normal and those of its sliding, in Coulomb's cone. Other dry friction has a box or a disk
+// whose limits may follow loads. The rows of the elements come one after the other.
+#pragma once
+
+#include <vector>
+
+#include "complementarity/cone/problem.hpp"
+#include "contact/tree_blocks.hpp"
+#include "run/time_stepping/mean_velocity.hpp"
+
+namespace pn {
+
+class StepElements {
+public:
+    struct Part {
+        int gap = -1;          // gap of a contact, -1 if none
+        int element = -1;      // friction element: sliding of the contact, or a box
+        double approach = 0.0; // restitution times the closing rate of the gap, at most 0
+        double middle = 0.0;   // middle of the limits of a box with one direction
+        bool rests = false;    // the contact sticks at the step's start
+    };
+
+    std::vector<StepRow> rows;
+    std::vector<Part> parts;         // by element
+    std::vector<ConeElement> cones;  // by element
+
+    explicit StepElements(const Program& p);
+
+    // Collect the elements of the contacts `touching` with their sliding, then other dry friction. The step starts in
+    // the given modes with the velocity v0.
+    void gather(const Program& p, Workspace& w, const std::vector<int>& touching, const std::vector<Mode>& modes,
+                const VecX& v0);
+    // Update the coefficients of contacts to the velocity of the workspace.
+    void move(const Program& p, const Workspace& w);
+    // Check if a limit of dry friction follows a load. The loads must then be those of minimum norm among all that share
+    // them alike: other ones need not settle.
+    bool limits_follow_loads(const Program& p) const;
+    // Begin passes of limits_settle.
+    void begin_passes() { last_change_ = HUGE_VAL; }
+    // Update the limits of dry friction to the loads of the current motion. Return true if they have converged, or if
+    // they change by at most `allowed` and do not converge.
+    bool limits_settle(const Program& p, Workspace& w, double t, const MeanVelocity& mean, double allowed);
+    // Write the middles of the limits into f. Boxes of the cone problem are centered at zero force.
+    void middles(VecX& f) const;
+    // Friction elements of no unilateral contact.
+    const std::vector<int>& alone() const { return alone_; }
+
+private:
+    double coefficient(const Program& p, const Workspace& w, const Part& part) const;
+    void add(const Program& p, const Part& part, int block, int kept, const ConeElement& cone);
+
+    std::vector<int> alone_;
+    std::vector<int> rubbing_;  // friction elements that take part, except the sliding of contacts
+    double last_change_ = 0.0;  // of the limits between two passes
+};
+
+}  // namespace pn
