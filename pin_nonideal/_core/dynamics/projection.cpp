@@ -18,11 +18,6 @@ constexpr double projection_stall_ratio = 0.5;
 constexpr int sure_position_steps = 3, sure_velocity_steps = 1;
 // Factorization at the new position costs less than this many iterations.
 constexpr double iterations_for_factors = 3.0;
-// Rank tolerances tried in this order at a state off the constraints, where dependent rows have pivots above
-// rank_tolerance. The first choice (fewest rows) whose projection closes all other rows is taken.
-constexpr double tolerances_near[] = {1e-3, 1e-5, 1e-7, 1e-9};
-// Maximum choices of rows to project one position. Each choice reduces the gaps of the other rows quadratically.
-constexpr int max_row_choices = 3;
 // Near a singular position the floor is zero. Iteration counts then assume convergence to unit roundoff.
 constexpr double no_floor = 1e-16;
 
@@ -266,48 +261,6 @@ bool project_position(const Program& p, Workspace& w, double t, VecX& q, const V
     return moves;
 }
 
-// Largest residual of the rows that count as dependent.
-static double dependent_residual(const Program& p, const Workspace& w) {
-    double largest = 0.0;
-    for (int i : w.now.rows.blocks) {
-        const Block& block = p.blocks[i];
-        for (size_t k = 0; k < block.kept.size(); ++k) {
-            const int row = block.row + static_cast<int>(k);
-            if (w.now.rows.active[row] || row >= p.constraint_rows()) continue;
-            largest = std::max(largest, std::abs(w.now.values[i].residual[block.kept[k]]));
-        }
-    }
-    return largest;
-}
-
-bool project_onto_dependent(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
-    if (!w.now.rows.redundant || !p.gaps.empty() || w.state.sticks_anywhere()) return false;
-    const int rank = static_cast<int>(std::count(w.now.rows.active.begin(), w.now.rows.active.end(), char(1)));
-    bool moved = false;
-    const auto is_open = [&] { return dependent_residual(p, w) > creeping_gap * scene_size(p, w); };
-    for (int k = 0; k < max_row_choices && (is_open() || (k == 0 && w.now.rows.distance < near_singular)); ++k) {
-        configure(p, w, t, q, v);
-        choose_rows(p, w, rank_tolerance, rank);
-        moved |= project_position(p, w, t, q, v);
-    }
-    return moved;
-}
-
-bool project_past_sticking(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
-    if (!w.now.rows.redundant || !w.state.sticks_anywhere()) return false;
-    if (dependent_residual(p, w) <= creeping_gap * scene_size(p, w)) return false;
-    const std::vector<Mode> modes = w.state.mode;
-    std::vector<Mode> released = modes;
-    std::replace(released.begin(), released.end(), sticking, unloaded);
-    set_modes(p, w, released);
-    configure(p, w, t, q, v);
-    if (w.now.rows.orthogonal) choose_rows(p, w);
-    project_position(p, w, t, q, v);
-    set_modes(p, w, modes);
-    configure(p, w, t, q, v);
-    return true;
-}
-
 // Set the velocity of a single dof held by a sticking element to exactly zero, as for a locked joint.
 static void rest_alone(const Program& p, const Workspace& w, VecX& v) {
     for (int i : w.now.rows.blocks) {
@@ -365,18 +318,6 @@ bool project_velocity(const Program& p, Workspace& w, double t, VecX& v) {
     return moved;
 }
 
-bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
-    bool moved = project_position(p, w, t, q, v);
-    moved |= project_onto_dependent(p, w, t, q, v);
-    return project_velocity(p, w, t, v) || moved;
-}
-
-void project_and_evaluate(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
-    project(p, w, t, q, v);
-    assemble_forces(p, w, t, v);
-    solve_dynamics(p, w, t, v);
-}
-
 void remove_normal_velocity(const Program& p, Workspace& w, Eigen::Ref<VecX> change) {
     w.scratch.work = change;
     for (int i : w.now.rows.blocks) multiply(p.blocks[i], w.now.A, w.scratch.work, w.scratch.r);
@@ -394,58 +335,6 @@ void remove_normal_move(const Program& p, Workspace& w, Eigen::Ref<VecX> move) {
     }
     least_move(p, w, w.scratch.work);
     move -= w.scratch.work;
-}
-
-void choose_rows_near(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
-    if (w.now.rows.blocks.empty() || !w.now.rows.orthogonal) return;
-    if (!p.gaps.empty() || w.state.sticks_anywhere()) return choose_rows(p, w);
-    const VecX start = q;
-    for (double tolerance : tolerances_near) {
-        choose_rows(p, w, tolerance);
-        project_position(p, w, t, q, v);
-        if (dependent_residual(p, w) <= creeping_gap * scene_size(p, w)) break;
-        q = start;
-        configure(p, w, t, q, v);
-    }
-    choose_rows(p, w);
-}
-
-static void configure_anew(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
-    set_modes(p, w, std::vector<Mode>(p.frictions.size(), slip_plus));
-    configure(p, w, t, q, v);
-    choose_rows_near(p, w, t, q, v);  // their Cholesky factor does not prove that they are independent
-}
-
-// Move penetrating bodies out to the contact plane. The velocity later decides between rest and impact.
-static void project_out(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
-    update_kinematics(p, w, t, q, v);
-    std::vector<char> inside(p.gaps.size(), 0);
-    for (size_t i = 0; i < p.gaps.size(); ++i) {
-        evaluate_gap(p, w, t, v, static_cast<int>(i));
-        inside[i] = w.now.values[p.gaps[i].block].residual[0] < 0.0 && !p.blocks[p.gaps[i].block].kept.empty();
-    }
-    set_closed(p, w, inside);
-    configure_anew(p, w, t, q, v);
-    project_position(p, w, t, q, v);
-    set_closed(p, w, std::vector<char>(p.gaps.size(), 0));
-}
-
-void project_anew(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
-    if (!p.gaps.empty()) project_out(p, w, t, q, v);
-    configure_anew(p, w, t, q, v);
-    if (!w.now.rows.blocks.empty()) project(p, w, t, q, v);
-}
-
-Closure close(const Program& p, Workspace& w, double t, VecX& q, VecX& v, double far) {
-    Closure found;
-    update_kinematics(p, w, t, q, v);
-    violations(p, w, t, v, found.before, found.rate);
-    found.after = found.before;
-    if (!(found.before <= far)) return found;
-    project_anew(p, w, t, q, v);
-    update_kinematics(p, w, t, q, v);
-    violations(p, w, t, v, found.after, found.rate);
-    return found;
 }
 
 }  // namespace pn

@@ -27,10 +27,6 @@ constexpr double slow_speed = 1e-5;
 // every step, in singular positions too.
 constexpr double open_gap = 1e-9;
 
-// Gaps above this fraction of the scene's size in dependent rows are closed by projection, which may move sticking
-// elements.
-constexpr double creeping_gap = 1e-11;
-
 // Add the least move that follows the constraints to third order to a step's move h v1, v1 = v0 + h a. Without it the
 // gap is h^2/2 b, because h v0 + h^2/2 a follows the constraints to second order. The multipliers of h^3 come from
 // projections after earlier steps. The workspace must hold (v0, a).
@@ -38,21 +34,12 @@ void follow_constraints(const Program& p, Workspace& w, double h, VecX& move);
 // Update the multipliers of h^3 after the projection at the end of such a step.
 void learn_third_order(Workspace& w, double h);
 
-// Each of the following projections returns false if nothing had to move.
-//
-// Project q. The workspace must hold factors near (t, q) and is configured there on return. Only a user's own rows read
-// v. `configured`: the workspace is already configured at (t, q). `keeps_factors`: if the old factors are accurate
-// enough, keep them for a velocity projection only. M and the rows are those of q.
+// Project q. Return false if nothing had to move. The workspace must hold factors near (t, q) and is configured there on
+// return. Only a user's own rows read v. `configured`: the workspace is already configured at (t, q). `keeps_factors`: if
+// the old factors are accurate enough, keep them for a velocity projection only. M and the rows are those of q.
 bool project_position(const Program& p, Workspace& w, double t, VecX& q, const VecX& v, bool configured = false,
                       bool keeps_factors = false);
-// Close the gaps of rows that count as dependent. Active rows that become short over a step magnify the residuals of
-// other rows. Project onto the longest rows at this position, as many as before, because off the constraints dependent
-// rows appear independent.
-bool project_onto_dependent(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
-// Close the gaps of rows that count as dependent while elements stick. Sticking elements hold these rows with forces
-// below rank_tolerance_sticking and creep by as little.
-bool project_past_sticking(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
-// Project v. The workspace must be configured at (t, q).
+// Project v. Return false if nothing had to move. The workspace must be configured at (t, q).
 bool project_velocity(const Program& p, Workspace& w, double t, VecX& v);
 // Check if q and v satisfy all rows in use, dependent rows included, without factorization. Return false if the state
 // moves fast enough to leave the rows by more than rounding over a step. Set the velocity of locked dofs, and of a dof
@@ -61,26 +48,11 @@ bool keeps_to_rows(const Program& p, Workspace& w, double t, const VecX& q, VecX
 // Check if q and v satisfy the constraints within the tolerances of projection. Evaluates rows and rates without
 // factorization.
 bool is_on_constraints(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
-// Project q and v. The workspace is configured there on return.
-bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
-// Project q and v and evaluate the result.
-void project_and_evaluate(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
 
 // Remove the part of a small change of the velocity or position that a projection would remove. Uses the factors in the
 // workspace. Nonholonomic rows bind velocities only, so projection of a position ignores them.
 void remove_normal_velocity(const Program& p, Workspace& w, Eigen::Ref<VecX> change);
 void remove_normal_move(const Program& p, Workspace& w, Eigen::Ref<VecX> move);
-
-// Choose rows at a state near the constraints without rows from an earlier step, and project the position onto them.
-// The workspace must be configured there.
-void choose_rows_near(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
-
-// Project a state without factors from an earlier step. Uses the factors and independent rows at the state itself, with
-// all elements slipping.
-void project_anew(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
-// Do the same unless the largest residual exceeds `far`. Return the residual before and after, and the largest rate.
-struct Closure { double before, after, rate; };
-Closure close(const Program& p, Workspace& w, double t, VecX& q, VecX& v, double far);
 
 // Largest residual of a block, as last evaluated, above the allowed one for rows of unit length. Zero if there is none.
 double opening(const Program& p, const Workspace& w, int block, double allowed);

@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "dynamics/evaluation.hpp"
-#include "dynamics/projection.hpp"
+#include "dynamics/state_projection.hpp"
 #include "dynamics/acceleration.hpp"
 #include "tree/mass_factor.hpp"
 

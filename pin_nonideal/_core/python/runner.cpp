@@ -12,7 +12,7 @@
 #include "constraints/row_length.hpp"
 #include "contact/active_set.hpp"
 #include "dynamics/evaluation.hpp"
-#include "dynamics/projection.hpp"
+#include "dynamics/state_projection.hpp"
 #include "dynamics/friction_limit.hpp"
 #include "dynamics/reported_loads.hpp"
 #include "dynamics/step_start.hpp"

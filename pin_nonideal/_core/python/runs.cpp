@@ -9,7 +9,7 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
-#include "dynamics/projection.hpp"
+#include "dynamics/state_projection.hpp"
 #include "python/failures.hpp"
 #include "python/reused_run.hpp"
 #include "python/options.hpp"

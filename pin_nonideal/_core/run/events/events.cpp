@@ -6,7 +6,7 @@
 #include "contact/impact.hpp"
 #include "contact/queries.hpp"
 #include "dynamics/evaluation.hpp"
-#include "dynamics/projection.hpp"
+#include "dynamics/state_projection.hpp"
 #include "dynamics/friction_limit.hpp"
 #include "dynamics/step_start.hpp"
 #include "friction/mode_update.hpp"

@@ -6,7 +6,7 @@
 #include "dynamics/evaluation.hpp"
 #include "dynamics/implicit_friction.hpp"
 #include "dynamics/power.hpp"
-#include "dynamics/projection.hpp"
+#include "dynamics/state_projection.hpp"
 #include "dynamics/reactions.hpp"
 #include "dynamics/friction_limit.hpp"
 #include "dynamics/step_start.hpp"

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "dynamics/evaluation.hpp"
-#include "dynamics/projection.hpp"
+#include "dynamics/state_projection.hpp"
 #include "dynamics/friction_limit.hpp"
 
 namespace pn {

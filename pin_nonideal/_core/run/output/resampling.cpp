@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "dynamics/evaluation.hpp"
-#include "dynamics/projection.hpp"
+#include "dynamics/state_projection.hpp"
 #include "dynamics/friction_limit.hpp"
 #include "dynamics/step_start.hpp"
 

@@ -1,0 +1,37 @@
+// Projection of a whole state onto the constraints, also if rows depend on each other or none are chosen yet. Each
+// projection that returns a bool returns false if nothing had to move.
+#pragma once
+
+#include "dynamics/projection.hpp"
+
+namespace pn {
+
+// Gaps above this fraction of the scene's size in dependent rows are closed by projection, which may move sticking
+// elements.
+constexpr double creeping_gap = 1e-11;
+
+// Project q and v. The workspace is configured there on return.
+bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
+// Project q and v and evaluate the result.
+void project_and_evaluate(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
+
+// Close the gaps of rows that count as dependent. Active rows that become short over a step magnify the residuals of
+// other rows. Project onto the longest rows at this position, as many as before, because off the constraints dependent
+// rows appear independent.
+bool project_onto_dependent(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
+// Close the gaps of rows that count as dependent while elements stick. Sticking elements hold these rows with forces
+// below rank_tolerance_sticking and creep by as little.
+bool project_past_sticking(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
+
+// Choose rows at a state near the constraints without rows from an earlier step, and project the position onto them.
+// The workspace must be configured there.
+void choose_rows_near(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
+
+// Project a state without factors from an earlier step. Uses the factors and independent rows at the state itself, with
+// all elements slipping.
+void project_anew(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
+// Do the same unless the largest residual exceeds `far`. Return the residual before and after, and the largest rate.
+struct Closure { double before, after, rate; };
+Closure close(const Program& p, Workspace& w, double t, VecX& q, VecX& v, double far);
+
+}  // namespace pn
