@@ -7,15 +7,7 @@ import runpy
 from pathlib import Path
 
 from pin_nonideal.errors import InputError, nearest
-
-
-def example_files() -> dict[str, Path]:
-    """Return the example scripts by name: installed with the package, or beside it in a checkout."""
-    here = Path(__file__).resolve().parent.parent
-    for folder in (here / "examples", here.parent / "examples"):
-        if folder.is_dir():
-            return {path.stem: path for path in sorted(folder.glob("*.py"))}
-    return {}
+from pin_nonideal.loading.library.example_scripts import example_files
 
 
 def examples() -> list[tuple[str, str]]:

@@ -16,8 +16,8 @@ DURATION = 0.05  # [s]
 SAME = 1e-7  # part of the accelerations by which equal motions may differ
 ROUNDING = 1e-8  # part of the weight: least squares of nearly dependent rows
 
-# The search for modes ends without a motion, although the cones allow one (docs/reference/limits.md). Time stepping has no
-# modes to search.
+# The search for modes ends without a motion, although the cones allow one (docs/reference/limits.md). Time
+# stepping has no modes to search.
 NO_MOTION = {(wedged.pile_of_balls, 132)}
 
 

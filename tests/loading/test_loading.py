@@ -28,6 +28,8 @@ ROUNDING = 1e-12
 def test_unknown_robot_names_the_nearest():
     with refuses('no robot "four_baar"; nearest: "four_bar"', UnknownNameError):
         pn.load("four_baar")
+    with refuses('no robot "contact_stack"; it is an example: pin-nonideal example', UnknownNameError):
+        pn.load("contact_stack")
 
 
 def test_a_folder_does_not_shadow_a_name_without_a_word(tmp_path, monkeypatch):

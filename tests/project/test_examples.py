@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from pin_nonideal.cli.examples import example_files, examples
+from pin_nonideal.cli.examples import examples
+from pin_nonideal.loading.library.example_scripts import example_files
 
 FOLDER = Path(__file__).parents[2] / "examples"
 NAMES = sorted(path.stem for path in FOLDER.glob("*.py"))

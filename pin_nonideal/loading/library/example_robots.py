@@ -13,6 +13,7 @@ import pinocchio as pin
 
 from pin_nonideal.description.constraints import Constraint
 from pin_nonideal.errors import LoadingError, UnknownNameError, nearest
+from pin_nonideal.loading.library.example_scripts import example_files
 from pin_nonideal.loading.urdf.geometry_sources import Shapes, cached_models, cached_shapes, file_stamps
 from pin_nonideal.loading.urdf.reader import RobotFile, read_mimics
 from pin_nonideal.types import Model
@@ -66,6 +67,8 @@ def example_robot(name: str, others: list[str]) -> RobotFile:
             "pip install example-robot-data-loaders"
         ) from None
     if name not in robots_loader.ROBOTS:
+        if name in example_files():
+            raise UnknownNameError(f'no robot "{name}"; it is an example: pin-nonideal example {name}')
         raise UnknownNameError(f'no robot "{name}"{nearest(name, [*others, *robots_loader.ROBOTS])}')
     kind = robots_loader.ROBOTS[name]
     if _is_sdf(kind):

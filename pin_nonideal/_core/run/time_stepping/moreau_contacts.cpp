@@ -219,19 +219,22 @@ void MoreauContacts::move_touching(double t) {
 
 // Compute the velocities at the step's end without the forces, over h.
 void MoreauContacts::measure_free() {
-    const int n = static_cast<int>(elements_.rows.size());
+    const auto& rows = elements_.rows;
+    const auto& parts = elements_.parts;
+    const auto& cones = elements_.cones;
+    const int n = static_cast<int>(rows.size());
     for (int i = 0; i < n; ++i) {
-        const Block& block = p.blocks[elements_.rows[i].block];
-        if (i == 0 || elements_.rows[i].block != elements_.rows[i - 1].block) mean_.start_rates(p, w, elements_.rows[i].block);
-        const double drift = w.now.values[elements_.rows[i].block].drift[block.kept[elements_.rows[i].k]];
-        offset_[i] = w.scratch.r[block.row + elements_.rows[i].k] / h_ + 0.5 * drift;
+        const Block& block = p.blocks[rows[i].block];
+        if (i == 0 || rows[i].block != rows[i - 1].block) mean_.start_rates(p, w, rows[i].block);
+        const double drift = w.now.values[rows[i].block].drift[block.kept[rows[i].k]];
+        offset_[i] = w.scratch.r[block.row + rows[i].k] / h_ + 0.5 * drift;
     }
-    for (size_t e = 0, at = 0; e < elements_.parts.size(); at += elements_.cones[e].dim, ++e)
-        offset_[at] += elements_.parts[e].approach / h_;
+    for (size_t e = 0, at = 0; e < parts.size(); at += cones[e].dim, ++e)
+        offset_[at] += parts[e].approach / h_;
     for (int i = 0; i < n; ++i) {
-        const Block& block = p.blocks[elements_.rows[i].block];
-        if (i == 0 || elements_.rows[i].block != elements_.rows[i - 1].block) multiply(block, w.now.A, a_free_, w.scratch.r);
-        w0_[i] = offset_[i] + w.scratch.r[block.row + elements_.rows[i].k];
+        const Block& block = p.blocks[rows[i].block];
+        if (i == 0 || rows[i].block != rows[i - 1].block) multiply(block, w.now.A, a_free_, w.scratch.r);
+        w0_[i] = offset_[i] + w.scratch.r[block.row + rows[i].k];
     }
 }
 
@@ -245,6 +248,8 @@ void MoreauContacts::recall_forces() {
 
 // Compute the motion under the forces f.
 void MoreauContacts::apply() {
+    const auto& parts = elements_.parts;
+    const auto& cones = elements_.cones;
     const int n = static_cast<int>(elements_.rows.size());
     w.now.a = a_free_;
     w.now.renew();
@@ -259,13 +264,13 @@ void MoreauContacts::apply() {
         w.now.lam = lam_free_;
         responses_.add_multipliers(f_, n, w.now.lam);
     }
-    for (size_t e = 0, at = 0; e < elements_.parts.size(); at += elements_.cones[e].dim, ++e) {
-        const int head = elements_.parts[e].gap >= 0;
-        if (head) w.now.lam[p.blocks[p.gaps[elements_.parts[e].gap].block].row] = f_[at];
-        if (elements_.parts[e].element < 0) continue;
-        Vec3& force = w.now.slip_force[elements_.parts[e].element];
+    for (size_t e = 0, at = 0; e < parts.size(); at += cones[e].dim, ++e) {
+        const int head = parts[e].gap >= 0;
+        if (head) w.now.lam[p.blocks[p.gaps[parts[e].gap].block].row] = f_[at];
+        if (parts[e].element < 0) continue;
+        Vec3& force = w.now.slip_force[parts[e].element];
         force = Vec3::Zero();
-        for (int k = head; k < elements_.cones[e].dim; ++k) force[k - head] = f_[at + k];
+        for (int k = head; k < cones[e].dim; ++k) force[k - head] = f_[at + k];
     }
 }
 
@@ -369,6 +374,8 @@ ConeResiduals MoreauContacts::residuals() {
 // Compute the velocity, the closed contacts and the modes at the step's end. An element sticks if its force stays below
 // its limit, or if its slip is zero.
 void MoreauContacts::end_velocity() {
+    const auto& parts = elements_.parts;
+    const auto& cones = elements_.cones;
     const int n = static_cast<int>(elements_.rows.size());
     if (n > 0) measure_end();
     mean_.end(w.now.a, v1_);
@@ -379,12 +386,12 @@ void MoreauContacts::end_velocity() {
     if (n == 0) return;
     const double still = rest_rate(v1_), clear = cone_force_rounding * f_.head(n).cwiseAbs().maxCoeff();
     w1_.head(n) *= h_;
-    for (size_t e = 0, at = 0; e < elements_.parts.size(); at += elements_.cones[e].dim, ++e) {
-        const StepElements::Part& part = elements_.parts[e];
-        const int head = part.gap >= 0, dim = elements_.cones[e].dim - head;
+    for (size_t e = 0, at = 0; e < parts.size(); at += cones[e].dim, ++e) {
+        const StepElements::Part& part = parts[e];
+        const int head = part.gap >= 0, dim = cones[e].dim - head;
         if (head) closed_[part.gap] = w1_[at] - part.approach <= still;
         if (part.element < 0 || (head && !closed_[part.gap])) continue;
-        const double limit = elements_.cones[e].bound * (head ? f_[at] : 1.0);
+        const double limit = cones[e].bound * (head ? f_[at] : 1.0);
         const double size = dim == 1 ? std::abs(f_[at + head] - part.middle) : f_.segment(at + head, dim).norm();
         const bool rests = w1_.segment(at + head, dim).norm() <= still;
         const bool held = limit - size > clear || rests;
@@ -406,25 +413,28 @@ void MoreauContacts::end_velocity() {
 // Add the work over the step, by the mean velocity. If a slip reverses inside the step, the friction that opposes its
 // end can do positive work on its mean velocity. This work is due to the scheme, not to friction.
 void MoreauContacts::book_work(VecX& y, double& moved_energy, double& impact_energy) {
-    const int n = static_cast<int>(elements_.rows.size());
+    const auto& rows = elements_.rows;
+    const auto& parts = elements_.parts;
+    const auto& cones = elements_.cones;
+    const int n = static_cast<int>(rows.size());
     if (!w.now.rows.blocks.empty()) {
         w.now.lam = lam_free_;
         responses_.add_multipliers(f_, n, w.now.lam);
     }
     force_ = 0.5 * (mean_.start() + mean_.finish());
     powers(p, w, force_, power_.data());
-    for (size_t e = 0, at = 0; e < elements_.parts.size(); at += elements_.cones[e].dim, ++e) {
+    for (size_t e = 0, at = 0; e < parts.size(); at += cones[e].dim, ++e) {
         double power = 0.0;
-        for (int k = 0; k < elements_.cones[e].dim; ++k) {
-            const StepRow& row = elements_.rows[at + k];
+        for (int k = 0; k < cones[e].dim; ++k) {
+            const StepRow& row = rows[at + k];
             multiply(p.blocks[row.block], w.now.A, force_, w.scratch.r);
             const double part = w.scratch.r[p.blocks[row.block].row + row.k] * f_[at + k];
-            if (k == 0 && elements_.parts[e].gap >= 0) impact_energy += h_ * part;
+            if (k == 0 && parts[e].gap >= 0) impact_energy += h_ * part;
             else power += part;
         }
-        if (elements_.parts[e].element < 0) continue;
+        if (parts[e].element < 0) continue;
         if (power > 0.0) moved_energy += h_ * power;
-        else power_[first_law_power + p.frictions[elements_.parts[e].element].law] += power;
+        else power_[first_law_power + p.frictions[parts[e].element].law] += power;
     }
     system_.work(y) += h_ * power_;
 }

@@ -61,7 +61,7 @@ void StepResponses::add_motion(const Program& p, Workspace& w, const VecX& f, in
 }
 
 void StepResponses::add_multipliers(const VecX& f, int n, VecX& lam) const {
-    lam.noalias() += multipliers_.leftCols(n) * f.head(n);
+    if (n > 0) lam.noalias() += multipliers_.leftCols(n) * f.head(n);
 }
 
 }  // namespace pn
