@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import shutil
 import signal
@@ -299,9 +300,9 @@ class TestListInfoBench:
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
     ) -> None:
         monkeypatch.chdir(tmp_path)
-        for name in ("main", "examples"):
-            installed = str(tmp_path / "pin_nonideal" / "cli" / f"{name}.py")
-            monkeypatch.setattr(sys.modules[f"pin_nonideal.cli.{name}"], "__file__", installed)
+        for name in ("cli.main", "loading.library.example_scripts"):
+            installed = str((tmp_path / "pin_nonideal" / name.replace(".", "/")).with_suffix(".py"))
+            monkeypatch.setattr(importlib.import_module(f"pin_nonideal.{name}"), "__file__", installed)
         assert main(["bench", "four_bar"]) == EXIT_ERROR
         assert error_line(capsys) == (
             "pin-nonideal: error: bench needs the folder benchmarks of a checkout; run it there: "
