@@ -103,7 +103,6 @@ bool BlockNewton::project(const BlockProblem& p, const Island& island, VecX& f) 
 }
 
 void BlockNewton::sweep(const BlockProblem& p, const Island& island, int sweeps, VecX& f, VecX& x, VecX& w) {
-    compliance_ = 0.0;
     move(p, island, f, x, w);
     for (int sweep = 0; sweep < sweeps; ++sweep)
         for (int i : island.elements) {

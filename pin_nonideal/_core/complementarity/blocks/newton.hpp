@@ -37,7 +37,8 @@ public:
     // `factor` keeps the order of elimination of the island.
     double solve(const BlockProblem& p, const Island& island, BlockFactor& factor, Search search, double compliance,
                  VecX& f, VecX& x, VecX& w);
-    // Improve f and x by sweeps of projected Gauss-Seidel, one element after another.
+    // Improve f and x by sweeps of the projected Gauss-Seidel method: each element in turn solves its own laws, with the
+    // forces of the others fixed. w is overwritten.
     void sweep(const BlockProblem& p, const Island& island, int sweeps, VecX& f, VecX& x, VecX& w);
     // Compute x and w of the island under the forces f.
     void move(const BlockProblem& p, const Island& island, const VecX& f, VecX& x, VecX& w) const;
