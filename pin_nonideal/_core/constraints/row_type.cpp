@@ -123,15 +123,15 @@ static PN_INLINE void evaluate_kind(const K& kind, const State& s, RowValues& ou
     }
 }
 
-// Like std::visit but inlined into the caller, for the kinds first + k.
-template <Part part, size_t first, size_t... k>
+// Like std::visit but inlined into the caller, for the first kinds.
+template <Part part, size_t... k>
 static PN_INLINE void evaluate_some(const Kind& kind, const State& s, RowValues& out, std::index_sequence<k...>) {
-    (void)((kind.index() == first + k && (evaluate_kind<part>(*std::get_if<first + k>(&kind), s, out), true)) || ...);
+    (void)((kind.index() == k && (evaluate_kind<part>(*std::get_if<k>(&kind), s, out), true)) || ...);
 }
 
-template <Part part, size_t first, size_t last>
-static PN_INLINE void evaluate_between(const Kind& kind, const State& s, RowValues& out) {
-    evaluate_some<part, first>(kind, s, out, std::make_index_sequence<last - first>());
+template <Part part, size_t count>
+static PN_INLINE void evaluate_until(const Kind& kind, const State& s, RowValues& out) {
+    evaluate_some<part>(kind, s, out, std::make_index_sequence<count>());
 }
 
 template <class Sought, class... K>
@@ -141,34 +141,34 @@ static constexpr size_t index_of(const std::variant<K...>*) {
     return i;
 }
 
-// The last kinds are gaps between shapes, which search for nearest points. Six functions replace one, because compile
-// time grows faster than the size of a function (GCC 12: 66 s for one, 36 s for six).
-constexpr size_t shapes = index_of<EllipsoidRow>(static_cast<const Kind*>(nullptr)), all = std::variant_size_v<Kind>;
+// Three wide functions evaluate the first kinds. The last kinds are gaps between shapes, which search for nearest points.
+// Each has functions of its own, compiled once: wide functions for all of them take 20 s more to compile
+// (GCC 12) and no less to run.
+constexpr size_t shapes = index_of<EllipsoidRow>(static_cast<const Kind*>(nullptr));
 static PN_WIDE void residual(const Kind& kind, const State& s, RowValues& out) {
-    evaluate_between<Part::residual, 0, shapes>(kind, s, out);
+    evaluate_until<Part::residual, shapes>(kind, s, out);
 }
 static PN_WIDE void place(const Kind& kind, const State& s, RowValues& out) {
-    evaluate_between<Part::place, 0, shapes>(kind, s, out);
+    evaluate_until<Part::place, shapes>(kind, s, out);
 }
 static PN_WIDE void motion(const Kind& kind, const State& s, RowValues& out) {
-    evaluate_between<Part::motion, 0, shapes>(kind, s, out);
+    evaluate_until<Part::motion, shapes>(kind, s, out);
 }
-static PN_WIDE void residual_of_shapes(const Kind& kind, const State& s, RowValues& out) {
-    evaluate_between<Part::residual, shapes, all>(kind, s, out);
-}
-static PN_WIDE void place_of_shapes(const Kind& kind, const State& s, RowValues& out) {
-    evaluate_between<Part::place, shapes, all>(kind, s, out);
-}
-static PN_WIDE void motion_of_shapes(const Kind& kind, const State& s, RowValues& out) {
-    evaluate_between<Part::motion, shapes, all>(kind, s, out);
+
+template <Part part>
+static void evaluate_shapes(const Kind& kind, const State& s, RowValues& out) {
+    std::visit([&](const auto& k) {
+        if constexpr (index_of<std::decay_t<decltype(k)>>(static_cast<const Kind*>(nullptr)) >= shapes)
+            evaluate_kind<part>(k, s, out);
+    }, kind);
 }
 
 void evaluate(const Kind& kind, const State& s, Part part, RowValues& out) {
     const bool of_shapes = kind.index() >= shapes;
     switch (part) {
-        case Part::residual: return of_shapes ? residual_of_shapes(kind, s, out) : residual(kind, s, out);
-        case Part::place: return of_shapes ? place_of_shapes(kind, s, out) : place(kind, s, out);
-        case Part::motion: return of_shapes ? motion_of_shapes(kind, s, out) : motion(kind, s, out);
+        case Part::residual: return of_shapes ? evaluate_shapes<Part::residual>(kind, s, out) : residual(kind, s, out);
+        case Part::place: return of_shapes ? evaluate_shapes<Part::place>(kind, s, out) : place(kind, s, out);
+        case Part::motion: return of_shapes ? evaluate_shapes<Part::motion>(kind, s, out) : motion(kind, s, out);
     }
 }
 

@@ -22,7 +22,7 @@ struct LowestOnEllipsoid {
     Vec place;          // the lowest point
     bool flat = false;  // no point is lower than the others
 
-    PN_INLINE LowestOnEllipsoid(const Sides& s, const Vec3& normal, const Vec3& semiaxes)
+    LowestOnEllipsoid(const Sides& s, const Vec3& normal, const Vec3& semiaxes)
         : e{s.a.R * Vec3::UnitX(), s.a.R * Vec3::UnitY(), s.a.R * Vec3::UnitZ()}, n(s.b.R * normal),
           part{Scalar(0.0), Scalar(0.0), Scalar(0.0)}, depth(0.0), place(s.a.x) {
         using std::sqrt;
@@ -39,7 +39,7 @@ struct LowestOnEllipsoid {
     }
 
     // Return the velocity of the lowest point, which moves on the body as the plane rotates relative to the body.
-    PN_INLINE Vec velocity(const Sides& s, const Vec3& semiaxes) const {
+    Vec velocity(const Sides& s, const Vec3& semiaxes) const {
         Vec out = s.a.velocity(place);
         if (flat) return out;
         const Vec turning = (s.b.omega() - s.a.omega()).cross(n);

@@ -32,7 +32,7 @@ struct NearestAlongLine {
 
     // The distance of a point to a convex solid is convex along the segment. Its slope, the component of the normal
     // along the segment, only grows. Newton's method finds the zero of the slope between bounds that close in.
-    PN_INLINE NearestAlongLine(const Sides& s, const Revolved& solid, const Vec& x, const Vec& along, double half)
+    NearestAlongLine(const Sides& s, const Revolved& solid, const Vec& x, const Vec& along, double half)
         : middle(x), e(along), part(first(s, solid, half)), at(there(s), solid), bend(0.0) {
         if (half == 0.0) return;
         Scalar low = -half, high = half, steepest = HUGE_VAL;
@@ -63,19 +63,19 @@ struct NearestAlongLine {
         bend = e.dot(at.turning(e));
     }
     // Segment along z of frame 1, about its origin.
-    PN_INLINE NearestAlongLine(const Sides& s, const Revolved& solid, double half)
+    NearestAlongLine(const Sides& s, const Revolved& solid, double half)
         : NearestAlongLine(s, solid, s.a.x, s.a.R * Vec3::UnitZ(), half) {}
-    PN_INLINE Vec place() const { return middle + part * e; }
+    Vec place() const { return middle + part * e; }
 
 private:
-    PN_INLINE Sides there(const Sides& s) const {
+    Sides there(const Sides& s) const {
         Sides out = s;
         out.a.x = place();
         return out;
     }
     // Return the point nearest to the solid's axis. If the segment is parallel to the axis, return the middle of its
     // part beside the solid.
-    PN_INLINE Scalar first(const Sides& s, const Revolved& solid, double half) const {
+    Scalar first(const Sides& s, const Revolved& solid, double half) const {
         const Vec axis = s.b.R * Vec3::UnitZ(), apart = middle - s.b.x;
         const Scalar cosine = e.dot(axis), square = 1.0 - cosine * cosine, up = apart.dot(axis);
         Scalar nearest;
@@ -100,7 +100,7 @@ struct AlongLineMotion {
     Vec dn;      // rate of the normal
     Scalar drift;   // bias of the distance: its second rate at zero acceleration
 
-    PN_INLINE AlongLineMotion(const Sides& s, const NearestAlongLine<Sides>& p)
+    AlongLineMotion(const Sides& s, const NearestAlongLine<Sides>& p)
         : u(), slides(0.0), dn(), drift(0.0) {
         const Vec c = p.place();
         u = s.a.velocity(c) - s.b.velocity(c);

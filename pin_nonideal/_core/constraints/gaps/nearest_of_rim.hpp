@@ -24,13 +24,13 @@ struct NearestOfRim {
     std::optional<Lowest> lowest;  // set over a face
     std::optional<Line> line;      // else set: nearest edge, with the disk as a cylinder of zero length
 
-    PN_INLINE NearestOfRim(const Sides& s, const Hull& hull, double rim) : n(), place(), distance(0.0) {
+    NearestOfRim(const Sides& s, const Hull& hull, double rim) : n(), place(), distance(0.0) {
         if (!find_face(s, hull, rim)) find_edge(s, hull, rim);
     }
-    static PN_INLINE Sides from_hull(const Sides& s) { return {s.b, s.a, s.t}; }
+    static Sides from_hull(const Sides& s) { return {s.b, s.a, s.t}; }
 
 private:
-    PN_INLINE bool find_face(const Sides& s, const Hull& hull, double rim) {
+    bool find_face(const Sides& s, const Hull& hull, double rim) {
         const Vec3 semiaxes(rim, rim, 0.0);
         for (const Hull::Face& face : hull.faces) {
             const Lowest there(s, face.normal, semiaxes);
@@ -46,7 +46,7 @@ private:
         }
         return lowest.has_value();
     }
-    PN_INLINE void find_edge(const Sides& s, const Hull& hull, double rim) {
+    void find_edge(const Sides& s, const Hull& hull, double rim) {
         const Revolved disk(0.0, rim, rim);
         const Sides turned = from_hull(s);
         for (const Hull::Edge& edge : hull.edges) {

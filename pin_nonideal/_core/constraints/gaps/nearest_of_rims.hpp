@@ -42,9 +42,9 @@ struct NearestToRevolved {
     Vec along[2];
     Scalar bend[3] = {Scalar(0.0), Scalar(0.0), Scalar(0.0)};  // entries 00, 01, 11
 
-    PN_INLINE NearestToRevolved(const Sides& s, const Vec& x, const Revolved& solid)
+    NearestToRevolved(const Sides& s, const Vec& x, const Revolved& solid)
         : place(x), at(there(s, x), solid), along() {}
-    static PN_INLINE Sides there(const Sides& s, const Vec& x) {
+    static Sides there(const Sides& s, const Vec& x) {
         Sides out = s;
         out.a.x = x;
         return out;
@@ -61,14 +61,14 @@ struct NearestAroundRim {
     Vec ex, ey, middle;
     double radius;
 
-    PN_INLINE NearestAroundRim(const Sides& s, double height, double rim)
+    NearestAroundRim(const Sides& s, double height, double rim)
         : ex(s.a.R * Vec3::UnitX()), ey(s.a.R * Vec3::UnitY()), middle(s.a.x + s.a.R * Vec3(0.0, 0.0, height)),
           radius(rim) {}
 
     // Find the nearest point. The distance only grows up its slope, so the nearest point of the whole disk lies in the
     // other half of the plane. An arc of the rim, at first half of it, closes in, and Newton steps continue inside the
     // arc. If two arcs remain, chords of the disk select one.
-    PN_INLINE NearestToRevolved<Sides> find(const Sides& s, const Revolved& solid) const {
+    NearestToRevolved<Sides> find(const Sides& s, const Revolved& solid) const {
         NearestToRevolved<Sides> out(s, middle, solid);
         if (radius == 0.0) return out;
         Way now = start(s, out.at);
@@ -98,25 +98,25 @@ struct NearestAroundRim {
     }
 
 private:
-    static PN_INLINE Scalar dot(const Way& a, const Way& b) { return a.x * b.x + a.y * b.y; }
-    static PN_INLINE Scalar cross(const Way& a, const Way& b) { return a.x * b.y - a.y * b.x; }
-    static PN_INLINE Way unit(const Way& a) {
+    static Scalar dot(const Way& a, const Way& b) { return a.x * b.x + a.y * b.y; }
+    static Scalar cross(const Way& a, const Way& b) { return a.x * b.y - a.y * b.x; }
+    static Way unit(const Way& a) {
         using std::sqrt;
         const Scalar length = sqrt(dot(a, a));
         return {a.x / length, a.y / length};
     }
-    static PN_INLINE Way turned(const Way& a, const Scalar& by) { return unit({a.x - by * a.y, a.y + by * a.x}); }
+    static Way turned(const Way& a, const Scalar& by) { return unit({a.x - by * a.y, a.y + by * a.x}); }
     // Arc of at most half the rim, counted around the axis.
     struct Arc {
         Way low, high;
-        PN_INLINE bool holds(const Way& way) const { return cross(low, way) > 0.0 && cross(way, high) > 0.0; }
-        PN_INLINE Way middle() const {
+        bool holds(const Way& way) const { return cross(low, way) > 0.0 && cross(way, high) > 0.0; }
+        Way middle() const {
             const Way sum{low.x + high.x, low.y + high.y};
             return dot(sum, sum) > level_rim ? unit(sum) : Way{-low.y, low.x};
         }
     };
     // Cut the arc along the chord through a point of the arc. Returns false if a piece would remain at either end.
-    static PN_INLINE bool cut(Arc& arc, const Way& now, const Way& slope) {
+    static bool cut(Arc& arc, const Way& now, const Way& slope) {
         const Way down = unit({-slope.x, -slope.y});
         const Scalar part = 2.0 * dot(now, down);
         const Way across = unit({part * down.x - now.x, part * down.y - now.y});
@@ -130,7 +130,7 @@ private:
     }
     // Return the direction of the nearest point of the whole disk, by bisection over the chords along `way`. The least
     // distance of a chord is convex across them.
-    PN_INLINE Way of_chords(const Sides& s, const Revolved& solid, const Way& way) const {
+    Way of_chords(const Sides& s, const Revolved& solid, const Way& way) const {
         const Vec along = out(way), beside = around(way);
         Way found = way;
         double low = -1.0, high = 1.0;
@@ -145,27 +145,27 @@ private:
         }
         return dot(found, found) > 0.0 ? unit(found) : way;
     }
-    PN_INLINE OnSolid nearest(const Sides& s, const Revolved& solid, const Way& way) const {
+    OnSolid nearest(const Sides& s, const Revolved& solid, const Way& way) const {
         return OnSolid(NearestToRevolved<Sides>::there(s, place(way)), solid);
     }
-    PN_INLINE Way slope_of(const OnSolid& at) const { return {at.n.dot(ex), at.n.dot(ey)}; }
-    PN_INLINE Vec place(const Way& way) const { return middle + radius * out(way); }
-    PN_INLINE Vec out(const Way& way) const { return way.x * ex + way.y * ey; }
-    PN_INLINE Vec around(const Way& way) const { return way.x * ey - way.y * ex; }
-    PN_INLINE Scalar curvature(const OnSolid& at, const Way& way) const {
+    Way slope_of(const OnSolid& at) const { return {at.n.dot(ex), at.n.dot(ey)}; }
+    Vec place(const Way& way) const { return middle + radius * out(way); }
+    Vec out(const Way& way) const { return way.x * ex + way.y * ey; }
+    Vec around(const Way& way) const { return way.x * ey - way.y * ex; }
+    Scalar curvature(const OnSolid& at, const Way& way) const {
         const Vec t = around(way);
         return t.dot(at.turning(t));
     }
     // Return the first direction: down the slope at the center, or toward the center of the solid if the slope vanishes
     // over a face.
-    PN_INLINE Way start(const Sides& s, const OnSolid& at) const {
+    Way start(const Sides& s, const OnSolid& at) const {
         const Way slope = slope_of(at);
         if (dot(slope, slope) > level_rim) return unit({-slope.x, -slope.y});
         const Vec toward = s.b.x - middle;
         const Way there{toward.dot(ex), toward.dot(ey)};
         return dot(there, there) > 0.0 ? unit(there) : Way{Scalar(1.0), Scalar(0.0)};
     }
-    PN_INLINE void polish(const Sides& s, const Revolved& solid, Way now, NearestToRevolved<Sides>& out) const {
+    void polish(const Sides& s, const Revolved& solid, Way now, NearestToRevolved<Sides>& out) const {
         for (int step = 0; step < 2; ++step) {
             out.place = place(now);
             out.along[0] = around(now);
@@ -190,7 +190,7 @@ struct NearestOfRims {
     Vec n;            // from body 2 to body 1
     Scalar distance;  // negative if one solid penetrates the side or a face of the other
 
-    PN_INLINE NearestOfRims(const Sides& s, const Revolved& first, const Revolved& second)
+    NearestOfRims(const Sides& s, const Revolved& first, const Revolved& second)
         : found(s, s.a.x, second), n(), distance(HUGE_VAL) {
         if (find_sides(s, first, second)) {
             take(found, false);
@@ -206,30 +206,30 @@ struct NearestOfRims {
             if (is_nearest(apart, e1, e2, first, second)) return;
         }
     }
-    static PN_INLINE Sides from_second(const Sides& s) { return {s.b, s.a, s.t}; }
-    PN_INLINE Sides mover(const Sides& s) const { return turned ? from_second(s) : s; }
+    static Sides from_second(const Sides& s) { return {s.b, s.a, s.t}; }
+    Sides mover(const Sides& s) const { return turned ? from_second(s) : s; }
 
 private:
-    PN_INLINE void take(const Found& other, bool of_second) {
+    void take(const Found& other, bool of_second) {
         found = other;
         turned = of_second;
         distance = other.at.distance;
         n = of_second ? Vec(-other.at.n) : other.at.n;
     }
-    PN_INLINE void try_rim(const Sides& s, const Revolved& own, double end, const Revolved& other, bool of_second) {
+    void try_rim(const Sides& s, const Revolved& own, double end, const Revolved& other, bool of_second) {
         const NearestAroundRim<Sides> rim(s, end * own.half, end > 0.0 ? own.above : own.below);
         const Found there = rim.find(s, other);
         if (there.at.distance < distance) take(there, of_second);
     }
     // Check if planes perpendicular to the normal through both points separate the solids.
-    PN_INLINE bool is_nearest(const Vec& apart, const Vec& e1, const Vec& e2, const Revolved& first,
+    bool is_nearest(const Vec& apart, const Vec& e1, const Vec& e2, const Revolved& first,
                               const Revolved& second) const {
         const Scalar between = n.dot(apart) - first.support(Scalar(-n.dot(e1)), Scalar(n.cross(e1).norm())) -
                                second.support(Scalar(n.dot(e2)), Scalar(n.cross(e2).norm()));
         return between > distance - shown_nearest * (first.reach + second.reach);
     }
     // Find the nearest points on crossing lines of both sides. Their common normal has a known angle to both axes.
-    PN_INLINE bool find_sides(const Sides& s, const Revolved& first, const Revolved& second) {
+    bool find_sides(const Sides& s, const Revolved& first, const Revolved& second) {
         using std::sqrt;
         if (first.half == 0.0 || second.half == 0.0) return false;
         const Vec e1 = s.a.R * Vec3::UnitZ(), e2 = s.b.R * Vec3::UnitZ(), w = e1.cross(e2), apart = s.a.x - s.b.x;
@@ -278,7 +278,7 @@ struct RimsMotion {
     Vec dn;      // rate of the normal
     Scalar drift;  // bias of the distance: its second rate at zero acceleration
 
-    PN_INLINE RimsMotion(const Sides& s, const NearestToRevolved<Sides>& p) : u(), slides(), dn(), drift(0.0) {
+    RimsMotion(const Sides& s, const NearestToRevolved<Sides>& p) : u(), slides(), dn(), drift(0.0) {
         const Vec& c = p.place;
         u = s.a.velocity(c) - s.b.velocity(c);
         const Vec turning = p.at.turning(u), omega = s.a.omega() - s.b.omega();

@@ -84,10 +84,10 @@ struct Hull {
         return true;
     }
     template <class Vec>
-    static PN_INLINE auto product(const Vec3& a, const Vec& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+    static auto product(const Vec3& a, const Vec& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
     // Check if a point outside a face lies over the face.
     template <class Vec>
-    static PN_INLINE bool stands_over(const Vec& at, const Face& face) {
+    static bool stands_over(const Vec& at, const Face& face) {
         for (size_t k = 0; k < face.sides.size(); ++k)
             if (product(face.sides[k], at) > face.ends[k]) return false;
         return true;
@@ -112,7 +112,7 @@ struct NearestOnHull {
     bool on_face = false, on_edge = false;  // location of the nearest point (neither: a corner)
     Scalar distance;                         // negative inside
 
-    PN_INLINE NearestOnHull(const Sides& s, const Hull& hull) : n(), along(), distance(0.0) {
+    NearestOnHull(const Sides& s, const Hull& hull) : n(), along(), distance(0.0) {
         const Vec e[3] = {s.b.R * Vec3::UnitX(), s.b.R * Vec3::UnitY(), s.b.R * Vec3::UnitZ()};
         const Vec apart = s.a.x - s.b.x;
         const Vec at(e[0].dot(apart), e[1].dot(apart), e[2].dot(apart));
@@ -122,18 +122,18 @@ struct NearestOnHull {
     }
 
     // Return the rate of n relative to the hull, for a point with the relative velocity u. It is zero over a face.
-    PN_INLINE Vec turning(const Vec& u) const {
+    Vec turning(const Vec& u) const {
         if (on_face) return Vec();
         const Vec free = on_edge ? Vec(u - along.dot(u) * along) : u;
         return (free - n.dot(free) * n) / distance;
     }
 
 private:
-    static PN_INLINE Scalar product(const Vec3& a, const Vec& b) { return Hull::product(a, b); }
-    static PN_INLINE Vec turned(const Vec (&e)[3], const Vec& x) { return x[0] * e[0] + x[1] * e[1] + x[2] * e[2]; }
+    static Scalar product(const Vec3& a, const Vec& b) { return Hull::product(a, b); }
+    static Vec turned(const Vec (&e)[3], const Vec& x) { return x[0] * e[0] + x[1] * e[1] + x[2] * e[2]; }
 
     // Find the face below the point. Inside the hull, find the nearest face.
-    PN_INLINE bool find_face(const Vec& at, const Hull& hull) {
+    bool find_face(const Vec& at, const Hull& hull) {
         int least = -1;
         bool outside = false;
         for (size_t f = 0; f < hull.faces.size() && !on_face; ++f) {
@@ -151,7 +151,7 @@ private:
         n = Vec(hull.faces[least].normal);
         return true;
     }
-    PN_INLINE void find_edge(const Vec& at, const Hull& hull) {
+    void find_edge(const Vec& at, const Hull& hull) {
         for (const Hull::Edge& edge : hull.edges) {
             const Vec3 &from = hull.points[edge.from], &to = hull.points[edge.to];
             const double length = (to - from).norm();

@@ -29,7 +29,7 @@ struct Revolved {
     }
     // Same for a direction with the given components along the axis and across it.
     template <class Scalar>
-    PN_INLINE Scalar support(const Scalar& along, const Scalar& across) const {
+    Scalar support(const Scalar& along, const Scalar& across) const {
         const Scalar high = half * along + above * across, low = below * across - half * along;
         return high > low ? high : low;
     }
@@ -53,7 +53,7 @@ struct NearestOnRevolved {
     bool on_rim = false;      // the nearest point is on a rim, or at the tip
     Scalar turns = Scalar(0.0);  // rate of n about the axis, per velocity of the point around the axis
 
-    PN_INLINE NearestOnRevolved(const Sides& s, const Revolved& solid)
+    NearestOnRevolved(const Sides& s, const Revolved& solid)
         : axis(s.b.R * Vec3::UnitZ()), out(s.b.R * Vec3::UnitX()), n(), distance(0.0) {
         const double slope = std::hypot(2.0 * solid.half, solid.below - solid.above);
         const bool disk = slope == 0.0;
@@ -84,7 +84,7 @@ struct NearestOnRevolved {
     }
 
     // Return the rate of n relative to the solid, for a point with the relative velocity u.
-    PN_INLINE Vec turning(const Vec& u) const {
+    Vec turning(const Vec& u) const {
         const Vec around = u - out.dot(u) * out - axis.dot(u) * axis;
         Vec sum = turns * around;
         if (!on_rim) return sum;
@@ -93,7 +93,7 @@ struct NearestOnRevolved {
     }
 
 private:
-    PN_INLINE void find_rim(const Revolved& solid, const Scalar& r, const Scalar& z) {
+    void find_rim(const Revolved& solid, const Scalar& r, const Scalar& z) {
         on_rim = true;
         for (const double end : {solid.half, -solid.half}) {
             const double radius = end > 0.0 ? solid.above : solid.below;
