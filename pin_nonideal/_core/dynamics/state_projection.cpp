@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynamics/acceleration.hpp"
 #include "dynamics/evaluation.hpp"
 
 namespace pn {
