@@ -106,13 +106,6 @@ double load_rounding(const Program& p, const Workspace& w, int gap) {
     return gap_sum_rounding * scale * scale * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
 }
 
-bool bodies_press(const Program& p, Workspace& w, int gap) {
-    const std::vector<int>& touching = w.now.touching;
-    return std::any_of(touching.begin(), touching.end(), [&](int i) {
-        return same_bodies(p, i, gap) && !is_bare(p, i) && load(p, w, i) > load_rounding(p, w, i);
-    });
-}
-
 int pulling_contact(const Program& p, Workspace& w) {
     const Reactions& r = reactions(p, w);
     if (r.presses && w.now.rows.redundant) return -1;

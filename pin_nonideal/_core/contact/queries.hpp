@@ -36,8 +36,6 @@ void leave_one_of_each_place(const Program& p, const Workspace& w, const std::ve
 double load(const Program& p, Workspace& w, int gap);
 // Rounding of the normal force.
 double load_rounding(const Program& p, const Workspace& w, int gap);
-// Check if some contact of the bodies of a gap has a load.
-bool bodies_press(const Program& p, Workspace& w, int gap);
 // Return the contact with the largest tension in the current motion, or -1 if all contacts can be in compression.
 // Redundant contacts have minimum-norm loads here.
 int pulling_contact(const Program& p, Workspace& w);

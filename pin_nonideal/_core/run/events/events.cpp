@@ -10,6 +10,7 @@
 #include "dynamics/friction_limit.hpp"
 #include "dynamics/step_start.hpp"
 #include "friction/mode_update.hpp"
+#include "run/events/unloaded_contacts.hpp"
 
 namespace pn {
 
@@ -165,24 +166,6 @@ void close_and_find(System& system, double t, bool starts, FrictionSwitch& frict
         friction.find(together);
         if (landing && !p.moves_in_time && system.v.cwiseAbs().maxCoeff() <= rest_speed) rest(system, t);
     });
-}
-
-// Open the contacts of two bodies if none of these contacts has a load. They would hold the bodies by rounding only, and
-// on features that may end.
-std::vector<int> open_unloaded(System& system, double t) {
-    const Program& p = system.p;
-    Workspace& w = system.w;
-    std::vector<int> out;
-    std::vector<char> closed = w.state.closed;
-    for (int i : w.now.touching) {
-        if (bodies_press(p, w, i)) continue;
-        closed[i] = 0;
-        out.push_back(i);
-    }
-    if (out.empty()) return out;
-    set_closed(p, w, closed);
-    begin_step(p, w, t, system.q, system.v);
-    return out;
 }
 
 }  // namespace

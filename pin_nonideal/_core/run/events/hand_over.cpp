@@ -7,6 +7,7 @@
 #include "dynamics/evaluation.hpp"
 #include "dynamics/projection.hpp"
 #include "dynamics/step_start.hpp"
+#include "run/events/unloaded_contacts.hpp"
 #include "tree/lie_group.hpp"
 
 namespace pn {
@@ -94,7 +95,7 @@ std::optional<HandOver::Found> HandOver::first(double size) {
 bool HandOver::is_unloaded(int gap) {
     system_.read(now_.y);
     begin_step(p, w, now_.t, system_.q, system_.v);
-    return !bodies_press(p, w, gap);
+    return pn::is_unloaded(system_, now_.t, gap);
 }
 
 void HandOver::pass(double time) {

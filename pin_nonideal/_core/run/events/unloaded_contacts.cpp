@@ -1,0 +1,94 @@
+#include "run/events/unloaded_contacts.hpp"
+
+#include <algorithm>
+
+#include "contact/queries.hpp"
+#include "dynamics/evaluation.hpp"
+#include "dynamics/failure.hpp"
+#include "dynamics/step_start.hpp"
+
+namespace pn {
+
+namespace {
+
+// Loads above this multiple of their rounding press surely. Contacts near each other amplify the rounding of their loads,
+// by the ratio of the size of the body to their distance.
+constexpr double surely_pressing = 1e6;
+// Maximum difference of accelerations that are the same, relative to all accelerations. Bodies that pass an edge between
+// two others have 1e-11 from rounding.
+constexpr double same_acceleration = 1e-9;
+
+std::vector<int> contacts_of_bodies(const Program& p, const Workspace& w, int gap) {
+    std::vector<int> list;
+    for (int i : w.now.touching)
+        if (same_bodies(p, i, gap) && !is_bare(p, i)) list.push_back(i);
+    return list;
+}
+
+// Check if the current motion, without these contacts, closes none of them. With friction it must also equal the motion
+// `held` with these contacts, since friction may hold bodies that are pressed by nothing else.
+bool needs_no_force(System& system, double t, const std::vector<int>& open, const VecX& held) {
+    const Program& p = system.p;
+    Workspace& w = system.w;
+    const bool rubs = std::any_of(open.begin(), open.end(), [&](int i) { return !p.gaps[i].elements.empty(); });
+    const double least = same_acceleration * (held.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
+    if (rubs && !((w.now.a - held).cwiseAbs().maxCoeff() <= least)) return false;
+    return std::all_of(open.begin(), open.end(), [&](int i) {
+        evaluate_gap(p, w, t, system.v, i);
+        return gap_acceleration(p, w, i) >= -std::max(least, acceleration_rounding(p, w, i));
+    });
+}
+
+// Check the motion without these contacts, and restore the motion with them.
+bool moves_without(System& system, double t, const std::vector<int>& contacts) {
+    const Program& p = system.p;
+    Workspace& w = system.w;
+    const RunState before = w.state;
+    const VecX held = w.now.a;
+    std::vector<char> closed = before.closed;
+    for (int i : contacts) closed[i] = 0;
+    bool same = false;
+    try {
+        set_closed(p, w, closed);
+        begin_step(p, w, t, system.q, system.v);
+        same = needs_no_force(system, t, contacts, held);
+    } catch (const Failure& failure) {  // no motion without these contacts
+        if (failure.kind == Failure::Kind::interrupted) throw;
+    }
+    set_contacts(p, w, before.closed, before.mode);
+    w.state = before;
+    begin_step(p, w, t, system.q, system.v);
+    return same;
+}
+
+}  // namespace
+
+bool is_unloaded(System& system, double t, int gap) {
+    const Program& p = system.p;
+    Workspace& w = system.w;
+    const std::vector<int> contacts = contacts_of_bodies(p, w, gap);
+    double largest = 0.0;  // load, in its rounding
+    for (int i : contacts) largest = std::max(largest, load(p, w, i) / load_rounding(p, w, i));
+    return largest <= 1.0 || (largest <= surely_pressing && moves_without(system, t, contacts));
+}
+
+std::vector<int> open_unloaded(System& system, double t) {
+    const Program& p = system.p;
+    Workspace& w = system.w;
+    std::vector<int> opened;
+    const std::vector<int> touching = w.now.touching;
+    for (int gap : touching) {
+        if (!w.state.closed[gap] || !is_unloaded(system, t, gap)) continue;
+        std::vector<char> closed = w.state.closed;
+        for (int i : touching) {
+            if (!closed[i] || !same_bodies(p, i, gap)) continue;
+            closed[i] = 0;
+            opened.push_back(i);
+        }
+        set_closed(p, w, closed);
+        begin_step(p, w, t, system.q, system.v);
+    }
+    return opened;
+}
+
+}  // namespace pn

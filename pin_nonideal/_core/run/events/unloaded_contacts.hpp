@@ -1,0 +1,16 @@
+// Closed contacts without a load. Rounding alone decides if they hold their bodies, so they are better open.
+#pragma once
+
+#include <vector>
+
+#include "run/integrators/system.hpp"
+
+namespace pn {
+
+// Check if the two bodies of a gap move the same without their contacts, at the state last read.
+bool is_unloaded(System& system, double t, int gap);
+
+// Open the contacts of all pairs of bodies that move the same without them. Return these contacts.
+std::vector<int> open_unloaded(System& system, double t);
+
+}  // namespace pn
