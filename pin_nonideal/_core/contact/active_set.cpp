@@ -171,7 +171,10 @@ Touching touching_contacts(const Program& p, Workspace& w, double t, const VecX&
     if (list.size() > 1) {
         for (int i : list)
             if (p.gaps[i].sliding >= 0) evaluate_block(p, w, t, v, p.frictions[p.gaps[i].sliding].block);
-        leave_one_of_each_place(p, w, w.state.closed, list);
+        leave_one_of_each_place(p, w, list, [&](int i, int other) {
+            if (opens_later(p, w, i, other) || opens_later(p, w, other, i)) return opens_later(p, w, i, other);
+            return w.state.closed[i] && !w.state.closed[other];
+        });
     }
     const double still = rest_rate(v);
     for (int i : list) {

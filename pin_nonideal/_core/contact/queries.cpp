@@ -85,16 +85,22 @@ bool coincide(const Program& p, const Workspace& w, int gap, int other) {
     return apart.norm() <= one_place * size;
 }
 
-void leave_one_of_each_place(const Program& p, const Workspace& w, const std::vector<char>& closed, std::vector<int>& list) {
+void leave_one_of_each_place(const Program& p, const Workspace& w, std::vector<int>& list, const Precedence& precedes) {
     size_t left = 0;
     for (int gap : list) {
         const auto end = list.begin() + static_cast<std::ptrdiff_t>(left);
         const auto same = std::find_if(list.begin(), end, [&](int other) { return coincide(p, w, gap, other); });
         if (same == end) list[left++] = gap;
-        else if (closed[gap] && !closed[*same]) *same = gap;
+        else if (precedes(gap, *same)) *same = gap;
     }
     list.resize(left);
     std::sort(list.begin(), list.end());
+}
+
+bool opens_later(const Program& p, const Workspace& w, int gap, int other) {
+    const auto bias = [&](int i) { return w.now.values[p.gaps[i].block].drift[p.blocks[p.gaps[i].block].kept[0]]; };
+    const double scale = std::abs(bias(gap)) + std::abs(bias(other)) + p.mechanism.gravity.norm();
+    return bias(gap) < bias(other) - min_bias_jump * scale;
 }
 
 double load(const Program& p, Workspace& w, int gap) {

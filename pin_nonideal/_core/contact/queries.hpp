@@ -1,12 +1,17 @@
 // Unilateral contacts: gaps, gap rates, and loads of closed contacts.
 #pragma once
 
+#include <functional>
+#include <vector>
+
 #include "dynamics/workspace.hpp"
 
 namespace pn {
 
 // Rounding of a closed gap [m], relative to the scene's size.
 constexpr double gap_rounding = 1e-14;
+// Minimum difference of the biases of two gaps, or of one gap before and after a hand-over, relative to all accelerations.
+constexpr double min_bias_jump = 1e-6;
 
 // Check if a contact has no mobility along its normal. Such a contact never closes.
 inline bool is_bare(const Program& p, int gap) { return p.blocks[p.gaps[gap].block].kept.empty(); }
@@ -29,8 +34,12 @@ bool are_copies(const Program& p, int gap, int other);
 // Check if two gaps coincide up to rounding: same bodies, same line of action, same friction point and same laws. Their
 // rows and the rows of their sliding must be evaluated.
 bool coincide(const Program& p, const Workspace& w, int gap, int other);
-// Reduce a list of touching gaps to one gap per place: a `closed` gap if possible, else the first.
-void leave_one_of_each_place(const Program& p, const Workspace& w, const std::vector<char>& closed, std::vector<int>& list);
+// Reduce a list of touching gaps to one gap per place: the one that precedes the others, in sorted order.
+using Precedence = std::function<bool(int gap, int other)>;
+void leave_one_of_each_place(const Program& p, const Workspace& w, std::vector<int>& list, const Precedence& precedes);
+// Check if a gap has a lower bias than another gap, which coincides with it. Their accelerations differ by their biases
+// only, so that a load on the first gap keeps the other open.
+bool opens_later(const Program& p, const Workspace& w, int gap, int other);
 
 // Normal force of a closed contact in the current motion. Redundant contacts have their minimum-norm compressive loads.
 double load(const Program& p, Workspace& w, int gap);

@@ -14,11 +14,10 @@ namespace pn {
 
 namespace {
 
-// Minimum jump of a gap's bias acceleration, relative to all accelerations. Error control covers smaller jumps.
-constexpr double min_bias_jump = 1e-6;
 // A jump keeps at least this part of a change in one half of each bisected interval. A smooth function keeps less.
 constexpr double kept_bias_change = 0.3;
-// Longest time [s, or relative to the time above 1 s] in which the change of the acceleration is negligible.
+// Longest time [s, or relative to the time above 1 s] in which the change of the acceleration is negligible. Features pass
+// each other by more than rounding in this time.
 constexpr double steady_time = 1e-12;
 // Part of the time to a hand-over that is left to the next step, since the acceleration changes on the way.
 constexpr double left_before_hand_over = 1e-3;
@@ -38,7 +37,9 @@ bool has_one_feature(const Program& p, int gap) {
 HandOver::HandOver(System& system, Progress& progress)
     : system_(system), now_(progress), p(system.p), w(system.w), move_(VecX::Zero(system.nv)), y_(VecX::Zero(system.ny)) {}
 
-bool HandOver::is_reached(double time) const { return time <= steady_time * std::max(1.0, std::abs(now_.t)); }
+double HandOver::steady() const { return steady_time * std::max(1.0, std::abs(now_.t)); }
+
+bool HandOver::is_reached(double time) const { return time <= steady(); }
 
 double HandOver::step_before(double time) { return (1.0 - left_before_hand_over) * time; }
 
@@ -98,10 +99,12 @@ bool HandOver::is_unloaded(int gap) {
     return pn::is_unloaded(system_, now_.t, gap);
 }
 
+// The state lies a little past the hand-over, so that rounding does not decide if another contact passes it too.
 void HandOver::pass(double time) {
-    move(time);
+    const double past = time + steady();
+    move(past);
     now_.y = y_;
-    now_.t += time;
+    now_.t += past;
 }
 
 }  // namespace pn

@@ -26,10 +26,11 @@ public:
     bool is_reached(double time) const;
     // Return the length of a step that ends just before a hand-over.
     static double step_before(double time);
-    // Move the current state by this time, with the current acceleration.
+    // Move the current state just past a hand-over after this time, with the current acceleration.
     void pass(double time);
 
 private:
+    double steady() const;
     void move(double time);
     double drift(int gap);
     double drift_after(double time, int gap);

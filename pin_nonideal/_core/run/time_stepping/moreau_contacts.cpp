@@ -205,7 +205,8 @@ void MoreauContacts::find_touching(double t) {
         evaluate_block(p, w, t, mean_.value(), p.gaps[i].block);
         for (int e : p.gaps[i].elements) evaluate_block(p, w, t, mean_.value(), p.frictions[e].block);
     }
-    if (touching_.size() > 1) leave_one_of_each_place(p, w, was_closed_, touching_);
+    if (touching_.size() > 1)
+        leave_one_of_each_place(p, w, touching_, [&](int i, int other) { return was_closed_[i] && !was_closed_[other]; });
 }
 
 // Evaluate the contacts that take part at a new mean velocity.
@@ -384,7 +385,8 @@ void MoreauContacts::end_velocity() {
         std::fill(modes_.begin(), modes_.end(), unloaded);
     }
     if (n == 0) return;
-    const double still = rest_rate(v1_), clear = cone_force_rounding * f_.head(n).cwiseAbs().maxCoeff();
+    const double still = rest_rate(v1_), fastest = 1.0 + v1_.cwiseAbs().maxCoeff();
+    const double largest = f_.head(n).cwiseAbs().maxCoeff(), clear = cone_force_rounding * largest;
     w1_.head(n) *= h_;
     for (size_t e = 0, at = 0; e < parts.size(); at += cones[e].dim, ++e) {
         const StepElements::Part& part = parts[e];
@@ -393,8 +395,10 @@ void MoreauContacts::end_velocity() {
         if (part.element < 0 || (head && !closed_[part.gap])) continue;
         const double limit = cones[e].bound * (head ? f_[at] : 1.0);
         const double size = dim == 1 ? std::abs(f_[at + head] - part.middle) : f_.segment(at + head, dim).norm();
-        const bool rests = w1_.segment(at + head, dim).norm() <= still;
-        const bool held = limit - size > clear || rests;
+        const double slip = w1_.segment(at + head, dim).norm();
+        // Of the law's two conditions, no slip and a force at the limit, the one with the smaller miss holds.
+        const bool below = limit - size > clear && slip * largest <= (limit - size) * fastest;
+        const bool held = below || slip <= still;
         const bool forward = dim > 1 || (dim > 0 && w1_[at + head] > 0.0);
         modes_[part.element] = held && dim > 0 ? sticking : forward ? slip_plus : slip_minus;
         const Block& block = p.blocks[p.frictions[part.element].block];
