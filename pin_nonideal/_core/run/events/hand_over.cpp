@@ -16,9 +16,10 @@ namespace {
 
 // A jump keeps at least this part of a change in one half of each bisected interval. A smooth function keeps less.
 constexpr double kept_bias_change = 0.3;
-// Longest time [s, or relative to the time above 1 s] in which the change of the acceleration is negligible. Features pass
-// each other by more than rounding in this time.
+// Longest time [s, or relative to the time above 1 s] in which the change of the acceleration is negligible.
 constexpr double steady_time = 1e-12;
+// Time [s, or relative to the time above 1 s] in which features pass each other by more than rounding.
+constexpr double passing_time = 1e-13;
 // Part of the time to a hand-over that is left to the next step, since the acceleration changes on the way.
 constexpr double left_before_hand_over = 1e-3;
 // Width [s, or relative to the time above 1 s] of the interval that contains a hand-over. It is below the spacing of times,
@@ -37,9 +38,7 @@ bool has_one_feature(const Program& p, int gap) {
 HandOver::HandOver(System& system, Progress& progress)
     : system_(system), now_(progress), p(system.p), w(system.w), move_(VecX::Zero(system.nv)), y_(VecX::Zero(system.ny)) {}
 
-double HandOver::steady() const { return steady_time * std::max(1.0, std::abs(now_.t)); }
-
-bool HandOver::is_reached(double time) const { return time <= steady(); }
+bool HandOver::is_reached(double time) const { return time <= steady_time * std::max(1.0, std::abs(now_.t)); }
 
 double HandOver::step_before(double time) { return (1.0 - left_before_hand_over) * time; }
 
@@ -101,7 +100,7 @@ bool HandOver::is_unloaded(int gap) {
 
 // The state lies a little past the hand-over, so that rounding does not decide if another contact passes it too.
 void HandOver::pass(double time) {
-    const double past = time + steady();
+    const double past = time + passing_time * std::max(1.0, std::abs(now_.t));
     move(past);
     now_.y = y_;
     now_.t += past;

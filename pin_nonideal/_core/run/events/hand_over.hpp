@@ -30,7 +30,6 @@ public:
     void pass(double time);
 
 private:
-    double steady() const;
     void move(double time);
     double drift(int gap);
     double drift_after(double time, int gap);

@@ -20,6 +20,7 @@ namespace pn {
 namespace {
 
 constexpr double cone_force_rounding = 1e-9;  // distance of a force at its limit, relative to the limit
+constexpr double most_stopped = 1e-6;  // slip of an element that stops, relative to 1 + the largest velocity
 constexpr double width_rounding = 1e-12;  // uncertainty of a gap at rest, relative to the scene's size
 // Accepted residual relative to the velocities. A step of a turning body can have no exact solution if corners share
 // its load. Also the accepted error of a limit, relative to the forces. The statistics report both.
@@ -340,6 +341,18 @@ bool MoreauContacts::keep_rest(bool solved) {
     return holds;
 }
 
+// Elements at rest can share loads in many ways, so that limits which follow the loads need not converge. Solve the step
+// with a part of these limits. Return true if all elements rest and their forces are within the limits that follow.
+bool MoreauContacts::rest_within_limits(double t) {
+    elements_.reduce_limits();
+    if (!solve_laws()) return false;
+    apply();
+    measure_end();
+    const int n = static_cast<int>(elements_.rows.size());
+    const bool stops = h_ * w1_.head(n).cwiseAbs().maxCoeff() <= most_stopped * (1.0 + v0_.cwiseAbs().maxCoeff());
+    return stops && elements_.limits_hold(p, w, t, mean_, f_);
+}
+
 void MoreauContacts::solve(double t) {
     const int n = static_cast<int>(elements_.rows.size());
     const bool loads = n > 0 && elements_.cones.back().is(ConeElement::Kind::box);  // limits that may depend on the motion
@@ -348,8 +361,8 @@ void MoreauContacts::solve(double t) {
         if (loads || pass > 0) apply();
         const double allowed = most_miss * f_.head(n).cwiseAbs().maxCoeff();
         if (elements_.limits_settle(p, w, t, mean_, allowed) && pass > 0) break;
-        if (pass == max_load_passes) throw Failure(Failure::Kind::not_converged, t);
-        if (!solve_laws()) throw Failure(Failure::Kind::not_converged, t);
+        if (pass == max_load_passes && rest_within_limits(t)) break;
+        if (pass == max_load_passes || !solve_laws()) throw Failure(Failure::Kind::not_converged, t);
         ++w.counters.iterations;
     }
     if (n == 0) apply();
@@ -373,7 +386,7 @@ ConeResiduals MoreauContacts::residuals() {
 }
 
 // Compute the velocity, the closed contacts and the modes at the step's end. An element sticks if its force stays below
-// its limit, or if its slip is zero.
+// its limit, or if its slip is zero. If a solution meets neither condition, the one with the smaller miss holds.
 void MoreauContacts::end_velocity() {
     const auto& parts = elements_.parts;
     const auto& cones = elements_.cones;
@@ -386,7 +399,7 @@ void MoreauContacts::end_velocity() {
     }
     if (n == 0) return;
     const double still = rest_rate(v1_), fastest = 1.0 + v1_.cwiseAbs().maxCoeff();
-    const double largest = f_.head(n).cwiseAbs().maxCoeff(), clear = cone_force_rounding * largest;
+    const double clear = cone_force_rounding * f_.head(n).cwiseAbs().maxCoeff();
     w1_.head(n) *= h_;
     for (size_t e = 0, at = 0; e < parts.size(); at += cones[e].dim, ++e) {
         const StepElements::Part& part = parts[e];
@@ -396,9 +409,8 @@ void MoreauContacts::end_velocity() {
         const double limit = cones[e].bound * (head ? f_[at] : 1.0);
         const double size = dim == 1 ? std::abs(f_[at + head] - part.middle) : f_.segment(at + head, dim).norm();
         const double slip = w1_.segment(at + head, dim).norm();
-        // Of the law's two conditions, no slip and a force at the limit, the one with the smaller miss holds.
-        const bool below = limit - size > clear && slip * largest <= (limit - size) * fastest;
-        const bool held = below || slip <= still;
+        const bool stops = slip <= most_stopped * fastest || slip * limit <= (limit - size) * fastest;
+        const bool held = (limit - size > clear && stops) || slip <= still;
         const bool forward = dim > 1 || (dim > 0 && w1_[at + head] > 0.0);
         modes_[part.element] = held && dim > 0 ? sticking : forward ? slip_plus : slip_minus;
         const Block& block = p.blocks[p.frictions[part.element].block];

@@ -65,6 +65,7 @@ private:
     bool moves();
     bool keep_rest(bool solved);
     ConeResiduals residuals();
+    bool rest_within_limits(double t);
     void solve(double t);
     void apply();
     void end_velocity();

@@ -17,6 +17,8 @@ constexpr double contact_load_tolerance = 1e-12;  // change of limits that count
 // Maximum ratio of two changes of limits from passes that converge. Slower limits follow force components that the
 // cones leave open, such as the direction of slow slip.
 constexpr double max_load_contraction = 0.5;
+// Part of the limits that elements at rest use if their limits do not converge.
+constexpr double kept_limit = 0.9;
 
 }  // namespace
 
@@ -82,26 +84,50 @@ bool StepElements::limits_follow_loads(const Program& p) const {
     });
 }
 
+// Return the limits of a box under the loads of the current motion.
+SlipLimits StepElements::limits(const Program& p, Workspace& w, double t, const MeanVelocity& mean, size_t e) const {
+    const Friction& friction = p.frictions[parts[e].element];
+    const bool rests = mean.start_speed(p, w, friction) == 0.0;
+    const double speed = slip_velocity(w.now, friction).norm();
+    const SlipLimits load = friction.gap >= 0 ? SlipLimits(friction.constant + friction.mu * w.now.lam[friction.row])
+                                              : load_limits(p, w, friction, t, w.now.terms.q, mean.value());
+    return load * (rests ? friction.static_ratio : friction.speed_factor(speed));
+}
+
 bool StepElements::limits_settle(const Program& p, Workspace& w, double t, const MeanVelocity& mean, double allowed) {
     double change = 0.0, largest = 0.0;
     for (size_t e = 0; e < parts.size(); ++e) {
         if (!cones[e].is(ConeElement::Kind::box)) continue;
-        const Friction& friction = p.frictions[parts[e].element];
-        const bool rests = mean.start_speed(p, w, friction) == 0.0;
-        const double speed = slip_velocity(w.now, friction).norm();
-        const SlipLimits load = friction.gap >= 0 ? SlipLimits(friction.constant + friction.mu * w.now.lam[friction.row])
-                                                  : load_limits(p, w, friction, t, w.now.terms.q, mean.value());
-        const SlipLimits limits = load * (rests ? friction.static_ratio : friction.speed_factor(speed));
-        const double limit = limits.reach();
-        change = std::max({change, std::abs(limit - cones[e].bound), std::abs(limits.middle() - parts[e].middle)});
+        const SlipLimits now = limits(p, w, t, mean, e);
+        const double limit = now.reach();
+        change = std::max({change, std::abs(limit - cones[e].bound), std::abs(now.middle() - parts[e].middle)});
         largest = std::max(largest, limit);
         cones[e].bound = std::max(0.0, limit);
-        parts[e].middle = limits.middle();
+        parts[e].middle = now.middle();
     }
     const bool settles = change <= contact_load_tolerance * largest ||
                          (change > max_load_contraction * last_change_ && change <= allowed);
     last_change_ = change;
     return settles;
+}
+
+void StepElements::reduce_limits() {
+    for (ConeElement& cone : cones)
+        if (cone.is(ConeElement::Kind::box)) cone.bound *= kept_limit;
+}
+
+bool StepElements::limits_hold(const Program& p, Workspace& w, double t, const MeanVelocity& mean, const VecX& f) {
+    bool hold = true;
+    for (size_t e = 0, at = 0; e < parts.size(); at += cones[e].dim, ++e) {
+        if (!cones[e].is(ConeElement::Kind::box)) continue;
+        const SlipLimits now = limits(p, w, t, mean, e);
+        const int dim = cones[e].dim;
+        const double size = dim == 1 ? std::abs(f[at] - now.middle()) : f.segment(at, dim).norm();
+        cones[e].bound = std::max(0.0, now.reach());
+        parts[e].middle = now.middle();
+        hold &= size <= cones[e].bound;
+    }
+    return hold;
 }
 
 void StepElements::middles(VecX& f) const {

@@ -42,12 +42,17 @@ public:
     // Update the limits of dry friction to the loads of the current motion. Return true if they have converged, or if
     // they change by at most `allowed` and do not converge.
     bool limits_settle(const Program& p, Workspace& w, double t, const MeanVelocity& mean, double allowed);
+    // Reduce the limits of dry friction to a part of them.
+    void reduce_limits();
+    // Set the limits of dry friction to the loads of the current motion. Return true if the forces f are within them.
+    bool limits_hold(const Program& p, Workspace& w, double t, const MeanVelocity& mean, const VecX& f);
     // Write the middles of the limits into f. Boxes of the cone problem are centered at zero force.
     void middles(VecX& f) const;
     // Friction elements of no unilateral contact.
     const std::vector<int>& alone() const { return alone_; }
 
 private:
+    SlipLimits limits(const Program& p, Workspace& w, double t, const MeanVelocity& mean, size_t e) const;
     double coefficient(const Program& p, const Workspace& w, const Part& part) const;
     void add(const Program& p, const Part& part, int block, int kept, const ConeElement& cone);
 
