@@ -35,8 +35,6 @@ VecX least_squares(const MatX& A, const VecX& b, double threshold) {
     return factor.solve(b);
 }
 
-VecX basic_least_squares(const MatX& A, const VecX& b) { return A.colPivHouseholderQr().solve(b); }
-
 MatX orthogonal_complement(const MatX& A, double threshold) {
     const Eigen::Index n = A.rows();
     Eigen::ColPivHouseholderQR<MatX> factor(A);

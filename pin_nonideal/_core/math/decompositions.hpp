@@ -47,9 +47,6 @@ MatX inverse(const MatX& A);
 // Compute the minimum-norm x that minimizes |A x - b|. Pivots below `threshold` of the largest count as zero.
 VecX least_squares(const MatX& A, const VecX& b, double threshold);
 
-// Compute an x that minimizes |A x - b|. Columns that other columns span get zero.
-VecX basic_least_squares(const MatX& A, const VecX& b);
-
 // Compute orthonormal columns that span the orthogonal complement of the columns of A. Pivots of A below `threshold` of
 // the largest count as zero.
 MatX orthogonal_complement(const MatX& A, double threshold);

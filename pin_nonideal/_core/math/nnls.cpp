@@ -18,16 +18,63 @@ constexpr double min_column_pivot = 1e-11;
 constexpr double binding_slack = 1e-9;
 // Rounding of a zero in a least-squares solution, relative to the numbers that it sums.
 constexpr double met_rounding = 1e-11;
+// Projections that make a column orthogonal to others, up to rounding.
+constexpr int orthogonal_passes = 2;
 // Maximum number of exchanges per column. The method is finite and takes about one. Further exchanges are rounding.
 constexpr int exchanges = 10;
 constexpr int most_cuts = 50;  // updates of the bound in largest_least, each exact for the binding numbers
 
-// Solve the least-squares problem over the listed columns.
-VecX solve_over(const MatX& A, const VecX& b, const std::vector<int>& columns) {
-    MatX part(A.rows(), static_cast<Eigen::Index>(columns.size()));
-    for (size_t k = 0; k < columns.size(); ++k) part.col(k) = A.col(columns[k]);
-    return basic_least_squares(part, b);
-}
+// Least-squares solutions over a set of columns, which changes by one column at a time. [Lawson, Hanson, ch. 24.]
+class ColumnSet {
+public:
+    ColumnSet(Eigen::Index rows, Eigen::Index most) : Q_(rows, std::min(rows, most)), R_(MatX::Zero(Q_.cols(), Q_.cols())) {}
+
+    // Append a column. Return false if the set spans it.
+    bool append(const VecX& column) {
+        const double length = column.norm();
+        VecX rest = column;
+        if (count_ == Q_.cols()) return false;
+        R_.col(count_).setZero();
+        for (int pass = 0; pass < orthogonal_passes; ++pass) {
+            const VecX part = Q_.leftCols(count_).transpose() * rest;
+            rest.noalias() -= Q_.leftCols(count_) * part;
+            R_.col(count_).head(count_) += part;
+        }
+        const double pivot = rest.norm();
+        if (!(pivot > min_column_pivot * length)) return false;
+        R_(count_, count_) = pivot;
+        Q_.col(count_++) = rest / pivot;
+        return true;
+    }
+
+    void remove(Eigen::Index column) {
+        --count_;
+        for (Eigen::Index k = column; k < count_; ++k) {
+            R_.col(k) = R_.col(k + 1);
+            const double size = std::hypot(R_(k, k), R_(k + 1, k)), c = R_(k, k) / size, s = R_(k + 1, k) / size;
+            for (Eigen::Index l = k + 2; l <= count_; ++l) rotate(R_(k, l), R_(k + 1, l), c, s);
+            R_(k, k) = size;
+            R_(k + 1, k) = 0.0;
+            for (Eigen::Index row = 0; row < Q_.rows(); ++row) rotate(Q_(row, k), Q_(row, k + 1), c, s);
+        }
+    }
+
+    VecX solve(const VecX& b) const {
+        VecX x = Q_.leftCols(count_).transpose() * b;
+        R_.topLeftCorner(count_, count_).triangularView<Eigen::Upper>().solveInPlace(x);
+        return x;
+    }
+
+private:
+    static void rotate(double& x, double& y, double c, double s) {
+        const double turned = c * x + s * y;
+        y = c * y - s * x;
+        x = turned;
+    }
+
+    MatX Q_, R_;  // orthonormal columns, and the upper triangle that gives the columns of the set
+    Eigen::Index count_ = 0;
+};
 
 double largest(const VecX& x) { return x.size() > 0 ? x.cwiseAbs().maxCoeff() : 0.0; }
 
@@ -43,25 +90,29 @@ MatX complement_of(const MatX& Z) {
 
 VecX nonnegative_least_squares(const MatX& A, const VecX& b) {
     const int n = static_cast<int>(A.cols());
+    const VecX lengths = A.colwise().norm();
+    const double size = n > 0 ? A.cwiseAbs().maxCoeff() : 0.0, size_of_b = b.norm();
     VecX x = VecX::Zero(n);
     std::vector<int> used;
-    std::vector<char> refused(n, 0);
+    std::vector<char> refused(n, 0), is_used(n, 0);
+    ColumnSet columns(A.rows(), n);
     for (int pass = 0; pass < exchanges * n; ++pass) {
         const VecX residual = b - A * x, descent = A.transpose() * residual;
+        const double rounding = nnls_rounding * (size_of_b + size * largest(x));
         int best = -1;
         double steepest = 0.0;
         for (int j = 0; j < n; ++j) {
-            if (refused[j] || std::find(used.begin(), used.end(), j) != used.end()) continue;
-            const double length = A.col(j).norm();
-            if (!(descent[j] > nnls_rounding * length * (b.norm() + A.cwiseAbs().maxCoeff() * largest(x)))) continue;
-            if (descent[j] > steepest * length) { steepest = descent[j] / length; best = j; }
+            if (refused[j] || is_used[j] || !(descent[j] > rounding * lengths[j])) continue;
+            if (descent[j] > steepest * lengths[j]) { steepest = descent[j] / lengths[j]; best = j; }
         }
         if (best < 0) break;
+        refused[best] = 1;  // unless its number is positive, also in rounding
+        if (!columns.append(A.col(best))) continue;
         used.push_back(best);
-        VecX s = solve_over(A, b, used);
-        if (!(s[s.size() - 1] > 0.0)) {  // positive but for rounding
-            refused[best] = 1;
+        VecX s = columns.solve(b);
+        if (!(s[s.size() - 1] > 0.0)) {
             used.pop_back();
+            columns.remove(static_cast<Eigen::Index>(used.size()));
             continue;
         }
         while (s.size() > 0 && s.minCoeff() <= 0.0) {  // step only as far as all stay nonnegative
@@ -69,13 +120,20 @@ VecX nonnegative_least_squares(const MatX& A, const VecX& b) {
             for (size_t k = 0; k < used.size(); ++k)
                 if (s[k] <= 0.0) part = std::min(part, x[used[k]] > 0.0 ? x[used[k]] / (x[used[k]] - s[k]) : 0.0);
             for (size_t k = 0; k < used.size(); ++k) x[used[k]] += part * (s[k] - x[used[k]]);
-            const auto stays = [&](int j) { return x[j] > nnls_rounding * largest(x); };
-            for (int j : used)
-                if (!stays(j)) x[j] = 0.0;
-            used.erase(std::stable_partition(used.begin(), used.end(), stays), used.end());
-            s = solve_over(A, b, used);
+            const double least = nnls_rounding * largest(x);
+            for (size_t k = used.size(); k-- > 0;) {
+                if (x[used[k]] > least) continue;
+                x[used[k]] = 0.0;
+                is_used[used[k]] = 0;
+                used.erase(used.begin() + static_cast<std::ptrdiff_t>(k));
+                columns.remove(static_cast<Eigen::Index>(k));
+            }
+            s = columns.solve(b);
         }
-        for (size_t k = 0; k < used.size(); ++k) x[used[k]] = s[k];
+        for (size_t k = 0; k < used.size(); ++k) {
+            x[used[k]] = s[k];
+            is_used[used[k]] = 1;
+        }
         std::fill(refused.begin(), refused.end(), char(0));
     }
     return x;
