@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
+from bisect import bisect_left, bisect_right
 from collections.abc import Collection, Iterator, Sequence
 from typing import cast
 
@@ -114,10 +114,27 @@ def _all(run: RunFields, acting: bool = False) -> Iterator[tuple[str, Array, str
     yield from _joints(run)
     places = [(p.name, p.v_first, p.nv, [FORCE_OF.get(u, "") for u in _motion(p)[1]]) for p in run.joints]
     for field, values, dofs in _by_dof(run):
-        for joint, first, nv, forces in places if dofs is None or not acting else _among(places, dofs):
-            part = values[:, first] if nv == 1 else values[:, first : first + nv]
-            yield from _numbered(f"{joint}.{field}", part, forces)
+        for joint, first, nv, forces in _among(places, dofs) if acting else places:
+            part = _of_dofs(values, dofs, first, nv)
+            yield from _numbered(f"{joint}.{field}", part[:, 0] if nv == 1 else part, forces)
     yield from _others(run)
+
+
+def _of_dofs(values: Array, dofs: Sequence[int], first: int, nv: int) -> Array:
+    """Return the columns of the degrees of freedom of a joint, (nt, nv), zero if no value belongs to them.
+
+    Args:
+        values: values by degree of freedom, (nt, n).
+        dofs: degree of freedom of each column, (n,), ascending.
+        first: first degree of freedom of the joint.
+        nv: number of its degrees of freedom.
+    """
+    start, stop = bisect_left(dofs, first), bisect_left(dofs, first + nv)
+    if stop - start == nv:
+        return values[:, start:stop]
+    part = np.zeros((len(values), nv))
+    part[:, [dof - first for dof in dofs[start:stop]]] = values[:, start:stop]
+    return part
 
 
 def _among(places: Sequence[Place], dofs: Collection[int]) -> Iterator[Place]:
@@ -168,16 +185,15 @@ def _motion(place: JointPlace) -> tuple[tuple[str, ...], tuple[str, ...]]:
     return (), ("",) * place.nv
 
 
-def _by_dof(run: RunFields) -> Iterator[tuple[str, Array, Sequence[int] | None]]:
-    """Yield the fields that have a column for each degree of freedom, with the dofs on which a law acts."""
+def _by_dof(run: RunFields) -> Iterator[tuple[str, Array, Sequence[int]]]:
+    """Yield the fields that have a column for each degree of freedom, with the dofs on which they act."""
     for field in ("F_ideal", "F_nonideal"):
         if getattr(run, field) is not None:
-            yield field, getattr(run, field), None
+            yield field, getattr(run, field), range(run.v.shape[1])
     dofs = dict(zip(run.law_names, run.law_dofs, strict=True)) if run.law_forces else {}
     for name, part in (run.law_forces or {}).items():
-        force = np.zeros(run.v.shape)
-        force[:, dofs[name]] = part
-        yield f"C.{name}", force, np.asarray(dofs[name]).tolist()
+        order = np.argsort(dofs[name], kind="stable")
+        yield f"C.{name}", part[:, order], np.asarray(dofs[name])[order].tolist()
 
 
 def _numbered(name: str, values: Array | None, units: Sequence[str]) -> Iterator[tuple[str, Array, str]]:

@@ -41,6 +41,9 @@ class Cubics:
         self._lines = np.array([(j.idx_v, j.idx_q) for j in joints if (j.nq, j.nv) == (1, 1)], dtype=int)
         self._lines = self._lines.reshape(-1, 2)
         self._flat = len(self._turns) + len(self._lines) == len(joints) == self.model.nv
+        # Steps of the intervals, and rates at their ends, each computed once.
+        self._known = np.zeros(len(self.t), dtype=bool)
+        self._differences = np.zeros((2, 0 if self._flat else len(self.t), self.model.nv))
 
     def configurations(self, k: NDArray[np.int64], s: Array) -> Array:
         """Configurations on the cubics, (n, nq).
@@ -112,7 +115,7 @@ class Cubics:
         run = self.run
         q0, q1, v0, v1 = run.q[k], run.q[k + 1], run.v[k], run.v[k + 1]
         h, part = (self.t[k + 1] - self.t[k])[:, None], s[:, None]
-        step, end_rate = self._steps(q0, q1, v1)
+        step, end_rate = self._steps(q0, q1, v1) if self._flat else self._curved_steps(k)
         dof = self._turns[:, 0]  # a continuous joint may turn more than once in a long step
         mean_turn = h * (v0 + v1)[:, dof] / 2.0
         step[:, dof] += 2.0 * np.pi * np.round((mean_turn - step[:, dof]) / (2.0 * np.pi))
@@ -126,13 +129,6 @@ class Cubics:
 
     def _steps(self, q0: Array, q1: Array, v1: Array) -> tuple[Array, Array]:
         """Differences of configurations, and rates at their ends in the tangent space at q0, (n, nv) each."""
-        if not self._flat:
-            pairs = list(zip(q0, q1, strict=True))
-            step = [pin.difference(self.model, *pair) for pair in pairs]
-            rates = [
-                pin.dDifference(self.model, *pair, pin.ARG1) @ v for pair, v in zip(pairs, v1, strict=True)
-            ]
-            return np.array(step).reshape(v1.shape), np.array(rates).reshape(v1.shape)
         steps = np.empty(v1.shape)
         dof, first = self._lines.T
         steps[:, dof] = q1[:, first] - q0[:, first]
@@ -140,6 +136,16 @@ class Cubics:
         x0, y0, x1, y1 = q0[:, first], q0[:, first + 1], q1[:, first], q1[:, first + 1]
         steps[:, dof] = np.arctan2(x0 * y1 - y0 * x1, x0 * x1 + y0 * y1)
         return steps, v1
+
+    def _curved_steps(self, k: NDArray[np.int64]) -> tuple[Array, Array]:
+        """Differences and rates at their ends, as `_steps`, of joints on any manifold."""
+        steps, rates = self._differences
+        for one in np.unique(k[~self._known[k]]):
+            pair = self.run.q[one], self.run.q[one + 1]
+            steps[one] = pin.difference(self.model, *pair)
+            rates[one] = pin.dDifference(self.model, *pair, pin.ARG1) @ self.run.v[one + 1]
+        self._known[k] = True
+        return steps[k], rates[k]
 
 
 def _closest(program: core.Program, q: Array, v: Array, t: Array, far: float) -> tuple[Array, Array]:

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 # Number of frames from which the bounding box of the motion is computed.
 BOX_FRAMES = 200
+# Number of points of a cloud that are compared at once, so that their projections stay in the cache.
+CLOUD_PART = 2048
 # Bodies with a longer travel than this multiple of the model's size leave a fixed view.
 MAX_FIXED_TRAVEL = 4.0
 
@@ -190,8 +192,16 @@ def _extreme_points(points: Array) -> Array:
     cloud = points.reshape(-1, 3)
     grid = np.array(list(product((-1.0, -0.5, 0.0, 0.5, 1.0), repeat=3)))
     shell = grid[np.abs(grid).max(axis=1) == 1.0]
-    reach = (shell / np.linalg.norm(shell, axis=1, keepdims=True)) @ cloud.T
-    return np.asarray(cloud[np.unique(np.argmax(reach, axis=1))])
+    shell = shell[: len(shell) // 2]  # the others are opposite
+    ways = shell / np.linalg.norm(shell, axis=1, keepdims=True)
+    far, chosen = np.full((2, len(ways)), -np.inf), np.zeros((2, len(ways)), dtype=int)
+    for first in range(0, len(cloud), CLOUD_PART):
+        reach = ways @ cloud[first : first + CLOUD_PART].T
+        for side, best in enumerate((reach.argmax(axis=1), reach.argmin(axis=1))):
+            own = np.take_along_axis(reach, best[:, None], axis=1)[:, 0] * (1.0 - 2.0 * side)
+            farther = own > far[side]
+            far[side, farther], chosen[side, farther] = own[farther], first + best[farther]
+    return np.asarray(cloud[np.unique(chosen)])
 
 
 def _direction(points: Array, up: Array, aslant: float) -> Array:

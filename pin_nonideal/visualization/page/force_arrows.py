@@ -86,6 +86,8 @@ def arrows_of(
     ]
     if run.lam is not None:
         for name, item, shown in constraints_of(run.scene):
+            if shown == core.Shown.contact:  # the forces of contacts are drawn at their points
+                continue
             rows = run.scene.constraint_slices[name]
             parts = {"total": motion.of(run.lam[:, rows])}
             if run.lam_ideal is not None:

@@ -46,6 +46,7 @@ class Motion:
         coordinates: coordinates of all joints, (n, width), see `Tracks`.
         held: intervals that are sampled too coarsely, (n - 1,); the page shows their first frame.
         size: diagonal of the model at the start [m].
+        cubics: cubics between the samples of the run.
     """
 
     times: Array
@@ -56,12 +57,17 @@ class Motion:
     coordinates: Array
     held: NDArray[np.bool_]
     size: float = 1.0
+    cubics: Cubics | None = None
 
     def of(self, values: Array) -> Array:
         """Return samples of the run at the frames, by linear interpolation; (nt, ...) gives (n, ...)."""
-        part = self.part.reshape(-1, *[1] * (values.ndim - 1))
-        after = np.minimum(self.before + 1, len(values) - 1)
-        return np.asarray((1.0 - part) * values[self.before] + part * values[after])
+        at_frames = values[self.before].astype(np.result_type(values, self.part), copy=False)
+        inner = np.flatnonzero(self.part)
+        if len(inner):
+            part = self.part[inner].reshape(-1, *[1] * (values.ndim - 1))
+            after = np.minimum(self.before[inner] + 1, len(values) - 1)
+            at_frames[inner] = (1.0 - part) * at_frames[inner] + part * values[after]
+        return at_frames
 
     def only(self, chosen: NDArray[np.int64]) -> Motion:
         """Return the motion at some of the frames."""
@@ -235,7 +241,9 @@ class _Frames:
         held = np.zeros(max(len(self.before) - 1, 0), dtype=bool)
         if len(self.well_sampled):
             held = ~self.well_sampled[np.minimum(self.before[:-1], len(self.well_sampled) - 1)]
-        return Motion(self.times(), poses, self.before, self.part, self.q, self.rows, held, self.size)
+        return Motion(
+            self.times(), poses, self.before, self.part, self.q, self.rows, held, self.size, self.cubics
+        )
 
 
 def _well_sampled(run: Trajectory, size: float) -> NDArray[np.bool_]:

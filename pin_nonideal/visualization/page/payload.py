@@ -284,14 +284,17 @@ def _impulse(event: Any) -> Array:
     return np.zeros(3) if impulse is None else np.asarray(impulse, dtype=float)
 
 
-def _plain(item: Any) -> Table:
-    """Return the fields of a dataclass, with arrays as lists."""
-    return {key: v.tolist() if isinstance(v, np.ndarray) else v for key, v in vars(item).items()}
+def _plain(item: Any, apart: Sequence[str] = ()) -> Table:
+    """Return the fields of a dataclass, with arrays as lists, except those that are stored apart."""
+    return {
+        key: v.tolist() if isinstance(v, np.ndarray) and key not in apart else v
+        for key, v in vars(item).items()
+    }
 
 
 def _stored_arrow(payload: Payload, motion: Motion, arrow: Arrow) -> Table:
     """Return an arrow with its origin in the frame of its joint, stored once if it is constant."""
-    stored = _plain(arrow)
+    stored = _plain(arrow, ("values", "origin"))
     stored["values"] = payload.add(arrow.values)
     if arrow.origin is not None:
         stored["origin"] = payload.add(
@@ -306,14 +309,14 @@ def _without_repetition(vectors: Array, size: float) -> Array:
 
 
 def _stored_mark(payload: Payload, motion: Motion, mark: Mark) -> Table:
-    stored = _plain(mark)
+    stored = _plain(mark, ("path", "closed"))
     stored["path"] = None if mark.path is None else payload.add(_without_repetition(mark.path, motion.size))
     stored["closed"] = None if mark.closed is None else payload.add(mark.closed, "u1")
     return stored
 
 
 def _stored_element(payload: Payload, motion: Motion, element: Element) -> Table:
-    stored = _plain(element)
+    stored = _plain(element, ("point", "axis", "share", "normal"))
     for key, size in (("point", motion.size), ("axis", 1.0)):
         stored[key] = payload.add(_without_repetition(np.atleast_2d(getattr(element, key)), size))
     for key in ("share", "normal"):
@@ -323,8 +326,9 @@ def _stored_element(payload: Payload, motion: Motion, element: Element) -> Table
 
 
 def _stored_guide(payload: Payload, guide: Guide) -> Table:
-    stored = _plain(guide)
-    for key in ("points", "shift", "normals"):
+    apart = ("points", "shift", "normals")
+    stored = _plain(guide, apart)
+    for key in apart:
         if stored[key] is not None:
             stored[key] = payload.add(getattr(guide, key))
     return stored

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -57,8 +58,7 @@ def resample(run: Trajectory, motion: Motion) -> tuple[Trajectory, Motion]:
     for key in NAMED:
         parts = getattr(run, key, None)
         if parts is not None:
-            exact = getattr(dense, key, None) or {}
-            values[key] = {name: at_frames(part, exact.get(name)) for name, part in parts.items()}
+            values[key] = _Resampled(parts, getattr(dense, key, None) or {}, at_frames)
     for key in ("modes", "closed"):  # constant from a sample to the next
         if getattr(run, key, None) is not None:
             values[key] = np.asarray(getattr(run, key))[motion.before]
@@ -76,8 +76,36 @@ def resample(run: Trajectory, motion: Motion) -> tuple[Trajectory, Motion]:
     return samples, replace(motion, before=np.arange(count), part=np.zeros(count))
 
 
+class _Resampled(Mapping[str, Array]):
+    """Values by name at the frames of a replay, each resampled when it is read first.
+
+    Args:
+        samples: values at the samples of the run by name.
+        exact: values at the frames between samples by name, where the interpolants of the steps are known.
+        at_frames: function of both that returns the values at the frames.
+    """
+
+    def __init__(
+        self, samples: Mapping[str, Array], exact: Mapping[str, Array], at_frames: Callable[..., Array]
+    ) -> None:
+        self._samples, self._exact, self._at_frames = samples, exact, at_frames
+        self._known: dict[str, Array] = {}
+
+    def __getitem__(self, name: str) -> Array:
+        if name not in self._known:
+            self._known[name] = self._at_frames(self._samples[name], self._exact.get(name))
+        return self._known[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._samples)
+
+    def __len__(self) -> int:
+        return len(self._samples)
+
+
 def _velocities(run: Trajectory, motion: Motion, inner: NDArray[np.intp]) -> Array:
     """Return the velocities of the cubic at frames between samples, else of the samples, (n, nv)."""
     velocities = motion.of(run.v)
-    velocities[inner] = Cubics(run).velocities(motion.before[inner], motion.part[inner])
+    cubics = motion.cubics or Cubics(run)
+    velocities[inner] = cubics.velocities(motion.before[inner], motion.part[inner])
     return velocities

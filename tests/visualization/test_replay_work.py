@@ -1,0 +1,113 @@
+"""Work on a replay page: values are computed once and where they are drawn, and the page stays the same."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import pin_nonideal as pn
+from pin_nonideal.visualization.page import between_samples, camera, frames, payload, resampling
+
+COUNT = 4
+
+
+def boxes(beside=False):
+    """Boxes that fall on a floor and come to rest; two of them have contacts with each other if `beside`."""
+    model, shapes = pin.Model(), pin.GeometryModel()
+    for k in range(2 if beside else COUNT):
+        place = np.array([0.15 * k, 0.0, 0.08 + 0.02 * k])
+        pn.free_body(model, f"box {k}", coal.Box(0.1, 0.1, 0.1), 500.0, collision_model=shapes, place=place)
+    contacts = pn.ground_contacts(model, shapes, mu=0.4)
+    contacts += pn.geometry_contacts(model, shapes, mu=0.4) if beside else []
+    scene = pn.Scene(model, contacts=contacts, collision_model=shapes)
+    v = (0.02 if beside else 0.5) * np.random.default_rng(1).uniform(-1.0, 1.0, model.nv)
+    record = ("forces", "energy", "reactions")
+    options = {"method": "moreau", "dt": 1e-3, "record": record, "output_dt": 0.01}
+    return pn.simulate(scene, 0.4, v=v, progress=False, **options)
+
+
+def four_bar():
+    record = ("forces", "energy")
+    return pn.simulate(pn.load("four_bar"), 0.5, output_dt=0.01, record=record, progress=False)
+
+
+RUNS = {"boxes": boxes, "four_bar": four_bar}
+
+
+def packed(run):
+    return payload.packed_runs([run], ["run"], None, "title", None, True)
+
+
+def interpolated(motion, values):
+    """Samples of a run at the frames of a motion, by one formula for all frames."""
+    part = motion.part.reshape(-1, *[1] * (values.ndim - 1))
+    after = np.minimum(motion.before + 1, len(values) - 1)
+    return (1.0 - part) * values[motion.before] + part * values[after]
+
+
+def extreme_points(points):
+    """Extreme points of a cloud in all directions at once."""
+    cloud = points.reshape(-1, 3)
+    grid = np.array(list(product((-1.0, -0.5, 0.0, 0.5, 1.0), repeat=3)))
+    shell = grid[np.abs(grid).max(axis=1) == 1.0]
+    reach = (shell / np.linalg.norm(shell, axis=1, keepdims=True)) @ cloud.T
+    return cloud[np.unique(np.argmax(reach, axis=1))]
+
+
+@pytest.mark.parametrize("kind", RUNS)
+def test_a_page_equals_that_of_plain_formulas(kind, monkeypatch):
+    run = RUNS[kind]()
+    page = packed(run)
+    monkeypatch.setattr(frames.Motion, "of", interpolated)
+    monkeypatch.setattr(camera, "_extreme_points", extreme_points)
+    assert packed(run) == page
+
+
+def test_extreme_points_of_a_large_cloud_are_those_of_all_points_at_once():
+    cloud = np.random.default_rng(0).normal(size=(3 * camera.CLOUD_PART + 17, 3))
+    np.testing.assert_array_equal(camera._extreme_points(cloud), extreme_points(cloud))
+    corners = np.array(list(product((-1.0, 1.0), repeat=3)))  # many of them are equally far
+    cloud = np.tile(corners, (camera.CLOUD_PART, 1))
+    np.testing.assert_array_equal(camera._extreme_points(cloud), extreme_points(cloud))
+
+
+def test_displacements_between_samples_are_computed_once(monkeypatch):
+    run, calls, difference = boxes(), [], pin.difference
+
+    def counted(*arguments):
+        calls.append(arguments)
+        return difference(*arguments)
+
+    monkeypatch.setattr(between_samples.pin, "difference", counted)
+    packed(run)
+    assert 0 < len(calls) <= len(run.t) - 1
+
+
+def test_forces_of_contacts_that_stay_open_are_not_resampled(monkeypatch):
+    """Two boxes have 160 gaps, which the page shows if they close."""
+    run, asked, read = boxes(beside=True), set(), resampling._Resampled.__getitem__
+
+    def recorded(self, name):
+        if self._samples is run.contact_forces:
+            asked.add(name)
+        return read(self, name)
+
+    monkeypatch.setattr(resampling._Resampled, "__getitem__", recorded)
+    packed(run)
+    between = {name for name in run.scene.contact_names if "ground" not in name}
+    assert len(between) == 160
+    assert asked == set(run.scene.contact_names) - between
+
+
+def test_resampled_values_are_a_mapping_with_values_at_the_frames():
+    samples, exact = {"a": np.arange(3.0), "b": np.ones(3)}, {"a": np.zeros(1)}
+    resampled = resampling._Resampled(samples, exact, lambda part, known: (part, known))
+    assert list(resampled) == ["a", "b"]
+    assert len(resampled) == 2
+    assert resampled["a"][1] is exact["a"]
+    assert dict(resampled)["b"] == (samples["b"], None)
+    assert resampled["b"] is resampled["b"]
