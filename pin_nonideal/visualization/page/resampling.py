@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, ItemsView, Iterator, Mapping, ValuesView
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pin_nonideal.scene.scene import compiled_scene
+from pin_nonideal.trajectory.groups import Group
 from pin_nonideal.types import Array
 
 from .between_samples import Cubics
@@ -58,7 +59,7 @@ def resample(run: Trajectory, motion: Motion) -> tuple[Trajectory, Motion]:
     for key in NAMED:
         parts = getattr(run, key, None)
         if parts is not None:
-            values[key] = _Resampled(parts, getattr(dense, key, None) or {}, at_frames)
+            values[key] = _Resampled(key, parts, getattr(dense, key, None) or {}, at_frames)
     for key in ("modes", "closed"):  # constant from a sample to the next
         if getattr(run, key, None) is not None:
             values[key] = np.asarray(getattr(run, key))[motion.before]
@@ -76,31 +77,45 @@ def resample(run: Trajectory, motion: Motion) -> tuple[Trajectory, Motion]:
     return samples, replace(motion, before=np.arange(count), part=np.zeros(count))
 
 
-class _Resampled(Mapping[str, Array]):
+class _Resampled(Group):
     """Values by name at the frames of a replay, each resampled when it is read first.
 
     Args:
+        field: field of the Trajectory.
         samples: values at the samples of the run by name.
         exact: values at the frames between samples by name, where the interpolants of the steps are known.
         at_frames: function of both that returns the values at the frames.
     """
 
     def __init__(
-        self, samples: Mapping[str, Array], exact: Mapping[str, Array], at_frames: Callable[..., Array]
+        self,
+        field: str,
+        samples: Mapping[str, Array],
+        exact: Mapping[str, Array],
+        at_frames: Callable[..., Array],
     ) -> None:
-        self._samples, self._exact, self._at_frames = samples, exact, at_frames
-        self._known: dict[str, Array] = {}
+        super().__init__(field, samples)
+        self._exact, self._at_frames, self._left = exact, at_frames, set(samples)
 
     def __getitem__(self, name: str) -> Array:
-        if name not in self._known:
-            self._known[name] = self._at_frames(self._samples[name], self._exact.get(name))
-        return self._known[name]
+        if name in self._left:
+            self._left.remove(name)
+            self[name] = self._at_frames(super().__getitem__(name), self._exact.get(name))
+        return super().__getitem__(name)
 
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._samples)
+    def __iter__(self) -> Iterator[str]:  # a dict with an iterator of its own is copied by its items
+        return super().__iter__()
 
-    def __len__(self) -> int:
-        return len(self._samples)
+    def get(self, name: str, default: Array | None = None) -> Array | None:  # type: ignore[override]
+        if name not in self:
+            return default
+        return self[name]
+
+    def values(self) -> ValuesView[Array]:  # type: ignore[override]
+        return ValuesView(self)
+
+    def items(self) -> ItemsView[str, Array]:  # type: ignore[override]
+        return ItemsView(self)
 
 
 def _velocities(run: Trajectory, motion: Motion, inner: NDArray[np.intp]) -> Array:
