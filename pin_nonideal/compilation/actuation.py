@@ -102,6 +102,8 @@ def _write(part: Part, out: core.Builder) -> None:
         out.add_breaks(part.breaks.tolist())
     else:
         out.set_sampled_torque(part.function, part.period)
+        if part.beside is not None:
+            out.add_torque_table(part.beside.times.tolist(), np.ascontiguousarray(part.beside.values))
 
 
 # --- one drive ----------------------------------------------------------------------------------------------

@@ -42,12 +42,14 @@ class Spring(NamedTuple):
 class Called(NamedTuple):
     """Torques of a function (t, q, v) -> tau, held between samples of `period` [s] if it is not None.
 
-    Steps end at the times `breaks` [s], (n,), where torques that are not held may jump.
+    Steps end at the times `breaks` [s], (n,), where torques that are not held may jump. The torques of the
+    table `beside` add to held torques.
     """
 
     function: Callable[..., Any]
     period: float | None
     breaks: Array = np.zeros(0)
+    beside: Timed | None = None
 
 
 Part = Constant | Timed | Spring | Called
@@ -89,7 +91,10 @@ def sum_of_torques(parts: Sequence[Part], drives: Sequence[object], model: Model
     if periods:
         _require_steady(parts, drives)
     late = SAMPLE_ROUNDING * periods[0] if periods else 0.0
-    functions = [_function_of(part, model, late) for part in parts]
+    linear = [part for part in parts if periods and isinstance(part, Timed) and not part.held]
+    functions = [
+        _function_of(part, model, late) for part in parts if not any(part is table for table in linear)
+    ]
 
     def total(t: float, q: Array, v: Array) -> Array:
         tau = np.zeros(model.nv)
@@ -98,14 +103,14 @@ def sum_of_torques(parts: Sequence[Part], drives: Sequence[object], model: Model
         return tau
 
     if periods:
-        return Called(total, periods[0])
+        return Called(total, periods[0], beside=_sum_of_tables(linear) if linear else None)
     times = [part.times for part in parts if isinstance(part, Timed)]
     times += [part.breaks for part in parts if isinstance(part, Called)]
     return Called(total, None, np.unique(np.concatenate([np.zeros(0), *times])))
 
 
 def _require_steady(parts: Sequence[Part], drives: Sequence[object]) -> None:
-    """Check that torques beside sampled torques are constant between the samples.
+    """Check that torques beside sampled torques are those of tables, or constant between the samples.
 
     Raises:
         InputError: see above.
@@ -113,19 +118,13 @@ def _require_steady(parts: Sequence[Part], drives: Sequence[object]) -> None:
     periods = [part.period if isinstance(part, Called) else None for part in parts]
     sampled = next(k for k, period in enumerate(periods) if period is not None)
     for part, period, drive in zip(parts, periods, drives, strict=True):
-        if (
-            isinstance(part, Constant)
-            or (isinstance(part, Timed) and part.held)
-            or period == periods[sampled]
-        ):
+        if isinstance(part, (Constant, Timed)) or period == periods[sampled]:
             continue
-        advice = "give all drives one period, or compute their sum in one function"
-        if isinstance(part, Timed):
-            advice = 'give the Table times at the samples and interpolation="hold"'
         got = kind_of_drive(drive) + ("" if period is None else f" with a period of {period:g} s")
         raise InputError(
             f"actuation: torques that {kind_of_drive(drives[sampled])} holds between samples of "
-            f"{periods[sampled]:g} s add only to torques that change at these samples; got {got}; {advice}"
+            f"{periods[sampled]:g} s add only to torques of tables and to torques that change at these "
+            f"samples; got {got}; give all drives one period, or compute their sum in one function"
         )
 
 

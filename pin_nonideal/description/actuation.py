@@ -56,9 +56,9 @@ class SampledControl:
     (`Scene.acceleration`, `Scene.solve`, `Scene.step`) have no earlier samples, so `initial` acts there.
     Torques that replace the actuation, as those of `Stepper.step` and of a callback, act without delay.
 
-    A control with `joints` may stand in a list of drives, beside drives whose torques change at its samples
-    only: constant torques, controls of the same period, a `TrackTrajectory` with this period, and a `Table`
-    with interpolation "hold" at times t0 + k period. One control of a list may have a delay.
+    A control with `joints` may stand in a list of drives. The others are constant torques, controls and
+    `TrackTrajectory` drives of the same period, and tables. A `Table` with interpolation "hold" has times
+    t0 + k period. A linear one has any times. One control of a list may have a delay.
 
     Args:
         function: (t, q, v) -> tau, shape (nv,) or by joint name, called once per period.

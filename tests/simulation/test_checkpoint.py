@@ -55,6 +55,17 @@ def driven_arm():
     return pn.Scene(scene.model, laws=scene.laws, q0=scene.q0, actuation=control, name="arm")
 
 
+def mixed_arm():
+    """The package's arm with joints that a sampled control drives, beside joints that follow a table."""
+    scene = pn.load("panda_friction")
+    names, times = list(scene.model.names)[1:], np.linspace(0.0, 0.2, 12)
+    brake = pn.SampledControl(
+        lambda t, q, v: dict(zip(names[:3], -5.0 * v[:3], strict=True)), 0.013, joints=names[:3]
+    )
+    ramps = pn.Table(times, {name: 20.0 * np.sin(9.0 * times + k) for k, name in enumerate(names[3:])})
+    return scene.replace(actuation=[brake, ramps])
+
+
 def weak_arm():
     """Return an arm whose motors reach their effort limits again and again."""
     scene = pn.load("panda_friction")
@@ -74,6 +85,8 @@ RUNS = {
     "redundant loops": (lambda: pn.load("n_four_bar", N=4), 0.5, {"record": "forces", "output_dt": 0.05}),
     "sliding feet": (lambda: pn.load("solo12_standing"), 0.2, {"record": "energy", "rtol": 1e-5}),
     "sampled torque": (driven_arm, 0.2, {"record": "energy"}),
+    "sampled torque beside a table": (mixed_arm, 0.2, {"record": ALL, "rtol": 1e-6}),
+    "time stepping beside a table": (mixed_arm, 0.2, {"record": ALL, "method": "moreau", "dt": 5e-3}),
     "events, Pinocchio's terms": (
         lambda: again(cart(), terms="pinocchio"),
         1.5,

@@ -308,11 +308,10 @@ CONTROL = pn.SampledControl(speed, PERIOD, joints=["shoulder"], name="servo")
     ("drives", "message"),
     [
         (
-            [CONTROL, pn.Table(STEPS, {"elbow": LOG}, name="log")],
-            'SampledControl "servo" holds between samples of 0.01 s add only to torques that change at these '
-            'samples; got Table "log"; give the Table times at the samples and interpolation="hold"',
+            [CONTROL, pn.HoldPosition({"elbow": 1.0}, {"elbow": 1.0})],
+            'SampledControl "servo" holds between samples of 0.01 s add only to torques of tables and to '
+            "torques that change at these samples; got HoldPosition; give all drives one",
         ),
-        ([CONTROL, pn.HoldPosition({"elbow": 1.0}, {"elbow": 1.0})], "got HoldPosition; give all drives one"),
         (
             [CONTROL, pn.SampledControl(speed, 0.02, joints=["elbow"])],
             "got SampledControl with a period of 0.02 s; give all drives one period",
@@ -350,6 +349,153 @@ def test_times_of_a_table_between_samples_are_refused_before_the_run():
             pn.InputError, match=r'Table "log": times must be samples .*"servo".*got 0\.035 s'
         ):
             act()
+
+
+KINKS = np.array([0.05, 0.112, 0.3, 0.303, 0.71])  # on the steps of METHODS, mostly between samples
+RAMPS = 3.0 * np.array([0.0, 2.0, -1.0, 3.0, -2.0])
+
+
+def two_arms():
+    """Two links on the world, joints "shoulder" and "elbow", which do not act on each other."""
+    model = pin.Model()
+    for name, length in (("shoulder", 0.5), ("elbow", 0.3)):
+        joint = model.addJoint(0, pin.JointModelRY(), pin.SE3.Identity(), name)
+        inertia = pin.Inertia(1.0, np.array([0.1, 0.0, -length]), 0.1 * np.eye(3))
+        model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
+    return model
+
+
+def own_speed(t, q, v):
+    return {"shoulder": 6.0 * (1.0 - v[0]) - q[0]}
+
+
+def beside_ramps(interpolation="linear", **delay):
+    control = pn.SampledControl(own_speed, PERIOD, joints=["shoulder"], **delay)
+    return [control, pn.Table(KINKS, {"elbow": RAMPS}, interpolation=interpolation)]
+
+
+def of_arms(actuation, laws=FRICTION, **options):
+    scene = pn.Scene(two_arms(), laws=laws, actuation=actuation)
+    return pn.simulate(scene, END, progress=False, **options)
+
+
+# Events of one arm shorten the steps of both, which changes motions by a method of order 1.
+SEPARATE = [
+    (method, laws)
+    for method in METHODS
+    for laws in ((), FRICTION)
+    if not laws or method != "semi_implicit_euler"
+]
+
+
+@pytest.mark.parametrize(("method", "laws"), SEPARATE)
+def test_a_linear_table_beside_a_sampled_control_moves_its_joints_as_alone(method, laws):
+    """Each of two arms moves as if the other one had no drive, by every method of the core."""
+    options = METHODS[method] | {"record": ("tau", "energy"), "output_dt": 0.05}
+    drives = beside_ramps()
+    both, *alone = (of_arms(actuation, laws, **options) for actuation in (drives, *drives))
+    for dof, one in enumerate(alone):
+        for key in ("q", "v", "tau"):
+            ours, other = getattr(both, key)[both.grid, dof], getattr(one, key)[one.grid, dof]
+            np.testing.assert_allclose(ours, other, rtol=0.0, atol=1e-9)
+    work = [one.energy["actuation"][-1] for one in (both, *alone)]
+    np.testing.assert_allclose(work[0], sum(work[1:]), rtol=0.0, atol=1e-9)
+    if method in ("dop853", "dopri5", "rk4"):
+        assert np.abs(both.energy["balance"]).max() < 1e-8
+    assert np.ptp(both.q, axis=0).min() > 0.1
+
+
+def test_steps_end_at_samples_and_at_kinks_and_the_torque_between_them_is_linear():
+    one = of_arms(beside_ramps(), record="tau")
+    assert set(KINKS) <= set(one.t)
+    assert {PERIOD * k for k in range(1, 100)} <= set(one.t)
+    np.testing.assert_allclose(one.tau[:, 1], np.interp(one.t, KINKS, RAMPS), rtol=0.0, atol=1e-12)
+    periods = one.t / PERIOD
+    inside = np.abs(periods - np.round(periods)) > 1e-6
+    held = [one.tau[inside & (np.floor(periods) == k), 0] for k in range(100)]
+    assert max(np.ptp(torques) for torques in held if torques.size) == 0.0
+
+
+def test_a_table_beside_a_delayed_control_is_not_late():
+    drives = beside_ramps(delay_samples=3, initial={"shoulder": 0.5})
+    late, alone = of_arms(drives, record="tau"), of_arms(drives[0], record="tau")
+    np.testing.assert_allclose(late.tau[:, 1], np.interp(late.t, KINKS, RAMPS), rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(late.q[-1, 0], alone.q[-1, 0], rtol=0.0, atol=1e-8)
+
+
+def test_ways_of_running_a_control_beside_a_linear_table():
+    """Runs of a rollout and of a stepper are the run of simulate; a torque of the caller replaces all."""
+    scene = pn.Scene(two_arms(), actuation=beside_ramps())
+    options = {"method": "rk4", "dt": PERIOD}
+    whole = pn.simulate(scene, 0.5, progress=False, **options)
+    for each in pn.rollout(scene, [scene.q0] * 2, [scene.v0] * 2, 0.5, jobs=2, **options):
+        np.testing.assert_array_equal(each.q, whole.q)
+    stepper = scene.stepper(PERIOD, **options)
+    for _ in range(50):
+        stepper.step()
+    np.testing.assert_allclose(stepper.q, whole.q[-1], rtol=0.0, atol=1e-12)
+    plain, replaced = pn.Scene(two_arms()).stepper(PERIOD, **options), scene.stepper(PERIOD, **options)
+    for _ in range(10):
+        plain.step([1.0, 2.0])
+        replaced.step([1.0, 2.0])
+    np.testing.assert_allclose(replaced.q, plain.q, rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("method", ["dop853", "rk4", "moreau"])
+def test_torques_that_replace_a_sampled_control_act_past_its_samples(method):
+    """Runs of a stepper and with a callback go on where the next sample would be."""
+    options = {"method": method} | ({} if method == "dop853" else {"dt": PERIOD / 2})
+    torque = [1.0, 2.0]
+    driven, plain = (
+        pn.Scene(two_arms(), actuation=a) for a in (pn.SampledControl(own_speed, PERIOD), torque)
+    )
+    steps, expected = driven.stepper(3.0 * PERIOD, **options), plain.stepper(3.0 * PERIOD, **options)
+    for _ in range(4):
+        steps.step(torque)
+        expected.step()
+    np.testing.assert_allclose(steps.q, expected.q, rtol=0.0, atol=1e-9)
+    told = pn.simulate(driven, 0.1, callback=lambda t, q, v: torque, progress=False, **options)
+    np.testing.assert_allclose(
+        told.q[-1], pn.simulate(plain, 0.1, progress=False, **options).q[-1], rtol=0.0, atol=1e-7
+    )
+
+
+def test_limits_clip_a_table_beside_a_sampled_control_where_it_reaches_them():
+    limited = pn.EffortLimits(beside_ramps(), effort={"elbow": 4.5})
+    one = of_arms(limited, record="tau")
+    at = [event.time for event in one.events if event.kind == "saturate"]
+    assert np.abs(one.tau[:, 1]).max() <= 4.5
+    first = np.interp(4.5, RAMPS[:2], KINKS[:2])
+    assert abs(at[0] - first) < 1e-9
+
+
+def test_a_scene_without_motion_waits_for_the_table():
+    """An arm at rest at first is driven by a table whose torques begin later."""
+    model = two_arms()
+    model.gravity = pin.Motion.Zero()
+    still = pn.SampledControl(lambda t, q, v: [0.0, 0.0], PERIOD, joints=["shoulder"])
+    table = pn.Table([0.5, 0.9], {"elbow": [0.0, 1.0]})
+    runs = [
+        pn.simulate(pn.Scene(model, actuation=actuation), END, method=method, dt=dt, progress=False)
+        for method, dt in (("dop853", None), ("moreau", 1e-3))
+        for actuation in ([still, table], table)
+    ]
+    for both, alone in (runs[:2], runs[2:]):
+        np.testing.assert_allclose(both.q[-1], alone.q[-1], rtol=0.0, atol=1e-9)
+        assert both.q[-1, 1] > 1e-2
+
+
+def test_a_held_and_a_linear_table_stand_beside_one_control():
+    model = two_arms()
+    joint = model.addJoint(0, pin.JointModelRY(), pin.SE3.Identity(), "third")
+    model.appendBodyToJoint(joint, pin.Inertia.Random(), pin.SE3.Identity())
+    held = pn.Table(STEPS, {"third": LOG}, interpolation="hold")
+    scene = pn.Scene(model, actuation=[held, *beside_ramps()])
+    one = pn.simulate(scene, END, record="tau", output_dt=PERIOD / 2, progress=False)
+    np.testing.assert_allclose(one.tau[:, 1], np.interp(one.t, KINKS, RAMPS), rtol=0.0, atol=1e-12)
+    middle = np.flatnonzero(one.grid)[1::2]
+    k = np.searchsorted(STEPS, one.t[middle], side="right") - 1
+    np.testing.assert_array_equal(one.tau[middle, 2], LOG[k])
 
 
 def test_torques_of_joints_that_a_control_does_not_command_are_refused():

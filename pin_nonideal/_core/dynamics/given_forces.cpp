@@ -55,6 +55,16 @@ struct Apply {
     }
 };
 
+// Add the torques of a table at a time.
+void add_torques(const TorqueTable& table, double t, VecX& tau) {
+    const auto& x = table.times;
+    if (t <= x.front()) { tau += table.values.col(0); return; }
+    if (t >= x.back()) { tau += table.values.col(table.values.cols() - 1); return; }
+    const int k = static_cast<int>(std::upper_bound(x.begin(), x.end(), t) - x.begin()) - 1;
+    const double s = (t - x[k]) / (x[k + 1] - x[k]);
+    tau += (1.0 - s) * table.values.col(k) + s * table.values.col(k + 1);
+}
+
 struct Torque {
     const Program& p;
     Workspace& w;
@@ -87,20 +97,20 @@ struct Torque {
         }
     }
     void operator()(const TorqueTable& table) const {
-        const auto& x = table.times;
-        if (t <= x.front()) { tau = table.values.col(0); return; }
-        if (t >= x.back()) { tau = table.values.col(table.values.cols() - 1); return; }
-        const int k = static_cast<int>(std::upper_bound(x.begin(), x.end(), t) - x.begin()) - 1;
-        const double s = (t - x[k]) / (x[k + 1] - x[k]);
-        tau = (1.0 - s) * table.values.col(k) + s * table.values.col(k + 1);
+        tau.setZero();
+        add_torques(table, t, tau);
     }
 };
 
 }  // namespace
 
 void asked_torque(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, VecX& tau) {
-    if (w.now.has_override) tau = w.now.override_torque;
-    else std::visit(Torque{p, w, t, q, v, tau}, p.actuation);
+    if (w.now.has_override) {
+        tau = w.now.override_torque;
+        return;
+    }
+    std::visit(Torque{p, w, t, q, v, tau}, p.actuation);
+    if (!p.added_torque.times.empty()) add_torques(p.added_torque, t, tau);
 }
 
 void given_forces(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {

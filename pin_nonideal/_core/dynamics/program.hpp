@@ -58,11 +58,16 @@ struct Program {
 
     std::vector<GivenForce> forces;
     Actuation actuation;
+    TorqueTable added_torque;            // torques beside those of a sampled control, without times if there are none
     VecX least_effort, most_effort;      // limits of the actuators, by dof (empty if unlimited)
 
     // Flags that skip computations that the scene does not need.
     bool has_laws() const { return !frictions.empty() || !laws.empty(); }
     bool limits_effort() const { return least_effort.size() > 0; }
+    // Return the actuation torques that are linear between times, null if there are none.
+    const TorqueTable* torque_table() const {
+        return added_torque.times.empty() ? std::get_if<TorqueTable>(&actuation) : &added_torque;
+    }
     bool needs_reactions = false;        // some law reads them
     bool rubs_while_closed = false;      // the only laws are frictions of unilateral contacts
     bool driven = false;                 // forces or actuation

@@ -48,7 +48,11 @@ struct SampledTorque {
     double period;
 };
 struct HoldPosition { VecX kp, kd, q; };
-struct TorqueTable { std::vector<double> times; MatX values; };  // one column per time
+// Torques at increasing times, one column per time. They are linear in between and constant outside.
+struct TorqueTable {
+    std::vector<double> times;
+    MatX values;
+};
 using Actuation = std::variant<NoActuation, ConstantTorque, TorqueFunction, SampledTorque, HoldPosition, TorqueTable>;
 
 }  // namespace pn

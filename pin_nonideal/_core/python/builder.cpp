@@ -167,6 +167,9 @@ void bind_actuation(nb::class_<Builder>& builder) {
         .def("set_torque_table", [](Builder& b, std::vector<double> times, Array2 values) {
             b.p->actuation = TorqueTable{std::move(times), map(values).transpose()};
         }, "times"_a, "values"_a)
+        .def("add_torque_table", [](Builder& b, std::vector<double> times, Array2 values) {
+            b.p->added_torque = TorqueTable{std::move(times), map(values).transpose()};
+        }, "times"_a, "values"_a)
         .def("limit_effort", [](Builder& b, Array least, Array most) {
             b.p->least_effort = map(least);
             b.p->most_effort = map(most);

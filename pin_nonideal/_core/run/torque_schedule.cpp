@@ -58,9 +58,10 @@ void Torques::take_rate_anew() {
 
 double Torques::next_stop(double after, double t_end) const {
     double stop = std::min(t_end, breaks_.next(after));
-    if (const auto* sampled = std::get_if<SampledTorque>(&p.actuation))
+    const auto* sampled = std::get_if<SampledTorque>(&p.actuation);
+    if (sampled && !w.now.has_override)  // nothing is sampled while other torques replace the actuation
         stop = std::min(stop, options_.t0 + now_.next_period * sampled->period);
-    if (const auto* table = std::get_if<TorqueTable>(&p.actuation)) {
+    if (const TorqueTable* table = p.torque_table()) {
         const auto next = std::upper_bound(table->times.begin(), table->times.end(), after);
         if (next != table->times.end()) stop = std::min(stop, *next);
     }

@@ -24,7 +24,7 @@ System::System(const Program& program, Workspace& workspace, bool with_energy)
       q(VecX::Zero(nq)), v(VecX::Zero(nv)), q_before_(q) {}
 
 bool System::stands(const VecX& y, const VecX& dy) const {
-    const bool in_time = p.asks_functions || p.moves_in_time || std::holds_alternative<TorqueTable>(p.actuation);
+    const bool in_time = p.asks_functions || p.moves_in_time || p.torque_table() != nullptr;
     return !in_time && (velocity(y).array() == 0.0).all() && (dy.head(ns).array() == 0.0).all();
 }
 

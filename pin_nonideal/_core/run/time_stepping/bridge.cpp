@@ -21,7 +21,7 @@ constexpr double least_cut = 1e-3;
 // another method in between.
 bool may_differ(const Program& p, const Options& options) {
     return options.method.scheme != Method::Scheme::moreau || p.asks_functions || p.moves_in_time || options.callback ||
-           std::holds_alternative<SampledTorque>(p.actuation) || std::holds_alternative<TorqueTable>(p.actuation);
+           std::holds_alternative<SampledTorque>(p.actuation) || p.torque_table() != nullptr;
 }
 
 // Check if accelerations and forces are needed at the end of every step.
