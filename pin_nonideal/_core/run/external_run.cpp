@@ -55,15 +55,15 @@ std::optional<int> FollowedRun::singular_onset() {
 // events.
 bool FollowedRun::bridges_cluster() const {
     return !out.events.empty() && out.events.back().kind == Event::Kind::chatter &&
-           t < out.events.back().time + chatter_time;
+           progress.t < out.events.back().time + chatter_time;
 }
 
 bool FollowedRun::follow(double end, const OutsideStep::Interpolant& interpolant) {
     between_steps();
-    moved_energy = moved_before_;
-    stepper.y0 = y;
-    stepper.start_rate() = rate;
-    stepper.follow(t, end - t, interpolant);
+    progress.moved_energy = moved_before_;
+    stepper.y0 = progress.y;
+    stepper.start_rate() = progress.rate;
+    stepper.follow(progress.t, end - progress.t, interpolant);
     system.project_and_evaluate(end, stepper.y1, stepper.end_rate());
     event.reset();
     if (!bridges_cluster()) find_event();
@@ -72,7 +72,7 @@ bool FollowedRun::follow(double end, const OutsideStep::Interpolant& interpolant
     system.on_constraints = w.now.rows.distance < near_singular && !w.now.rows.blocks.empty();
     const bool breaks_here = breaks.reached() && !done();
     if (breaks_here) pass_break();
-    if (event || breaks_here || options.method.one_step) moved_before_ = moved_energy;
+    if (event || breaks_here || options.method.one_step) moved_before_ = progress.moved_energy;
     return event.has_value() || breaks_here;
 }
 

@@ -33,10 +33,10 @@ public:
     // integrator that does not solve for the direction.
     std::optional<int> singular_onset();
 
-    double time() const { return t; }
+    double time() const { return progress.t; }
     using Simulation::done;
-    VecX state() const { return y.head(system.ns); }
-    VecX state_rate() const { return rate.head(system.ns); }
+    VecX state() const { return progress.y.head(system.ns); }
+    VecX state_rate() const { return progress.rate.head(system.ns); }
 
 private:
     bool bridges_cluster() const;

@@ -44,34 +44,35 @@ constexpr double shortest_sought = 1e-9;
 
 Simulation::Simulation(const Program& program, Workspace& workspace, const Options& run_options, Recording& recording)
     : p(program), w(workspace), options(run_options), out(recording), t_end(options.end()),
-      system(program, workspace, options.record.energy), norm(system, options.rtol, options.atol, rounding),
+      system(program, workspace, options.record.energy), norm(system, options.rtol, options.atol, progress.rounding),
       stepper(options.method, system, norm), control(options.method, options.rtol),
-      choice(system, stepper, *this, run_options), stiffness(system, stepper, *this, run_options),
-      floor(system, stepper, norm, *this, recording), growth(system, *this, run_options, recording),
-      watch(system, gaps), locator(system, stepper, norm, slip_at_start, pulls, watch), hand_over(system, *this),
-      output(system, stepper, *this, run_options, recording), notices(system, stepper, *this, recording),
-      value_events(run_options.events, system, stepper, *this), breaks(system, *this, output, recording),
-      torques(system, *this, run_options, output, breaks),
-      landing(system, *this, watch, run_options, output, recording),
-      time_stepping(system, *this, watch, run_options, torques, output, notices, value_events, recording),
-      clusters(system, *this, run_options, stiffness, time_stepping, recording),
-      modes(system, *this, run_options, torques, output, landing, clusters, recording) {
-    y = rate = configured_y = VecX::Zero(system.ny);
+      choice(system, stepper, progress, run_options), stiffness(system, stepper, progress, run_options),
+      floor(system, stepper, norm, progress, recording), growth(system, progress, run_options, recording),
+      watch(system, progress.gaps),
+      locator(system, stepper, norm, progress.slip_at_start, progress.pulls, watch), hand_over(system, progress),
+      output(system, stepper, progress, run_options, recording), notices(system, stepper, progress, recording),
+      value_events(run_options.events, system, stepper, progress), breaks(system, progress, output, recording),
+      torques(system, progress, run_options, output, breaks),
+      landing(system, progress, watch, run_options, output, recording),
+      time_stepping(system, progress, watch, run_options, torques, output, notices, value_events, recording),
+      clusters(system, progress, run_options, stiffness, time_stepping, recording),
+      modes(system, progress, run_options, torques, output, landing, clusters, recording) {
+    progress.y = progress.rate = progress.configured_y = VecX::Zero(system.ny);
     // Time stepping solves for velocities. Accelerations are only recorded, so the solution nearest to the last one
     // suffices.
     const bool in_time = options.method.scheme == Method::Scheme::moreau;
     w.continues = options.continues || (in_time && system.ng > 0);
-    slip_at_start.assign(p.frictions.size(), 0.0);
-    pulls.assign(p.contacts.size(), 0);
+    progress.slip_at_start.assign(p.frictions.size(), 0.0);
+    progress.pulls.assign(p.contacts.size(), 0);
 }
 
 void Simulation::start(const VecX& q0, const VecX& v0) {
-    t = options.t0;
-    stands = false;
-    y.setZero();
-    y.head(system.nq) = q0;
-    y.segment(system.nq, system.nv) = v0;
-    if (system.nz > 0) y.segment(system.nq + system.nv, system.nz) = w.state.z;
+    progress.t = options.t0;
+    progress.stands = false;
+    progress.y.setZero();
+    progress.y.head(system.nq) = q0;
+    progress.y.segment(system.nq, system.nv) = v0;
+    if (system.nz > 0) progress.y.segment(system.nq + system.nv, system.nz) = w.state.z;
     output.begin();
     breaks.enter();
     w.state.has_held = false;
@@ -84,18 +85,18 @@ void Simulation::start(const VecX& q0, const VecX& v0) {
     if (options.method.scheme == Method::Scheme::moreau && system.ng > 0) {
         time_stepping.begin(options.dt);
     } else {
-        switch_modes(system, t, y, rate, std::nullopt);
+        switch_modes(system, progress.t, progress.y, progress.rate, std::nullopt);
         landing.remember_gaps();
     }
     output.now();
     notices.pulls(std::nullopt);
     notices.several(false);
-    value_events.start(t, y);
-    h = options.dt;
+    value_events.start(progress.t, progress.y);
+    progress.h = options.dt;
     if (options.method.adaptive()) {
-        h = norm.initial_step(options.method.order, t, y, rate, t_end - t);
-        system.read(y);
-        begin_step(p, w, t, system.q, system.v);
+        progress.h = norm.initial_step(options.method.order, progress.t, progress.y, progress.rate, t_end - progress.t);
+        system.read(progress.y);
+        begin_step(p, w, progress.t, system.q, system.v);
     }
     output.configured_now();
 }
@@ -119,9 +120,9 @@ void Simulation::run() {
         accept(proposal, event);
         record(event);
     }
-    if (t < t_end) {  // ended by the user: record a last sample
-        system.read(y);
-        if (!w.now.no_motion) evaluate(p, w, t, system.q, system.v);
+    if (progress.t < t_end) {  // ended by the user: record a last sample
+        system.read(progress.y);
+        if (!w.now.no_motion) evaluate(p, w, progress.t, system.q, system.v);
         output.now();
     }
     if (options.save) save();
@@ -131,7 +132,7 @@ void Simulation::watch_evaluations() {
     if (!options.tick && !(options.max_wall > 0.0)) return;
     w.watch = [this](double at) {
         if (options.tick) options.tick(at);
-        if (is_late()) throw EndOfRun{Failure(Failure::Kind::wall, t, {}, options.max_wall)};
+        if (is_late()) throw EndOfRun{Failure(Failure::Kind::wall, progress.t, {}, options.max_wall)};
     };
 }
 
@@ -144,27 +145,27 @@ bool Simulation::is_late() const {
 // Runs are saved only here, because the state between two steps is all that the next step needs.
 bool Simulation::between_steps() {
     try {
-        if (options.tick && ++ticks % steps_a_tick == 0) options.tick(t);
+        if (options.tick && ++ticks % steps_a_tick == 0) options.tick(progress.t);
     } catch (...) {
         if (options.save) save();
         throw;
     }
     if (options.save && Clock::now() >= next_save) save();
-    if (out.steps == early_steps && t - options.t0 < least_progress * options.duration)
-        throw Failure(Failure::Kind::step_size, t, {}, static_cast<double>(out.steps));
+    if (out.steps == early_steps && progress.t - options.t0 < least_progress * options.duration)
+        throw Failure(Failure::Kind::step_size, progress.t, {}, static_cast<double>(out.steps));
     if (options.max_steps > 0 && out.steps >= options.max_steps)
-        throw Failure(Failure::Kind::steps, t, {}, static_cast<double>(out.steps));
-    if (is_late()) throw Failure(Failure::Kind::wall, t, {}, options.max_wall);
+        throw Failure(Failure::Kind::steps, progress.t, {}, static_cast<double>(out.steps));
+    if (is_late()) throw Failure(Failure::Kind::wall, progress.t, {}, options.max_wall);
     return !options.callback || torques.ask_callback();
 }
 
 void Simulation::save() {
-    options.save(to_bytes(w, *this, out));
+    options.save(to_bytes(w, progress, out));
     next_save = Clock::now() + options.save_interval;
 }
 
 void Simulation::restore(const std::string& state) {
-    from_bytes(state, system, *this, out);
+    from_bytes(state, system, progress, out);
     breaks.enter();
 }
 
@@ -175,15 +176,15 @@ Simulation::Proposal Simulation::propose() {
     torques.sample();
     const bool adaptive = options.method.adaptive();
     const std::optional<double> before_hand_over = to_hand_over();
-    if (p.searches_breaks) breaks.look(std::min(t_end, t + (adaptive ? h : options.dt)), adaptive);
-    double stop = torques.next_stop(t, t_end);
+    if (p.searches_breaks) breaks.look(std::min(t_end, progress.t + (adaptive ? progress.h : options.dt)), adaptive);
+    double stop = torques.next_stop(progress.t, t_end);
     if (!adaptive)  // stay on the fixed grid, also after an event inside a step
-        stop = std::min(stop, options.t0 + (whole_lengths(t - options.t0, options.dt) + 1.0) * options.dt);
-    const double remaining = stop - t;
-    double size = adaptive ? h : remaining;
-    if (adaptive && p.asks_functions && (system.velocity(y).array() == 0.0).all()) {
+        stop = std::min(stop, options.t0 + (whole_lengths(progress.t - options.t0, options.dt) + 1.0) * options.dt);
+    const double remaining = stop - progress.t;
+    double size = adaptive ? progress.h : remaining;
+    if (adaptive && p.asks_functions && (system.velocity(progress.y).array() == 0.0).all()) {
         const double since = out.events.empty() ? options.t0 : out.events.back().time;
-        size = std::min(size, std::max(rest_step, rest_part_step * (t - since)));
+        size = std::min(size, std::max(rest_step, rest_part_step * (progress.t - since)));
     }
     bool last = false;
     if (size >= remaining * whole_way) {
@@ -193,7 +194,7 @@ Simulation::Proposal Simulation::propose() {
         size = even_part * remaining;
     }
     if (!adaptive && !p.frictions.empty()) {
-        const double shorter = locator.shorten_toward_rest(rate, size);
+        const double shorter = locator.shorten_toward_rest(progress.rate, size);
         last &= shorter == size;
         size = shorter;
     }
@@ -209,28 +210,28 @@ Simulation::Proposal Simulation::propose() {
 std::optional<double> Simulation::to_hand_over() {
     const bool adaptive = options.method.adaptive();
     hand_over_ahead = false;
-    if (system.ng == 0 || (adaptive && !hands_over)) return std::nullopt;
+    if (system.ng == 0 || (adaptive && !progress.hands_over)) return std::nullopt;
     bool asks = true;
     for (;;) {
-        const double size = std::min(adaptive ? h : options.dt, torques.next_stop(t, t_end) - t);
+        const double size = std::min(adaptive ? progress.h : options.dt, torques.next_stop(progress.t, t_end) - progress.t);
         const std::optional<HandOver::Found> next = hand_over.first(size);
-        hands_over = next.has_value();
+        progress.hands_over = next.has_value();
         if (!next || next->time >= size * whole_way) return std::nullopt;  // passed in the step after a stop
         if (hand_over.is_reached(next->time)) {
             hand_over.pass(next->time);
-            handed_over = t;
+            progress.handed_over = progress.t;
         } else if (!std::exchange(asks, false) || !hand_over.is_unloaded(next->gap)) {
             hand_over_ahead = true;
             return HandOver::step_before(next->time);
         }
-        modes.change({FoundEvent::Kind::lift, -1, t, false, true});
+        modes.change({FoundEvent::Kind::lift, -1, progress.t, false, true});
         output.now();
     }
 }
 
 void Simulation::pass_break() {
     if (!breaks.pass()) return;
-    if (system.has_events()) modes.change({FoundEvent::Kind::touch, -1, t});
+    if (system.has_events()) modes.change({FoundEvent::Kind::touch, -1, progress.t});
     output.now();
 }
 
@@ -241,16 +242,16 @@ std::optional<double> Simulation::integrate(const Proposal& proposal) {
     watched = system.watches();
     if (watched) before_step = w.state;
     const int active = system.active();
-    stepper.y0.head(system.ns) = y.head(system.ns);
+    stepper.y0.head(system.ns) = progress.y.head(system.ns);
     stepper.y0.segment(system.ns, active - system.ns).setZero();  // watch entries integrate over one step only
-    stepper.start_rate().head(active) = rate.head(active);
+    stepper.start_rate().head(active) = progress.rate.head(active);
     try {
         return try_step(proposal);
     } catch (const Failure& failure) {
         // A stage can leave the domain if the step is too long. A shorter step shows if the motion itself fails. If the
         // motion diverges, no step is short enough, and the step-size failure is reported.
-        const double tiny = tiny_step_at(t);
-        const bool runs_away = tiny * system.velocity(rate).norm() > system.velocity(y).norm();
+        const double tiny = tiny_step_at(progress.t);
+        const bool runs_away = tiny * system.velocity(progress.rate).norm() > system.velocity(progress.y).norm();
         if (!options.method.adaptive() || (proposal.size < tiny && !runs_away) ||
             failure.kind == Failure::Kind::interrupted)
             throw;
@@ -266,12 +267,12 @@ std::optional<double> Simulation::try_step(const Proposal& proposal) {
     const double start_pivot = w.now.rows.distance;
     system.on_constraints = start_pivot < near_singular && !w.now.rows.blocks.empty();
     system.smallest_pivot = 1.0;
-    stepper.take(t, size);
+    stepper.take(progress.t, size);
     if (system.smallest_pivot < near_singular && !system.on_constraints) {
         system.on_constraints = true;
-        stepper.take(t, size);
+        stepper.take(progress.t, size);
     }
-    if (!stepper.y1.head(stepper.active).allFinite()) throw Failure(Failure::Kind::not_finite, t + size);
+    if (!stepper.y1.head(stepper.active).allFinite()) throw Failure(Failure::Kind::not_finite, progress.t + size);
     if (control.needs_detour(system.smallest_pivot, start_pivot, w.now.rows.distance)) return std::nullopt;
     const bool needs_end = options.method.first_same_as_last && !stepper.collocates();
     double error = needs_end ? 0.0 : stepper.error();
@@ -280,20 +281,20 @@ std::optional<double> Simulation::try_step(const Proposal& proposal) {
         return error;
     }
     const bool measures = p.driven_exactly && options.method.adaptive() &&
-                          size > shortest_measured * std::max(1.0, std::abs(t));
+                          size > shortest_measured * std::max(1.0, std::abs(progress.t));
     if (measures) {
         moved_ = stepper.y1;
         w.now.projected_gap = w.now.projected_rate = 0.0;
     }
-    if (!leaves_rate(proposal) || !system.is_on_constraints(t + size, stepper.y1))
-        system.project_and_evaluate(t + size, stepper.y1, stepper.end_rate());
+    if (!leaves_rate(proposal) || !system.is_on_constraints(progress.t + size, stepper.y1))
+        system.project_and_evaluate(progress.t + size, stepper.y1, stepper.end_rate());
     stepper.learn();
     if (needs_end) error = stepper.error();
     if (measures) {
         // If constraints drive the motion, the stages do not contain this error. The projection removes it, so its move
         // is measured.
         moved_ -= stepper.y1;
-        error = std::max(error, norm.of_projection(moved_, stepper.y0, stepper.y1, t, size));
+        error = std::max(error, norm.of_projection(moved_, stepper.y0, stepper.y1, progress.t, size));
     }
     choice.look();
     return error;
@@ -302,13 +303,14 @@ std::optional<double> Simulation::try_step(const Proposal& proposal) {
 // --- Control the error ----------------------------------------------------------------------------------------------
 
 bool Simulation::control_error(const Proposal& proposal, std::optional<double> error) {
-    const bool accepted = control.accepts(error, proposal.size, proposal.last, h);
+    const bool accepted = control.accepts(error, proposal.size, proposal.last, progress.h);
     if (accepted) opened.reset();
     else ++out.rejected;
-    hands_over |= !accepted;
-    if (accepted || !error || h >= least_spacings * std::abs(std::nextafter(t, t_end) - t)) return accepted;
+    progress.hands_over |= !accepted;
+    const double spacing = std::abs(std::nextafter(progress.t, t_end) - progress.t);
+    if (accepted || !error || progress.h >= least_spacings * spacing) return accepted;
     if (opened) throw *opened;
-    throw Failure(Failure::Kind::step_size, t);
+    throw Failure(Failure::Kind::step_size, progress.t);
 }
 
 // --- Locate events --------------------------------------------------------------------------------------------------
@@ -329,12 +331,12 @@ bool Simulation::locate_event(const Proposal& proposal) {
         return true;
     } catch (const Failure& failure) {
         // The repeated step failed although the whole step did not, so the step is too long.
-        const double tiny = tiny_step_at(t);
+        const double tiny = tiny_step_at(progress.t);
         if (!options.method.adaptive() || proposal.size < tiny || failure.kind == Failure::Kind::interrupted) throw;
     }
     ++out.rejected;
-    hands_over = true;
-    h = shortened * proposal.size;
+    progress.hands_over = true;
+    progress.h = shortened * proposal.size;
     back_to_start();
     return false;
 }
@@ -351,7 +353,7 @@ bool Simulation::leaves_rate(const Proposal& proposal) const {
 // neither applies.
 bool Simulation::goes_on(const Failure& failure) {
     const bool may_end = modes.may_end(failure);
-    const bool at_hand_over = hand_over_ahead || t - handed_over <= chatter_time;
+    const bool at_hand_over = hand_over_ahead || progress.t - progress.handed_over <= chatter_time;
     const bool of_hand_over = at_hand_over && ModeChanges::of_closed_contacts(failure);
     const bool leads_on = of_hand_over || ModeChanges::leads_on(failure);
     if (!may_end && !leads_on) return false;
@@ -370,8 +372,8 @@ void Simulation::back_to_start() {
         set_contacts(p, w, before_step.closed, before_step.mode);
         w.state = before_step;
     }
-    system.read(y);
-    begin_step(p, w, t, system.q, system.v);
+    system.read(progress.y);
+    begin_step(p, w, progress.t, system.q, system.v);
 }
 
 // --- Accept ---------------------------------------------------------------------------------------------------------
@@ -380,18 +382,18 @@ void Simulation::accept(const Proposal& proposal, const std::optional<FoundEvent
     ++out.steps;
     out.limited += norm.is_limited();
     const std::optional<double> to_rest = event ? std::nullopt : locator.time_to_rest();
-    if (to_rest) h = past_rest * *to_rest;
-    t = event ? event->time : proposal.last && !to_rest ? proposal.stop : stepper.t0 + stepper.h;
-    moved_energy += system.moved_energy;
+    if (to_rest) progress.h = past_rest * *to_rest;
+    progress.t = event ? event->time : proposal.last && !to_rest ? proposal.stop : stepper.t0 + stepper.h;
+    progress.moved_energy += system.moved_energy;
     const bool arrives = event && event->kind == FoundEvent::Kind::rest_or_limit;
-    remember_directions(system, slip_at_start, arrives ? event->index : -1);
-    y.head(stepper.active) = stepper.y1.head(stepper.active);
-    rate.head(stepper.active) = stepper.end_rate().head(stepper.active);
+    remember_directions(system, progress.slip_at_start, arrives ? event->index : -1);
+    progress.y.head(stepper.active) = stepper.y1.head(stepper.active);
+    progress.rate.head(stepper.active) = stepper.end_rate().head(stepper.active);
     growth.look();
     output.configured_now();
     landing.remember_gaps(!event);
     output.keep_step();
-    value_events.tell(t, out.events);
+    value_events.tell(progress.t, out.events);
     if (!event || !event->changes_modes()) notices.pulls(event);
     output.inside_step(notices.several(true));
     stepper.end_directions();

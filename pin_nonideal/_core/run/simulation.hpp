@@ -20,7 +20,7 @@ void simulate(const Program& p, Workspace& w, const VecX& q0, const VecX& v0, co
 // std::invalid_argument if the bytes do not fit the scene.
 void resume(const Program& p, Workspace& w, const std::string& state, const Options& options, Recording& out);
 
-class Simulation : protected Progress {
+class Simulation {
 public:
     Simulation(const Program& p, Workspace& w, const Options& options, Recording& out);
     void start(const VecX& q0, const VecX& v0);
@@ -59,17 +59,23 @@ protected:
     // Check if the acceleration at the end of this step is not needed.
     bool leaves_rate(const Proposal& proposal) const;
 
-    bool done() const { return t >= t_end || value_events.ends_run(); }
+    bool done() const { return progress.t >= t_end || value_events.ends_run(); }
     // Report progress, save, check the limits of the run and call the callback. Return false if the run must stop.
     bool between_steps();
     bool is_late() const;
     void save();
 
+    // Set-up of the run, the same in all steps.
     const Program& p;
     Workspace& w;
     const Options& options;
     Recording& out;
     double t_end;
+    bool stops_there = false;  // no other period continues from the state at t_end
+
+    Progress progress;  // state from step to step, with the current time, state and step size
+
+    // Parts of the step. They read and change `progress`.
     System system;
     ErrorNorm norm;
     Stepper stepper;
@@ -90,16 +96,19 @@ protected:
     TimeStepping time_stepping;
     Clusters clusters;
     ModeChanges modes;
+
+    // Data of the current step only.
     VecX moved_;  // move by the projection of the step's end
-    long ticks = 0;
-    Clock::time_point next_save;
-    const Clock::time_point begun = Clock::now();
     std::optional<FoundEvent> event;  // event in the step just taken
     RunState before_step;      // run state at the step's start, set if `watched`
     bool watched = false;      // a contact was closed or an element active at the step's start
     bool hand_over_ahead = false;  // the step ends before a hand-over
-    bool stops_there = false;  // no other period continues from the state at t_end
     std::optional<Failure> opened;  // loop that a trial of this step could not close
+
+    // Progress reports, checkpoints and the limit of the wall time.
+    long ticks = 0;
+    Clock::time_point next_save;
+    const Clock::time_point begun = Clock::now();
 };
 
 }  // namespace pn

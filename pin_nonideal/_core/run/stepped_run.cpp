@@ -3,7 +3,7 @@
 namespace pn {
 
 void SteppedRun::begin(const VecX& q0, const VecX& v0, double period, bool only) {
-    static_cast<Progress&>(*this) = at_first_;
+    progress = at_first_;
     stepper.forget();
     stiffness.forget();
     event.reset();
@@ -17,7 +17,7 @@ void SteppedRun::begin(const VecX& q0, const VecX& v0, double period, bool only)
 }
 
 void SteppedRun::advance(double period) {
-    stands = false;  // torques may have changed
+    progress.stands = false;  // torques may have changed
     t_end = options.t0 + static_cast<double>(++periods_) * period;
     run();
 }

@@ -18,11 +18,11 @@ public:
     // Integrate to the end of the next period.
     void advance(double period);
 
-    double time() const { return t; }
-    const VecX& state() const { return y; }
+    double time() const { return progress.t; }
+    const VecX& state() const { return progress.y; }
 
 private:
-    const Progress at_first_ = *this;
+    const Progress at_first_ = progress;  // before the first start
     long periods_ = 0;
 };
 

@@ -20,23 +20,23 @@ double whole_lengths(double time, double length) {
 }
 
 Torques::Torques(System& system, Progress& progress, const Options& options, Output& output, Breaks& breaks)
-    : p(system.p), w(system.w), system_(system), now_(progress), options_(options), output_(output),
+    : p(system.p), w(system.w), system_(system), progress_(progress), options_(options), output_(output),
       breaks_(breaks) {}
 
 void Torques::sample() {
     const auto* sampled = std::get_if<SampledTorque>(&p.actuation);
     if (!sampled || w.now.has_override) return;
-    if (w.state.has_held && now_.t < options_.t0 + now_.next_period * sampled->period) return;
-    system_.read(now_.y);
-    sampled->function(now_.t, system_.q, system_.v, w.state.held_torque);
+    if (w.state.has_held && progress_.t < options_.t0 + progress_.next_period * sampled->period) return;
+    system_.read(progress_.y);
+    sampled->function(progress_.t, system_.q, system_.v, w.state.held_torque);
     w.state.has_held = true;
-    now_.next_period = static_cast<long>(whole_lengths(now_.t - options_.t0, sampled->period)) + 1;
+    progress_.next_period = static_cast<long>(whole_lengths(progress_.t - options_.t0, sampled->period)) + 1;
     take_rate_anew();
 }
 
 bool Torques::ask_callback() {
-    system_.read(now_.y);
-    const Options::Told told = options_.callback(now_.t, system_.q, system_.v, w.scratch.work);
+    system_.read(progress_.y);
+    const Options::Told told = options_.callback(progress_.t, system_.q, system_.v, w.scratch.work);
     if (told != Options::Told::torque) return told == Options::Told::go_on;
     set(w.scratch.work);
     return true;
@@ -45,14 +45,14 @@ bool Torques::ask_callback() {
 void Torques::set(const VecX& torque) {
     w.now.has_override = true;
     w.now.override_torque = torque;
-    system_.read(now_.y);
+    system_.read(progress_.y);
     take_rate_anew();
 }
 
 // Recompute the rate at the state that was read last.
 void Torques::take_rate_anew() {
-    begin_step(p, w, now_.t, system_.q, system_.v);
-    system_.rate_of_evaluation(now_.t, now_.y, now_.rate);
+    begin_step(p, w, progress_.t, system_.q, system_.v);
+    system_.rate_of_evaluation(progress_.t, progress_.y, progress_.rate);
     output_.configured_now();
 }
 
@@ -60,7 +60,7 @@ double Torques::next_stop(double after, double t_end) const {
     double stop = std::min(t_end, breaks_.next(after));
     const auto* sampled = std::get_if<SampledTorque>(&p.actuation);
     if (sampled && !w.now.has_override)  // nothing is sampled while other torques replace the actuation
-        stop = std::min(stop, options_.t0 + now_.next_period * sampled->period);
+        stop = std::min(stop, options_.t0 + progress_.next_period * sampled->period);
     if (const TorqueTable* table = p.torque_table()) {
         const auto next = std::upper_bound(table->times.begin(), table->times.end(), after);
         if (next != table->times.end()) stop = std::min(stop, *next);

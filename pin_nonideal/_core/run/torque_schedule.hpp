@@ -28,7 +28,7 @@ private:
     const Program& p;
     Workspace& w;
     System& system_;
-    Progress& now_;
+    Progress& progress_;
     const Options& options_;
     Output& output_;
     Breaks& breaks_;

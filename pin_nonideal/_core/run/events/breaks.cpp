@@ -71,7 +71,7 @@ std::optional<Probe> find_jump(const TimeFunction& f, Probe& a, Probe b, double 
 }  // namespace
 
 Breaks::Breaks(System& system, Progress& progress, Output& output, Recording& out)
-    : p(system.p), w(system.w), system_(system), now_(progress), output_(output), out_(out) {
+    : p(system.p), w(system.w), system_(system), progress_(progress), output_(output), out_(out) {
     for (int i = 0; i < p.constraints; ++i)
         for (const TimeFunction* f : time_functions(p.blocks[i].kind)) motions_.push_back({i, f});
 }
@@ -80,7 +80,7 @@ void Breaks::enter(double at) {
     const auto after = std::upper_bound(p.breaks.begin(), p.breaks.end(), at);
     double last = after == p.breaks.begin() ? -HUGE_VAL : *(after - 1);
     next_ = after == p.breaks.end() ? HUGE_VAL : *after;
-    double& found = now_.found_break;
+    double& found = progress_.found_break;
     if (found <= at) {
         last = std::max(last, found);
         found = HUGE_VAL;
@@ -91,7 +91,7 @@ void Breaks::enter(double at) {
 
 double Breaks::next(double after) const {
     const auto stated = std::upper_bound(p.breaks.begin(), p.breaks.end(), after);
-    const double found = now_.found_break > after ? now_.found_break : HUGE_VAL;
+    const double found = progress_.found_break > after ? progress_.found_break : HUGE_VAL;
     return std::min(found, stated == p.breaks.end() ? HUGE_VAL : *stated);
 }
 
@@ -102,10 +102,10 @@ std::vector<double> Breaks::rates(double t) const {
 }
 
 bool Breaks::pass() {
-    const std::vector<double> before = rates(now_.t);
+    const std::vector<double> before = rates(progress_.t);
     enter();
-    const std::vector<double> after = rates(now_.t);
-    system_.read(now_.y);
+    const std::vector<double> after = rates(progress_.t);
+    system_.read(progress_.y);
     const double allowed = break_rate_rounding * (1.0 + system_.v.cwiseAbs().maxCoeff());
     bool jumps = false;
     for (size_t i = 0; i < motions_.size(); ++i) jumps |= std::abs(after[i] - before[i]) > allowed;
@@ -114,12 +114,12 @@ bool Breaks::pass() {
         if (system_.has_events()) return true;
     } else {
         // The rates agree up to the rounding of the time, which fast accelerations magnify.
-        begin_rows(p, w, now_.t, system_.q, system_.v);
-        project_velocity(p, w, now_.t, system_.v);
-        system_.write(now_.y);
+        begin_rows(p, w, progress_.t, system_.q, system_.v);
+        project_velocity(p, w, progress_.t, system_.v);
+        system_.write(progress_.y);
     }
-    begin_step(p, w, now_.t, system_.q, system_.v);
-    system_.rate_of_evaluation(now_.t, now_.y, now_.rate);
+    begin_step(p, w, progress_.t, system_.q, system_.v);
+    system_.rate_of_evaluation(progress_.t, progress_.y, progress_.rate);
     output_.configured_now();
     return jumps;
 }
@@ -128,24 +128,24 @@ bool Breaks::pass() {
 // friction has finite forces and gives no impulse.
 void Breaks::jump(const std::vector<double>& before, const std::vector<double>& after) {
     output_.before_jump();
-    system_.read(now_.y);
+    system_.read(progress_.y);
     const std::vector<char> closed = w.state.closed;
     const std::vector<Mode> modes = w.state.mode;
     if (!p.gaps.empty()) set_closed(p, w, std::vector<char>(p.gaps.size(), 0));
     if (!p.frictions.empty()) set_modes(p, w, std::vector<Mode>(p.frictions.size(), slip_plus));
     VecX &v = system_.v, v_minus = v;
-    begin_rows(p, w, now_.t, system_.q, v);
+    begin_rows(p, w, progress_.t, system_.q, v);
     const double energy = kinetic_energy(p.mechanism, w.now.terms, v);
-    project_velocity(p, w, now_.t, v);
+    project_velocity(p, w, progress_.t, v);
     const double work = kinetic_energy(p.mechanism, w.now.terms, v) - energy;
     const VecX change = v - v_minus;
     VecX impulse = VecX::Zero(w.now.lam.size());
     for (int i : w.now.rows.blocks) multiply(p.blocks[i], w.now.A, change, w.scratch.r);
     solve_rows(w.now.rows, w.scratch.r, impulse);
     tell(before, after, v_minus, impulse);
-    system_.write(now_.y);
-    if (system_.energy) system_.work(now_.y)[constraint_power] += work;
-    else now_.moved_energy += work;
+    system_.write(progress_.y);
+    if (system_.energy) system_.work(progress_.y)[constraint_power] += work;
+    else progress_.moved_energy += work;
     if (!p.gaps.empty()) set_closed(p, w, closed);
     if (!p.frictions.empty()) set_modes(p, w, modes);
 }
@@ -157,7 +157,7 @@ void Breaks::tell(const std::vector<double>& before, const std::vector<double>& 
         if (!(std::abs(after[i] - before[i]) > allowed)) continue;
         const Block& block = p.blocks[motions_[i].block];
         const double along = block.kept.empty() ? 0.0 : impulse[block.row];
-        out_.events.push_back({now_.t, Event::Kind::jump, motions_[i].block, Vec3(along, 0.0, 0.0),
+        out_.events.push_back({progress_.t, Event::Kind::jump, motions_[i].block, Vec3(along, 0.0, 0.0),
                                0.5 * (before[i] + after[i]) * along, v_minus, system_.v});
     }
 }
@@ -168,7 +168,7 @@ void Breaks::look(double end, bool adaptive) {
     for (const Motion& motion : motions_) {
         const TimeFunction& f = *motion.function;
         if (!is_users(f)) continue;
-        const double begin = w.now.row_time(now_.t);
+        const double begin = w.now.row_time(progress_.t);
         if (!(begin < end)) return;
         std::optional<Probe> found;
         Probe before = probe(f, begin);
@@ -185,7 +185,7 @@ void Breaks::look(double end, bool adaptive) {
         if (!found) continue;
         if (std::abs(found->f[0] - before.f[0]) > value_jump)
             throw Failure(Failure::Kind::closure, found->t, {motion.block}, std::abs(found->f[0] - before.f[0]));
-        if (found->t < now_.found_break) now_.found_break = found->t;
+        if (found->t < progress_.found_break) progress_.found_break = found->t;
         enter();
         end = w.now.row_time(end);
     }

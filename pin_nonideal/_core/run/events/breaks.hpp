@@ -16,13 +16,13 @@ public:
 
     // Set the stretch between the last break and the next one at the current time, or at another one. Rows are evaluated
     // within this stretch.
-    void enter() { enter(now_.t); }
+    void enter() { enter(progress_.t); }
     void enter(double at);
     // Time of the next break after the current time or after another one (infinity if none), and a check if it is
     // reached.
     double next() const { return next_; }
     double next(double after) const;
-    bool reached() const { return now_.t >= next_; }
+    bool reached() const { return progress_.t >= next_; }
     // Pass the break that was reached, and recompute the rate. Return true if the velocity has jumped. The caller must
     // then select the modes of contacts and friction.
     bool pass();
@@ -43,7 +43,7 @@ private:
     const Program& p;
     Workspace& w;
     System& system_;
-    Progress& now_;
+    Progress& progress_;
     Output& output_;
     Recording& out_;
     std::vector<Motion> motions_;

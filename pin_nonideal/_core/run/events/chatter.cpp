@@ -19,53 +19,53 @@ constexpr double chatter_growth = 2.0, longest_chatter = 1e-2;
 
 Clusters::Clusters(System& system, Progress& progress, const Options& options, StiffnessGuard& stiffness,
                    TimeStepping& time_stepping, Recording& out)
-    : w(system.w), now_(progress), options_(options), stiffness_(stiffness), time_stepping_(time_stepping),
+    : w(system.w), progress_(progress), options_(options), stiffness_(stiffness), time_stepping_(time_stepping),
       out_(out) {}
 
 bool Clusters::bridge(int element, double t_end) {
-    std::vector<double>& recent = now_.recent_events;
+    std::vector<double>& recent = progress_.recent_events;
     if (recent.size() > chatter_events) recent.erase(recent.begin());
-    if (recent.size() < chatter_events || now_.t - recent.front() > chatter_time) return false;
+    if (recent.size() < chatter_events || progress_.t - recent.front() > chatter_time) return false;
     if (!options_.method.outside()) {
         stiffness_.require_time_steps(next_stretch() / chatter_steps);
         step_over(element, t_end);
         return true;
     }
     recent.clear();  // steps of SciPy's methods continue without event location
-    out_.events.push_back({now_.t, Event::Kind::chatter, element});
+    out_.events.push_back({progress_.t, Event::Kind::chatter, element});
     return false;
 }
 
 void Clusters::remember() {
-    std::vector<double>& last = now_.last_changes;
-    if (!last.empty() && last.back() == now_.t) return;
+    std::vector<double>& last = progress_.last_changes;
+    if (!last.empty() && last.back() == progress_.t) return;
     if (last.size() == dwindling_events) last.erase(last.begin());
-    last.push_back(now_.t);
+    last.push_back(progress_.t);
 }
 
 bool Clusters::dwindles() const {
-    const std::vector<double>& last = now_.last_changes;
-    return last.size() == dwindling_events && now_.t - last.front() <= chatter_time;
+    const std::vector<double>& last = progress_.last_changes;
+    return last.size() == dwindling_events && progress_.t - last.front() <= chatter_time;
 }
 
 // Return the length [s] of the next stretch: twice the last one if events crowded again right after it.
 double Clusters::next_stretch() const {
-    const std::vector<double>& recent = now_.recent_events;
-    const double first = recent.empty() ? now_.t : recent.front();
-    const bool again = now_.bridged_time > 0.0 && first - now_.bridged_end < now_.bridged_time;
-    return again ? std::min(chatter_growth * now_.bridged_time, longest_chatter) : chatter_time;
+    const std::vector<double>& recent = progress_.recent_events;
+    const double first = recent.empty() ? progress_.t : recent.front();
+    const bool again = progress_.bridged_time > 0.0 && first - progress_.bridged_end < progress_.bridged_time;
+    return again ? std::min(chatter_growth * progress_.bridged_time, longest_chatter) : chatter_time;
 }
 
 void Clusters::step_over(int element, double t_end) {
-    now_.bridged_time = next_stretch();
-    now_.recent_events.clear();
-    now_.last_changes.clear();
-    const double dt = now_.bridged_time / chatter_steps;
-    out_.events.push_back({now_.t, Event::Kind::chatter, element});
-    const double stop = std::min(t_end, now_.t + now_.bridged_time);
+    progress_.bridged_time = next_stretch();
+    progress_.recent_events.clear();
+    progress_.last_changes.clear();
+    const double dt = progress_.bridged_time / chatter_steps;
+    out_.events.push_back({progress_.t, Event::Kind::chatter, element});
+    const double stop = std::min(t_end, progress_.t + progress_.bridged_time);
     w.state.seeks_directions = false;
-    while (now_.t < stop) time_stepping_.step(dt, stop, t_end);
-    now_.bridged_end = now_.t;
+    while (progress_.t < stop) time_stepping_.step(dt, stop, t_end);
+    progress_.bridged_end = progress_.t;
 }
 
 }  // namespace pn

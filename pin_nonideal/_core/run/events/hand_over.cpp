@@ -36,39 +36,41 @@ bool has_one_feature(const Program& p, int gap) {
 }  // namespace
 
 HandOver::HandOver(System& system, Progress& progress)
-    : system_(system), now_(progress), p(system.p), w(system.w), move_(VecX::Zero(system.nv)), y_(VecX::Zero(system.ny)) {}
+    : system_(system), progress_(progress), p(system.p), w(system.w), move_(VecX::Zero(system.nv)),
+      y_(VecX::Zero(system.ny)) {}
 
-bool HandOver::is_reached(double time) const { return time <= steady_time * std::max(1.0, std::abs(now_.t)); }
+bool HandOver::is_reached(double time) const { return time <= steady_time * std::max(1.0, std::abs(progress_.t)); }
 
 double HandOver::step_before(double time) { return (1.0 - left_before_hand_over) * time; }
 
 // Set y_ to the state after a time.
 void HandOver::move(double time) {
-    system_.read(now_.y);
-    const auto a = system_.velocity(now_.rate);
+    system_.read(progress_.y);
+    const auto a = system_.velocity(progress_.rate);
     move_ = time * (system_.v + 0.5 * time * a);
-    y_ = now_.y + time * now_.rate;
+    y_ = progress_.y + time * progress_.rate;
     retract(p.mechanism, system_.q.data(), move_.data(), y_.data());
 }
 
 double HandOver::drift(int gap) {
-    follow_gap(p, w, now_.t, system_.v, gap);
+    follow_gap(p, w, progress_.t, system_.v, gap);
     return w.now.values[p.gaps[gap].block].drift[0];
 }
 
 double HandOver::drift_after(double time, int gap) {
     move(time);
     system_.read(y_);
-    update_kinematics(p, w, now_.t + time, system_.q, system_.v);
+    update_kinematics(p, w, progress_.t + time, system_.q, system_.v);
     return drift(gap);
 }
 
 // Check if the bias of a gap jumps within `size`, and reduce `size` to the first time after the jump.
 bool HandOver::find(int gap, double& size) {
     double low = 0.0, high = size, at_low = drift_after(low, gap), at_high = drift_after(high, gap);
-    const double scale = p.mechanism.gravity.norm() + system_.velocity(now_.rate).cwiseAbs().maxCoeff() + std::abs(at_low);
+    const double acceleration = p.mechanism.gravity.norm() + system_.velocity(progress_.rate).cwiseAbs().maxCoeff();
+    const double scale = acceleration + std::abs(at_low);
     const double least = std::max(kept_bias_change * std::abs(at_high - at_low), min_bias_jump * scale);
-    const double width = hand_over_width * std::max(1.0, std::abs(now_.t));
+    const double width = hand_over_width * std::max(1.0, std::abs(progress_.t));
     while (high - low > width) {
         const double middle = 0.5 * (low + high);
         if (!(low < middle && middle < high)) break;
@@ -93,17 +95,17 @@ std::optional<HandOver::Found> HandOver::first(double size) {
 }
 
 bool HandOver::is_unloaded(int gap) {
-    system_.read(now_.y);
-    begin_step(p, w, now_.t, system_.q, system_.v);
-    return pn::is_unloaded(system_, now_.t, gap);
+    system_.read(progress_.y);
+    begin_step(p, w, progress_.t, system_.q, system_.v);
+    return pn::is_unloaded(system_, progress_.t, gap);
 }
 
 // The state lies a little past the hand-over, so that rounding does not decide if another contact passes it too.
 void HandOver::pass(double time) {
-    const double past = time + passing_time * std::max(1.0, std::abs(now_.t));
+    const double past = time + passing_time * std::max(1.0, std::abs(progress_.t));
     move(past);
-    now_.y = y_;
-    now_.t += past;
+    progress_.y = y_;
+    progress_.t += past;
 }
 
 }  // namespace pn

@@ -36,7 +36,7 @@ private:
     bool find(int gap, double& size);
 
     System& system_;
-    Progress& now_;
+    Progress& progress_;
     const Program& p;
     Workspace& w;
     VecX move_, y_;

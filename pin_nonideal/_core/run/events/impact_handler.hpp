@@ -26,7 +26,7 @@ private:
     const Program& p;
     Workspace& w;
     System& system_;
-    Progress& now_;
+    Progress& progress_;
     GapWatch& watch_;
     const Options& options_;
     Output& output_;

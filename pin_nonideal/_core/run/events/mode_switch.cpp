@@ -20,7 +20,7 @@ static bool of_modes(const Failure& failure) {
 
 ModeChanges::ModeChanges(System& system, Progress& progress, const Options& options, Torques& torques, Output& output,
                          Landing& landing, Clusters& clusters, Recording& out)
-    : p(system.p), w(system.w), system_(system), now_(progress), options_(options), torques_(torques), output_(output),
+    : p(system.p), w(system.w), system_(system), progress_(progress), options_(options), torques_(torques), output_(output),
       landing_(landing), clusters_(clusters), out_(out) {}
 
 void ModeChanges::change(FoundEvent event) {
@@ -29,9 +29,9 @@ void ModeChanges::change(FoundEvent event) {
     std::vector<int> let_go;
     event.in_vain = event.kind == FoundEvent::Kind::touch && event.index >= 0 && has_let_go(event.index);
     try {
-        if (contacts_land(system_, now_.t, now_.y)) event = {FoundEvent::Kind::touch, -1, now_.t};
+        if (contacts_land(system_, progress_.t, progress_.y)) event = {FoundEvent::Kind::touch, -1, progress_.t};
         struck = event.kind == FoundEvent::Kind::touch && landing_.strike(false);
-        for (const Event& found : switch_modes(system_, now_.t, now_.y, now_.rate, event, &let_go)) {
+        for (const Event& found : switch_modes(system_, progress_.t, progress_.y, progress_.rate, event, &let_go)) {
             out_.events.push_back(found);
             if (!struck) clusters_.count();
         }
@@ -44,9 +44,9 @@ void ModeChanges::change(FoundEvent event) {
     clusters_.remember();
     const bool in_vain = event.kind == FoundEvent::Kind::touch && event.index >= 0 && !struck;
     const bool same_modes = std::equal(before.mode.begin(), before.mode.end(), w.state.mode.begin());
-    if (!same_modes || before.closed != w.state.closed) now_.gaps.ask_anew();
-    else if (in_vain && !w.state.closed[event.index]) now_.gaps.ask_in_vain(event.index, now_.t);
-    for (int gap : let_go) now_.gaps.ask_in_vain(gap, now_.t);
+    if (!same_modes || before.closed != w.state.closed) progress_.gaps.ask_anew();
+    else if (in_vain && !w.state.closed[event.index]) progress_.gaps.ask_in_vain(event.index, progress_.t);
+    for (int gap : let_go) progress_.gaps.ask_in_vain(gap, progress_.t);
     landing_.remember_gaps();
     if (struck) return end_bouncing();
     if (same_modes) clusters_.count();
@@ -57,14 +57,14 @@ void ModeChanges::change(FoundEvent event) {
 // Check if a contact of the same two bodies was let go, because no contact of theirs had a load.
 bool ModeChanges::has_let_go(int gap) const {
     for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i)
-        if (now_.gaps.is_in_vain(i) && same_bodies(p, gap, i)) return true;
+        if (progress_.gaps.is_in_vain(i) && same_bodies(p, gap, i)) return true;
     return false;
 }
 
 // End the bouncing. If the motion of a low flight is not found, bridge it by time stepping if possible.
 void ModeChanges::end_bouncing() {
     try {
-        landing_.end_bouncing(torques_.next_stop(now_.t, options_.end()));
+        landing_.end_bouncing(torques_.next_stop(progress_.t, options_.end()));
     } catch (const Failure& failure) {
         if (!leads_on(failure) || !step_over(failure)) throw;
     }
@@ -78,22 +78,22 @@ bool ModeChanges::leads_on(const Failure& failure) {
 
 bool ModeChanges::may_end(const Failure& failure) const {
     return of_modes(failure) && options_.method.adaptive() && system_.ng > 0 &&
-           now_.t >= now_.left + leaving_apart * tiny_step_at(now_.t);
+           progress_.t >= progress_.left + leaving_apart * tiny_step_at(progress_.t);
 }
 
 bool ModeChanges::leave() {
-    const double t = now_.t, ahead = tiny_step_at(t);
-    const VecX y = now_.y;
+    const double t = progress_.t, ahead = tiny_step_at(t);
+    const VecX y = progress_.y;
     try {
-        now_.y.noalias() += ahead * now_.rate;
-        now_.t += ahead;
-        change(FoundEvent{FoundEvent::Kind::lift, -1, now_.t});
+        progress_.y.noalias() += ahead * progress_.rate;
+        progress_.t += ahead;
+        change(FoundEvent{FoundEvent::Kind::lift, -1, progress_.t});
     } catch (const Failure&) {
-        now_.t = t;
-        now_.y = y;
+        progress_.t = t;
+        progress_.y = y;
         return false;
     }
-    now_.left = now_.t;
+    progress_.left = progress_.t;
     output_.now();
     return true;
 }
@@ -124,13 +124,13 @@ bool ModeChanges::step_over(const Failure& failure, bool of_hand_over) {
         } catch (const Failure& again) {  // the solver fails again a little later
             if (system_.ng == 0 || !of_modes(again) || !leads_on(again)) throw;
         }
-        if (now_.t >= options_.end()) return true;
+        if (progress_.t >= options_.end()) return true;
     }
 }
 
 // Check if all slipping elements are about to rest.
 bool ModeChanges::creeps() const {
-    const double least = creeping * (1.0 + system_.velocity(now_.y).cwiseAbs().maxCoeff());
+    const double least = creeping * (1.0 + system_.velocity(progress_.y).cwiseAbs().maxCoeff());
     const std::vector<int>& slipping = w.now.slipping;
     return !slipping.empty() && std::all_of(slipping.begin(), slipping.end(), [&](int e) {
         return slip_velocity(w.now, p.frictions[e]).norm() <= least;
@@ -138,7 +138,7 @@ bool ModeChanges::creeps() const {
 }
 
 void ModeChanges::go_on_with_new_modes() {
-    switch_modes(system_, now_.t, now_.y, now_.rate, std::nullopt);
+    switch_modes(system_, progress_.t, progress_.y, progress_.rate, std::nullopt);
     landing_.remember_gaps();
     output_.configured_now();
 }
@@ -148,10 +148,10 @@ void ModeChanges::keep_last(const RunState& before, bool struck) {
     set_contacts(p, w, before.closed, before.mode);
     w.state = before;
     if (struck) return;
-    system_.read(now_.y);
+    system_.read(progress_.y);
     try {
-        begin_step(p, w, now_.t, system_.q, system_.v);
-        evaluate(p, w, now_.t, system_.q, system_.v);
+        begin_step(p, w, progress_.t, system_.q, system_.v);
+        evaluate(p, w, progress_.t, system_.q, system_.v);
         output_.now();
     } catch (const Failure&) {  // the previous sample is the last, and the first failure is reported
     }

@@ -15,7 +15,7 @@ constexpr int stiff_in_a_row = 6, patience = 20;
 }  // namespace
 
 StepperChoice::StepperChoice(System& system, Stepper& stepper, Progress& progress, const Options& options)
-    : w(system.w), system_(system), stepper_(stepper), now_(progress), options_(options) {}
+    : w(system.w), system_(system), stepper_(stepper), progress_(progress), options_(options) {}
 
 void StepperChoice::look() {
     turns_stiffly_ = options_.method.adaptive() && turning(system_) && stepper_.stiffness() > stiff;
@@ -24,8 +24,8 @@ void StepperChoice::look() {
 void StepperChoice::choose() {
     stepper_.forget();
     bool& seeks = w.state.seeks_directions;
-    int& turning_steps = now_.turning_steps;
-    const double next = options_.method.adaptive() ? now_.h : options_.dt;
+    int& turning_steps = progress_.turning_steps;
+    const double next = options_.method.adaptive() ? progress_.h : options_.dt;
     if (stepper_.collocates()) {
         seeks = turning(system_) && (stepper_.h == 0.0 || stepper_.stiffness() * next > stiff * stepper_.h);
         turning_steps = seeks ? 0 : -patience;

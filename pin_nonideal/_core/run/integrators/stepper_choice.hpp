@@ -22,7 +22,7 @@ private:
     Workspace& w;
     System& system_;
     Stepper& stepper_;
-    Progress& now_;
+    Progress& progress_;
     const Options& options_;
     bool turns_stiffly_ = false;  // stability limited the step just taken
 };

@@ -35,7 +35,7 @@ bool asks_always(const Program& p, const Options& options) {
 TimeStepping::TimeStepping(System& system, Progress& progress, GapWatch& watch, const Options& options,
                            Torques& torques, Output& output, Notices& notices, ValueEvents& value_events,
                            Recording& out)
-    : p(system.p), w(system.w), system_(system), now_(progress), options_(options), torques_(torques),
+    : p(system.p), w(system.w), system_(system), progress_(progress), options_(options), torques_(torques),
       output_(output), notices_(notices), value_events_(value_events), out_(out), moreau_(system),
       moreau_contacts_(system, watch), lasts_(!may_differ(system.p, options)),
       asked_always_(asks_always(system.p, options)) {}
@@ -43,14 +43,14 @@ TimeStepping::TimeStepping(System& system, Progress& progress, GapWatch& watch, 
 // End of a step of this size: at a stop, a jump of the actuation or a due sample before it. Times that differ by rounding
 // are one end, the last of them.
 double TimeStepping::end_of_step(double size, double stop, double t_end) const {
-    double end = now_.t + size;
+    double end = progress_.t + size;
     bool met = false;
     const auto meet = [&](double time) {
-        if (!(time > now_.t + rounding_) || !(time < end + rounding_)) return;
+        if (!(time > progress_.t + rounding_) || !(time < end + rounding_)) return;
         end = met && time > end - rounding_ ? std::max(end, time) : time;
         met = true;
     };
-    const double jump = torques_.next_stop(now_.t + rounding_, t_end);
+    const double jump = torques_.next_stop(progress_.t + rounding_, t_end);
     meet(jump);
     meet(torques_.next_stop(jump, t_end));
     // A sample that differs by rounding is taken at the end of the step, which it does not change.
@@ -61,7 +61,7 @@ double TimeStepping::end_of_step(double size, double stop, double t_end) const {
 
 // Check if nothing moves and the sticking elements leave no freedom.
 bool TimeStepping::rests() const {
-    return lasts_ && (system_.velocity(now_.y).array() == 0.0).all() && is_immobile(p, w);
+    return lasts_ && (system_.velocity(progress_.y).array() == 0.0).all() && is_immobile(p, w);
 }
 
 // Check if accelerations and forces are needed at the step's end: by a sample, by the end of the run, or by slip. Slip
@@ -76,10 +76,10 @@ bool TimeStepping::asks_for_motion(double end, double t_end) const {
 
 // Take as much of a step to `end` as approaching edges allow, in a scene with unilateral contacts.
 void TimeStepping::take_part(double end, double t_end, double least) {
-    double& t = now_.t;
-    const double left = end - t, h = std::max(moreau_contacts_.allowed(t, left, now_.y), least);
+    double& t = progress_.t;
+    const double left = end - t, h = std::max(moreau_contacts_.allowed(t, left, progress_.y), least);
     const bool whole = h >= (1.0 - min_remainder) * left;
-    moreau_contacts_.step(t, whole ? left : h, now_.y, now_.moved_energy, now_.impact_energy);
+    moreau_contacts_.step(t, whole ? left : h, progress_.y, progress_.moved_energy, progress_.impact_energy);
     t = whole ? end : t + h;
     const MoreauContacts::Relaxed& relaxed = moreau_contacts_.relaxed();
     if (relaxed.block >= 0 && !relaxes_) {
@@ -87,86 +87,86 @@ void TimeStepping::take_part(double end, double t_end, double least) {
         out_.events.back().miss = relaxed.miss;
     }
     relaxes_ = relaxed.block >= 0;
-    const bool asks = now_.evaluated = whole && asks_for_motion(end, t_end);
-    if (moreau_contacts_.project(t, now_.y, now_.moved_energy)) {
-        if (asks) system_.evaluate_step_end(t, now_.y, now_.rate, true);
+    const bool asks = progress_.evaluated = whole && asks_for_motion(end, t_end);
+    if (moreau_contacts_.project(t, progress_.y, progress_.moved_energy)) {
+        if (asks) system_.evaluate_step_end(t, progress_.y, progress_.rate, true);
         return;
     }
-    system_.settle(t, now_.y, now_.rate, asks, true);
-    now_.moved_energy += system_.moved_energy;
+    system_.settle(t, progress_.y, progress_.rate, asks, true);
+    progress_.moved_energy += system_.moved_energy;
 }
 
 // A step that starts and ends at rest with the same contacts and modes leaves the state unchanged.
 void TimeStepping::take_with_contacts(double end, double t_end) {
-    const double least = least_cut * (end - now_.t);
-    const bool may_stand = lasts_ && (system_.velocity(now_.y).array() == 0.0).all();
+    const double least = least_cut * (end - progress_.t);
+    const bool may_stand = lasts_ && (system_.velocity(progress_.y).array() == 0.0).all();
     if (may_stand) {
-        y_from_ = now_.y;
+        y_from_ = progress_.y;
         before_step_ = w.state.mode;
         closed_before_step_ = w.state.closed;
     }
-    while (now_.t < end) take_part(end, t_end, least);
-    now_.stands = may_stand && !relaxes_ && now_.y == y_from_ && same_bytes<Mode>(before_step_, w.state.mode) &&
+    while (progress_.t < end) take_part(end, t_end, least);
+    progress_.stands = may_stand && !relaxes_ && progress_.y == y_from_ && same_bytes<Mode>(before_step_, w.state.mode) &&
               same_bytes(closed_before_step_, w.state.closed);
 }
 
 void TimeStepping::take(double end, double t_end) {
     if (system_.ng > 0) return take_with_contacts(end, t_end);
-    double& t = now_.t;
-    VecX &y = now_.y, &y_from = y_from_;
+    double& t = progress_.t;
+    VecX &y = progress_.y, &y_from = y_from_;
     const bool rested = rests();
     Modes& before = before_step_;
     if (rested) {
         y_from = y;
         before = w.state.mode;
     }
-    const double moved_from = now_.moved_energy;
-    moreau_.step(t, end - t, y, now_.moved_energy);
+    const double moved_from = progress_.moved_energy;
+    moreau_.step(t, end - t, y, progress_.moved_energy);
     t = end;
     const bool held = rested && std::equal(before.begin(), before.end(), w.state.mode.begin());
     if (!held) {
         const bool bridges = options_.method.scheme != Method::Scheme::moreau;
-        system_.settle(t, y, now_.rate, asks_for_motion(end, t_end), bridges);
-        now_.moved_energy += system_.moved_energy;
+        system_.settle(t, y, progress_.rate, asks_for_motion(end, t_end), bridges);
+        progress_.moved_energy += system_.moved_energy;
         return;
     }
     // Remove the rounding from a motion held at rest. Law states continue.
     y.head(system_.nq + system_.nv) = y_from.head(system_.nq + system_.nv);
     system_.work(y) = system_.work(y_from);
-    now_.moved_energy = moved_from;
+    progress_.moved_energy = moved_from;
     system_.read(y);
     system_.read_law_states(y);
     begin_step(p, w, t, system_.q, system_.v);
-    system_.rate_of_evaluation(t, y, now_.rate);
-    now_.evaluated = true;
-    now_.stands = y == y_from;
+    system_.rate_of_evaluation(t, y, progress_.rate);
+    progress_.evaluated = true;
+    progress_.stands = y == y_from;
 }
 
 // Elements at rest have the modes of the end of a first step. It solves its laws at far less cost than accelerations.
 void TimeStepping::begin(double size) {
-    system_.read(now_.y);
-    std::vector<char> closed = system_.touching.at(p, w, now_.t, system_.q, system_.v, true).rest;
+    system_.read(progress_.y);
+    std::vector<char> closed = system_.touching.at(p, w, progress_.t, system_.q, system_.v, true).rest;
     set_closed(p, w, closed);
     moreau_contacts_.forget();
-    VecX y = now_.y;
+    VecX y = progress_.y;
     double moved_energy = 0.0, impact_energy = 0.0;
-    moreau_contacts_.step(now_.t, size, y, moved_energy, impact_energy);
+    moreau_contacts_.step(progress_.t, size, y, moved_energy, impact_energy);
     for (size_t i = 0; i < closed.size(); ++i) closed[i] = closed[i] && w.state.closed[i];
     const std::vector<Mode> modes = w.state.mode;
     set_closed(p, w, closed);
-    system_.read(now_.y);
-    ModeQuestion first = first_question(p, w, now_.t, system_.q, system_.v);
+    system_.read(progress_.y);
+    ModeQuestion first = first_question(p, w, progress_.t, system_.q, system_.v);
     for (int e : first.at_rest) first.modes[e] = modes[e];
     set_contacts(p, w, closed, first.modes);
-    system_.evaluate_step_end(now_.t, now_.y, now_.rate, true);
+    system_.evaluate_step_end(progress_.t, progress_.y, progress_.rate, true);
 }
 
 void TimeStepping::step(double size, double stop, double t_end) {
-    rounding_ = std::max(min_remainder * size, same_time(now_.t));
-    torques_.enter(now_.t + rounding_);
+    rounding_ = std::max(min_remainder * size, same_time(progress_.t));
+    torques_.enter(progress_.t + rounding_);
     torques_.sample();
-    double& t = now_.t;
-    VecX& y = now_.y;
+    double& t = progress_.t;
+    VecX& y = progress_.y;
     const double end = end_of_step(size, stop, t_end), from = t;
     const bool watched = system_.watches();
     if (watched || !open_before_) {
@@ -175,11 +175,11 @@ void TimeStepping::step(double size, double stop, double t_end) {
         open_before_ = !watched;
     }
     const VecX y_from = options_.record.dense ? y : VecX();
-    if (!now_.stands || (!now_.evaluated && asks_for_motion(end, t_end))) take(end, t_end);
+    if (!progress_.stands || (!progress_.evaluated && asks_for_motion(end, t_end))) take(end, t_end);
     t = end;
     ++out_.steps;
     output_.configured_now();
-    remember_directions(system_, now_.slip_at_start);
+    remember_directions(system_, progress_.slip_at_start);
     if (watched || system_.watches())
         for (const Event& change : changes_since(system_, t, closed_before_, before_)) out_.events.push_back(change);
     notices_.pulls(std::nullopt);

@@ -31,7 +31,7 @@ private:
     const Program& p;
     Workspace& w;
     System& system_;
-    Progress& now_;
+    Progress& progress_;
     const Options& options_;
     Torques& torques_;
     Output& output_;
