@@ -110,6 +110,18 @@ def test_links_lead_to_files(path: Path) -> None:
     assert broken == []
 
 
+def test_explanations_link_to_the_headers_of_the_core() -> None:
+    """A slip header stands beside that of its gap. The rows of bilateral constraints are one folder."""
+    core = ROOT / "pin_nonideal" / "_core"
+    pages = (ROOT / "docs" / "explanation").glob("*.md")
+    links = [(page, link) for page in pages for link in LINK.findall(page.read_text(encoding="utf-8"))]
+    linked = {(page.parent / link).resolve() for page, link in links}
+    headers = {path for path in core.rglob("*.hpp") if path.parent not in {core / "python", *linked}}
+    gaps = {path for path in core.glob("constraints/gaps/*.hpp") if not path.stem.endswith("_slip")}
+    assert gaps
+    assert sorted((headers | gaps) - linked) == []
+
+
 def test_the_folder_of_the_robots_page_loads(tmp_path: Path) -> None:
     files = {(b.document, b.mark): b.text for b in blocks() if b.mark.startswith("file: ")}
     (tmp_path / "robot.urdf").write_text(

@@ -5,7 +5,7 @@
 
 #include "constraints/geometry.hpp"
 #include "constraints/row_traits.hpp"
-#include "constraints/gaps/nearest_of_rims.hpp"
+#include "constraints/gaps/nearest_of_cylinders.hpp"
 
 namespace pn {
 
@@ -31,19 +31,19 @@ struct RimsRow {
 
     template <class Sides, class Out>
     PN_INLINE void residual(const Sides& s, Out& out) const {
-        out.residual[0] = NearestOfRims<Sides>(s, first, second).distance - radius;  // Eq. (2)
+        out.residual[0] = NearestOfCylinders<Sides>(s, first, second).distance - radius;  // Eq. (2)
     }
     // The force acts at the nearest point that slides. The other one lies on its line of action.
     template <class Sides, class Out>
     PN_INLINE void place(const Sides& s, Out& out) const {
-        const NearestOfRims<Sides> p(s, first, second);
+        const NearestOfCylinders<Sides> p(s, first, second);
         out.residual[0] = p.distance - radius;
         out.wrench[0] = force_at(p.found.place, p.n);
     }
     template <class Sides, class Out>
     PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
-        const NearestOfRims<Sides> p(s, first, second);
-        const RimsMotion<Sides> m(p.mover(s), p.found);
+        const NearestOfCylinders<Sides> p(s, first, second);
+        const CylindersMotion<Sides> m(p.mover(s), p.found);
         out.rate[0] = p.found.at.n.dot(m.u);
         out.drift[0] = m.drift;
     }

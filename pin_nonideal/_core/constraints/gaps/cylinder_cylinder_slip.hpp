@@ -5,7 +5,7 @@
 
 #include "constraints/geometry.hpp"
 #include "constraints/row_traits.hpp"
-#include "constraints/gaps/nearest_of_rims.hpp"
+#include "constraints/gaps/nearest_of_cylinders.hpp"
 #include "constraints/gaps/segments.hpp"
 
 namespace pn {
@@ -26,15 +26,15 @@ struct RimsSlipRows : SlipDirections {
 
     template <class Sides, class Out>
     PN_INLINE void rows(const Sides& s, Out& out) const {
-        const NearestOfRims<Sides> p(s, first, second);
+        const NearestOfCylinders<Sides> p(s, first, second);
         const TurningTangents<Sides> along(s, p.n, typename Sides::Vec());
         for (int k = 0; k < 2; ++k) out.wrench[k] = force_at(contact(p), along.t[k]);
     }
     template <class Sides, class Out>
     PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
-        const NearestOfRims<Sides> p(s, first, second);
+        const NearestOfCylinders<Sides> p(s, first, second);
         const Sides mover = p.mover(s);
-        const RimsMotion<Sides> m(mover, p.found);
+        const CylindersMotion<Sides> m(mover, p.found);
         const TurningTangents<Sides> along(s, p.n, p.turned ? typename Sides::Vec(-m.dn) : m.dn);
         slide(s, out, along, contact(p), mover.a.velocity(p.found.place) + m.slides - around(p) * m.dn);
     }
@@ -44,7 +44,7 @@ private:
     template <class Nearest>
     PN_INLINE double around(const Nearest& p) const { return p.turned ? radius2 : radius1; }
     template <class Sides>
-    PN_INLINE typename Sides::Vec contact(const NearestOfRims<Sides>& p) const {
+    PN_INLINE typename Sides::Vec contact(const NearestOfCylinders<Sides>& p) const {
         return p.found.place - around(p) * p.found.at.n;
     }
 };

@@ -5,7 +5,7 @@
 
 #include "constraints/geometry.hpp"
 #include "constraints/row_traits.hpp"
-#include "constraints/gaps/nearest_of_rim.hpp"
+#include "constraints/gaps/nearest_on_disk.hpp"
 
 namespace pn {
 
@@ -31,18 +31,18 @@ struct RimRow {
 
     template <class Sides, class Out>
     PN_INLINE void residual(const Sides& s, Out& out) const {
-        out.residual[0] = NearestOfRim<Sides>(s, solid, rim).distance - radius;  // Eq. (2)
+        out.residual[0] = NearestOnDisk<Sides>(s, solid, rim).distance - radius;  // Eq. (2)
     }
     template <class Sides, class Out>
     PN_INLINE void place(const Sides& s, Out& out) const {
-        const NearestOfRim<Sides> p(s, solid, rim);
+        const NearestOnDisk<Sides> p(s, solid, rim);
         out.residual[0] = p.distance - radius;
         out.wrench[0] = force_at(p.place, p.n);
     }
     // Over a face the rates are those of a disk over a plane. Beside an edge they are those of the edge over the disk.
     template <class Sides, class Out>
     PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
-        const NearestOfRim<Sides> p(s, solid, rim);
+        const NearestOnDisk<Sides> p(s, solid, rim);
         if (p.lowest) {
             sliding_row(s, out, 0, p.n, p.place, p.lowest->velocity(s, {rim, rim, 0.0}));
             return;

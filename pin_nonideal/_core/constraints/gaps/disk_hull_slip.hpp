@@ -5,7 +5,7 @@
 
 #include "constraints/geometry.hpp"
 #include "constraints/row_traits.hpp"
-#include "constraints/gaps/nearest_of_rim.hpp"
+#include "constraints/gaps/nearest_on_disk.hpp"
 #include "constraints/gaps/segments.hpp"
 
 namespace pn {
@@ -25,14 +25,14 @@ struct RimSlipRows : SlipDirections {
 
     template <class Sides, class Out>
     PN_INLINE void rows(const Sides& s, Out& out) const {
-        const NearestOfRim<Sides> p(s, solid, rim);
+        const NearestOnDisk<Sides> p(s, solid, rim);
         const TurningTangents<Sides> along(s, p.n, typename Sides::Vec());
         for (int k = 0; k < 2; ++k) out.wrench[k] = force_at(p.place, along.t[k]);
     }
     template <class Sides, class Out>
     PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
         using Vec = typename Sides::Vec;
-        const NearestOfRim<Sides> p(s, solid, rim);
+        const NearestOnDisk<Sides> p(s, solid, rim);
         if (p.lowest) {
             const TurningTangents<Sides> along(s, p.n, s.b.omega().cross(p.n));
             return slide(s, out, along, p.place, p.lowest->velocity(s, {rim, rim, 0.0}));

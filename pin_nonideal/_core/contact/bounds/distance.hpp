@@ -66,10 +66,10 @@ struct Separation {
         return of_middles(s, nearest.at.n, kind.radius, kind.half1 * nearest.e);
     }
     static Separation of(const Sides<Pose>& s, const RimRow& kind) {
-        return of_middles(s, NearestOfRim<Sides<Pose>>(s, kind.solid, kind.rim).n, kind.radius, s.a.R.col(2));
+        return of_middles(s, NearestOnDisk<Sides<Pose>>(s, kind.solid, kind.rim).n, kind.radius, s.a.R.col(2));
     }
     static Separation of(const Sides<Pose>& s, const RimsRow& kind) {
-        return of_middles(s, NearestOfRims<Sides<Pose>>(s, kind.first, kind.second).n, kind.radius, s.a.R.col(2));
+        return of_middles(s, NearestOfCylinders<Sides<Pose>>(s, kind.first, kind.second).n, kind.radius, s.a.R.col(2));
     }
     static Separation of_middles(const Sides<Pose>& s, const Vec3& normal, double radius, const Vec3& axis_of_first) {
         Separation out{{}, 0, normal, radius};

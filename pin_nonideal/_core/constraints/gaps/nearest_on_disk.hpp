@@ -1,19 +1,19 @@
-// The point of a disk that is nearest to a convex hull. If the disk stands over a face, this is its lowest point.
-// Otherwise it is the point that faces the nearest edge. The disk lies across z of frame 1, about its origin. The hull
-// lies in frame 2.
+// The point of a disk that is nearest to a convex hull. If the disk stands over a face, this is its lowest point on the
+// rim (lowest_on_rim_or_ellipsoid.hpp). Otherwise it is the point that faces the nearest edge. The disk lies across z of
+// frame 1, about its origin. The hull lies in frame 2.
 #pragma once
 
 #include <optional>
 
 #include "constraints/geometry.hpp"
-#include "constraints/gaps/lowest_on_ellipsoid.hpp"
+#include "constraints/gaps/lowest_on_rim_or_ellipsoid.hpp"
 #include "constraints/gaps/nearest_along_line.hpp"
 #include "constraints/gaps/nearest_on_hull.hpp"
 
 namespace pn {
 
 template <class Sides>
-struct NearestOfRim {
+struct NearestOnDisk {
     using Vec = typename Sides::Vec;
     using Scalar = typename Sides::Scalar;
     using Lowest = LowestOnEllipsoid<Sides>;
@@ -24,7 +24,7 @@ struct NearestOfRim {
     std::optional<Lowest> lowest;  // set over a face
     std::optional<Line> line;      // else set: nearest edge, with the disk as a cylinder of zero length
 
-    NearestOfRim(const Sides& s, const Hull& hull, double rim) : n(), place(), distance(0.0) {
+    NearestOnDisk(const Sides& s, const Hull& hull, double rim) : n(), place(), distance(0.0) {
         if (!find_face(s, hull, rim)) find_edge(s, hull, rim);
     }
     static Sides from_hull(const Sides& s) { return {s.b, s.a, s.t}; }

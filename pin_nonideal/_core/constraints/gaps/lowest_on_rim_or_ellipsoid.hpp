@@ -1,6 +1,6 @@
-// The lowest point of an ellipsoid over a plane of frame 2. The semiaxes lie along the axes of frame 1, about its
-// origin. An ellipsoid with one zero semiaxis is a disk, such as the face of a wheel or of a can. Its lowest point lies
-// on the rim.
+// The point at which the rim of a wheel, or an ellipsoid, is lowest over a plane of frame 2. The semiaxes of the
+// ellipsoid lie along the axes of frame 1, about its origin. The face of a wheel is an ellipsoid with one semiaxis zero,
+// and its lowest point lies on the rim.
 #pragma once
 
 #include <cmath>

@@ -1,11 +1,11 @@
-// Directions of friction: sliding of an ellipsoid's lowest point along the plane of frame 2.
+// Directions of friction: sliding of the lowest point of a rim or ellipsoid along the plane of frame 2.
 #pragma once
 
 #include <tuple>
 
 #include "constraints/geometry.hpp"
 #include "constraints/row_traits.hpp"
-#include "constraints/gaps/lowest_on_ellipsoid.hpp"
+#include "constraints/gaps/lowest_on_rim_or_ellipsoid.hpp"
 
 namespace pn {
 

@@ -1,4 +1,4 @@
-// The gap between an ellipsoid, or a disk, and the plane of frame 2.
+// The gap between the rim of a wheel, or an ellipsoid, and the plane of frame 2.
 #pragma once
 
 #include <algorithm>
@@ -6,7 +6,7 @@
 
 #include "constraints/geometry.hpp"
 #include "constraints/row_traits.hpp"
-#include "constraints/gaps/lowest_on_ellipsoid.hpp"
+#include "constraints/gaps/lowest_on_rim_or_ellipsoid.hpp"
 
 namespace pn {
 
