@@ -1,9 +1,9 @@
-// Time stepping at velocity level (Moreau's midpoint rule). With the slip velocities u at the step's end and the
-// percussions P,
+// Time stepping at velocity level (Moreau's midpoint rule): the scheme, and its step in scenes without unilateral
+// contacts. moreau_contacts.hpp adds the contacts. With the slip velocities u at the step's end and the percussions P,
 //     q_m = q0 + h/2 v0,   M (v1 - v0) = h (F + C)(q_m, (v0 + v1)/2) + A^T P + N^T P_f,   q1 = q_m + h/2 v1,
 //     A v1 + phi_t = 0,
 // and P_f opposes u within h times its limit. The scheme has order 2 between events and no creep: sticking elements have
-// zero velocity. All elements are solved together.
+// zero velocity. All friction elements are solved together.
 #pragma once
 
 #include <vector>

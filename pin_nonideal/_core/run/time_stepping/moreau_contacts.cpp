@@ -426,8 +426,7 @@ void MoreauContacts::end_velocity() {
     marked_ = true;
 }
 
-// Add the work over the step, by the mean velocity. If a slip reverses inside the step, the friction that opposes its
-// end can do positive work on its mean velocity. This work is due to the scheme, not to friction.
+// Add the work as Moreau::book_work does. The work of contacts along their normals belongs to impacts.
 void MoreauContacts::book_work(VecX& y, double& moved_energy, double& impact_energy) {
     const auto& rows = elements_.rows;
     const auto& parts = elements_.parts;

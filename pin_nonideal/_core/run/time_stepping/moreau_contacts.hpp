@@ -1,6 +1,7 @@
-// Time stepping with unilateral contacts (Moreau's midpoint rule). Contacts with a closed gap at the step's middle take
-// part. They satisfy u_n + e u_n- >= 0 at the step's end with a nonnegative percussion, and Coulomb's cone along it.
-// All other dry friction stays within its limits. Each step solves one cone problem. Open contacts add no rows.
+// Unilateral contacts in the scheme of moreau.hpp. A contact takes part if its gap is closed at the step's middle. With
+// the rate u_n- of its gap before the step, the restitution e and the percussion (P_n, P_t),
+//     0 <= P_n,   0 <= u_n + e min(u_n-, 0),   one of them zero,     |P_t| <= mu P_n,
+// and P_t opposes the slip velocity. These laws and the limits of the other friction elements form one cone problem.
 #pragma once
 
 #include <vector>
