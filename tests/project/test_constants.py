@@ -21,6 +21,16 @@ def constants(text: str) -> list[str]:
     return names
 
 
+def code(path: Path) -> str:
+    """Text of a source without its comments."""
+    return re.sub(r"//[^\n]*", "", path.read_text(encoding="utf-8"))
+
+
+def room(path: Path) -> str:
+    """Folder of the core to which a source belongs."""
+    return path.relative_to(CORE).parts[0]
+
+
 def test_declarations_are_found() -> None:
     text = """
 constexpr double first = 1e-3, second = 2.0;  // two
@@ -40,3 +50,33 @@ def test_no_constant_is_defined_twice() -> None:
             files[name].append(path.relative_to(CORE).as_posix())
     assert len(files) > 400
     assert {name: paths for name, paths in files.items() if len(paths) > 1} == {}
+
+
+def test_shared_tolerances_are_in_one_header() -> None:
+    """A real constant that another room reads stands in `math`, not in a header of its first room."""
+    sources = {path: code(path) for path in sorted(CORE.rglob("*.[ch]pp"))}
+    shared = [
+        f"{path.relative_to(CORE)}: {name}"
+        for path, text in sources.items()
+        if path.suffix == ".hpp" and room(path) != "math"
+        for declaration in DECLARATION.findall(text)
+        if "double" in declaration.partition("=")[0]
+        for name in constants(declaration)
+        for other, users in sources.items()
+        if room(other) != room(path) and re.search(rf"(?<![.>\w]){name}\b", users)
+    ]
+    assert shared == []
+
+
+def test_shared_tolerances_are_few_and_explained() -> None:
+    text = (CORE / "math" / "tolerances.hpp").read_text(encoding="utf-8")
+    names = constants(text)
+    assert 10 < len(names) <= 25
+    explained = re.findall(r"^// [^-].*\nconstexpr double (\w+) = .*;$", text, re.M)
+    assert explained == names
+    sources = {path: code(path) for path in CORE.rglob("*.[ch]pp")}
+    users = {
+        name: {room(path) for path, text in sources.items() if re.search(rf"\b{name}\b", text)} - {"math"}
+        for name in names
+    }
+    assert [name for name, rooms in users.items() if len(rooms) < 2] == []

@@ -4,6 +4,7 @@
 
 #include "math/decompositions.hpp"
 #include "math/nnls.hpp"
+#include "math/tolerances.hpp"
 
 namespace pn {
 

@@ -6,9 +6,6 @@
 
 namespace pn {
 
-// Entry of a unit null-space vector of multipliers below which a row shares no load.
-constexpr double min_null_space_entry = 1e-9;
-
 struct Press {
     double margin;             // largest s with all multipliers >= s in some distribution (negative: some row must pull)
     std::vector<int> sharing;  // rows that share a load with the given row, as indices of `pressing`

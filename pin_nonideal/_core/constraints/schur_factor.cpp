@@ -9,6 +9,9 @@
 
 namespace pn {
 
+// Smallest trusted pivot of the Cholesky factor of the unit-diagonal B B^T. The relative error of the factor stays
+// below the machine precision divided by this value. Below it the orthogonal factorization of B^T is used.
+constexpr double min_schur_pivot = 1e-5;
 // Part of the squared length of the longest row of a block below which a row is rounding.
 constexpr double vanishing_square = 1e-28;
 

@@ -5,10 +5,6 @@
 
 namespace pn {
 
-// Smallest trusted pivot of the Cholesky factor of the unit-diagonal B B^T. The relative error of the factor stays
-// below the machine precision divided by this value. Below it the orthogonal factorization of B^T is used.
-constexpr double min_schur_pivot = 1e-5;
-
 // Compute B B^T and its factor for the active rows. Falls back to the orthogonal factorization.
 void factor_rows(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
                  RowSystem& s);

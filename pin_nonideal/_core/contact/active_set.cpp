@@ -10,6 +10,7 @@
 #include "dynamics/projection.hpp"
 #include "dynamics/friction_limit.hpp"
 #include "friction/stick_slip.hpp"
+#include "math/tolerances.hpp"
 
 namespace pn {
 
@@ -17,6 +18,10 @@ namespace {
 
 using Choice = std::vector<char>;  // closed flag by gap
 
+// Time [s] within which a closing gap touches.
+constexpr double touching_time = 1e-12;
+// At the start of a run, gaps up to this fraction of the scene's size touch.
+constexpr double starting_width = 1e-10;
 // Enumerate all active sets up to this many contacts if pivoting fails.
 constexpr int most_enumerated = 12;
 // Limit of the enumeration if slip directions must be consistent too. Without consistency a motion to integrate exists.

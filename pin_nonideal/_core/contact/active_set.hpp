@@ -8,11 +8,6 @@
 
 namespace pn {
 
-// Gaps narrower than this [m or rad], or closing within this time [s], touch.
-constexpr double touching_width = 1e-12, touching_time = 1e-12;
-// At the start of a run, gaps up to this fraction of the scene's size touch.
-constexpr double starting_width = 1e-10;
-
 // Contact state: touching contacts, resting contacts, and impacts.
 struct Touching {
     std::vector<char> touch, rest;

@@ -11,6 +11,7 @@
 #include "dynamics/step_start.hpp"
 #include "complementarity/cone/solver.hpp"
 #include "tree/lie_group.hpp"
+#include "math/tolerances.hpp"
 
 namespace pn {
 
@@ -41,7 +42,7 @@ double longest_single_move(const Program& p, const Workspace& w) {
 }
 
 bool strays_from_planes(const Program& p, Workspace& w, double longest_single) {
-    const double allowed = open_gap * scene_size(p, w);
+    const double allowed = max_projected_gap * scene_size(p, w);
     double widest = 0.0;
     for (int i : w.now.touching) {
         if (opening(p, w, p.gaps[i].block, allowed) != 0.0) return true;

@@ -9,6 +9,7 @@
 #include "complementarity/cone/solver.hpp"
 #include "friction/stick_slip.hpp"
 #include "math/decompositions.hpp"
+#include "math/tolerances.hpp"
 
 namespace pn {
 

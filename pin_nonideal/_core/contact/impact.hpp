@@ -18,9 +18,6 @@ struct Impact {
     double energy_change = 0.0;   // change of the total kinetic energy, including work of moving constraints
 };
 
-// Impulses below this fraction of the largest impulse of an impact are rounding.
-constexpr double impulse_rounding = 1e-14;
-
 // Gap rates below this value are rest [m/s or rad/s].
 double rest_rate(const VecX& v);
 

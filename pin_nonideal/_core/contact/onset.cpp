@@ -9,6 +9,7 @@
 #include "complementarity/cone/solver.hpp"
 #include "contact/rest_of_trees.hpp"
 #include "friction/stick_slip.hpp"
+#include "math/tolerances.hpp"
 
 namespace pn {
 

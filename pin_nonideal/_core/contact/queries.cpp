@@ -5,6 +5,7 @@
 
 #include "constraints/redundancy.hpp"
 #include "dynamics/reactions.hpp"
+#include "math/tolerances.hpp"
 
 namespace pn {
 

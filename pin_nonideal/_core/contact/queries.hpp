@@ -8,11 +8,6 @@
 
 namespace pn {
 
-// Rounding of a closed gap [m], relative to the scene's size.
-constexpr double gap_rounding = 1e-14;
-// Minimum difference of the biases of two gaps, or of one gap before and after a hand-over, relative to all accelerations.
-constexpr double min_bias_jump = 1e-6;
-
 // Check if a contact has no mobility along its normal. Such a contact never closes.
 inline bool is_bare(const Program& p, int gap) { return p.blocks[p.gaps[gap].block].kept.empty(); }
 

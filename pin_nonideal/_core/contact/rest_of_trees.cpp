@@ -4,6 +4,7 @@
 
 #include "complementarity/blocks/solver.hpp"
 #include "contact/tree_blocks.hpp"
+#include "math/tolerances.hpp"
 
 namespace pn {
 

@@ -6,9 +6,6 @@
 
 namespace pn {
 
-// Acceleration of a tree at rest that counts as rounding, relative to that without forces.
-constexpr double tree_acceleration_rounding = 1e-9;
-
 // Row k of a block, whose force is an unknown.
 struct StepRow {
     int block, k;

@@ -5,6 +5,7 @@
 #include <climits>
 
 #include "dynamics/workspace.hpp"
+#include "math/tolerances.hpp"
 
 namespace pn {
 

@@ -4,6 +4,7 @@
 
 #include "dynamics/reactions.hpp"
 #include "dynamics/acceleration.hpp"
+#include "math/tolerances.hpp"
 
 namespace pn {
 
@@ -84,7 +85,7 @@ std::pair<double, double> slip_toward_rest(const Program& p, Workspace& w, int e
     const Vec3 u = slip_velocity(w.now, f);
     const double size = u.norm();
     // Slip too slow to have a direction uses the stored direction.
-    const bool slow = size <= directed_speed * (1.0 + w.now.speed);
+    const bool slow = size <= min_directed_speed * (1.0 + w.now.speed);
     if (slow || 2.0 * along * along > size * size) return {along, slip_rate_along_mode(p, w, e)};
     return {size, slip_acceleration(p, w, f).dot(u) / size};
 }
@@ -143,7 +144,7 @@ static Vec3 force_direction(const Program& p, Workspace& w, int e) {
     if (w.state.seeks_directions) return -w.state.last_direction[e];
     const Vec3 u = slip_velocity(w.now, f);
     const double speed = u.norm();
-    if (speed > directed_speed * (1.0 + w.now.speed))
+    if (speed > min_directed_speed * (1.0 + w.now.speed))
         // Past a reversal inside a step the direction stays the same, so that the step integrates a smooth law.
         w.state.last_direction[e] = u.dot(w.state.slip_direction[e]) >= 0.0 ? Vec3(u / speed) : Vec3(-u / speed);
     return -w.state.last_direction[e];

@@ -8,9 +8,6 @@
 
 namespace pn {
 
-// Slip below this fraction of the scene's speed has no direction except rounding.
-constexpr double directed_speed = 1e-9;
-
 // Slip velocity along an element's directions, from the rows last evaluated.
 Vec3 slip_velocity(const Evaluation& now, const Friction& f);
 // Slip accelerations of an element in the current motion, along its directions.

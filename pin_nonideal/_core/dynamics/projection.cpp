@@ -7,6 +7,7 @@
 #include "dynamics/acceleration.hpp"
 #include "tree/mass_factor.hpp"
 #include "tree/lie_group.hpp"
+#include "math/tolerances.hpp"
 
 namespace pn {
 
@@ -16,6 +17,15 @@ namespace {
 // rounding. Newton's method at least halves the residual near the constraints. The first steps may start far away.
 constexpr double projection_stall_ratio = 0.5;
 constexpr int sure_position_steps = 3, sure_velocity_steps = 1;
+// Maximum fraction of an earlier step that an iteration step may keep. Steps above it carry no information about the
+// change of the rows since their factorization.
+constexpr double broyden_limit = 0.3;
+// A step with an expected residual below this fraction of rounding is not evaluated separately.
+constexpr double trusted_part = 0.5;
+// The third-order part of a step's move is used if its square is below this fraction of the second-order part's square.
+constexpr double falling_square = 0.01;
+// Below this speed [rad/s or m/s] rows change only by rounding over a step of time stepping.
+constexpr double slow_speed = 1e-5;
 // Factorization at the new position costs less than this many iterations.
 constexpr double iterations_for_factors = 3.0;
 // Near a singular position the floor is zero. Iteration counts then assume convergence to unit roundoff.
@@ -110,7 +120,7 @@ void move_position(const Program& p, Workspace& w, VecX& q, const Dofs&... dofs)
 }
 
 // Rounding level of residuals. It is zero near a singular position, which magnifies rounding.
-double rounding_part(const Workspace& w) { return w.now.rows.distance < near_singular ? 0.0 : projection_floor; }
+double rounding_part(const Workspace& w) { return w.now.rows.distance < near_singular_pivot ? 0.0 : projection_floor; }
 
 }  // namespace
 
@@ -146,7 +156,7 @@ double opening(const Program& p, const Workspace& w, int block, double allowed) 
 }
 
 void require_closed(const Program& p, const Workspace& w, double t) {
-    const double allowed = open_gap * scene_size(p, w);
+    const double allowed = max_projected_gap * scene_size(p, w);
     double largest = 0.0;
     int worst = -1;
     for (int i : w.now.awake) {
@@ -254,7 +264,7 @@ bool project_position(const Program& p, Workspace& w, double t, VecX& q, const V
     }
     if (count > 0 && static_cast<int>(p.constrained_dofs.size()) < p.mechanism.nv) move_position(p, w, q);
     // In deep trees M and its factor share storage.
-    const bool serves = p.affine_rates && w.now.rows.distance >= near_singular && p.mechanism.deep_dofs.empty();
+    const bool serves = p.affine_rates && w.now.rows.distance >= near_singular_pivot && p.mechanism.deep_dofs.empty();
     if (!configured && keeps_factors && serves) place(p, w, t, q, v);
     else if (!configured) configure(p, w, t, q, v);
     if (moves) ++w.counters.projections;

@@ -6,27 +6,6 @@
 
 namespace pn {
 
-// Residuals below this fraction of the scene's size are rounding: a few hundred operations of unit roundoff.
-constexpr double projection_floor = 2e-14;
-// A pivot of the rows' unit-diagonal factor below this value is near a singular position. The pivot is the squared sine
-// of the angle between the nearest row and the other rows.
-constexpr double near_singular = 2.5e-3;
-// Maximum fraction of an earlier step that an iteration step may keep. Steps above it carry no information about the
-// change of the rows since their factorization.
-constexpr double broyden_limit = 0.3;
-// A step with an expected residual below this fraction of rounding is not evaluated separately.
-constexpr double trusted_part = 0.5;
-// The third-order part of a step's move is used if its square is below this fraction of the second-order part's square.
-constexpr double falling_square = 0.01;
-// In an immobile scene a velocity below this [rad/s or m/s] is rounding of the last event.
-constexpr double immobile_speed = 1e-8;
-// Below this speed [rad/s or m/s] rows change only by rounding over a step of time stepping.
-constexpr double slow_speed = 1e-5;
-
-// A gap above this fraction of the scene's size after projection is a failure. Projection closes gaps to rounding after
-// every step, in singular positions too.
-constexpr double open_gap = 1e-9;
-
 // Add the least move that follows the constraints to third order to a step's move h v1, v1 = v0 + h a. Without it the
 // gap is h^2/2 b, because h v0 + h^2/2 a follows the constraints to second order. The multipliers of h^3 come from
 // projections after earlier steps. The workspace must hold (v0, a).

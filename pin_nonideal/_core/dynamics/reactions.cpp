@@ -6,6 +6,7 @@
 #include "constraints/redundancy.hpp"
 #include "dynamics/law_forces.hpp"
 #include "math/nnls.hpp"
+#include "math/tolerances.hpp"
 
 namespace pn {
 

@@ -5,6 +5,7 @@
 
 #include "dynamics/acceleration.hpp"
 #include "dynamics/evaluation.hpp"
+#include "math/tolerances.hpp"
 
 namespace pn {
 
@@ -13,6 +14,9 @@ namespace {
 // Rank tolerances tried in this order at a state off the constraints, where dependent rows have pivots above
 // rank_tolerance. The first choice (fewest rows) whose projection closes all other rows is taken.
 constexpr double tolerances_near[] = {1e-3, 1e-5, 1e-7, 1e-9};
+// Gaps above this fraction of the scene's size in dependent rows are closed by projection, which may move sticking
+// elements.
+constexpr double creeping_gap = 1e-11;
 // Maximum choices of rows to project one position. Each choice reduces the gaps of the other rows quadratically.
 constexpr int max_row_choices = 3;
 
@@ -57,7 +61,7 @@ bool project_onto_dependent(const Program& p, Workspace& w, double t, VecX& q, c
     const int rank = static_cast<int>(std::count(w.now.rows.active.begin(), w.now.rows.active.end(), char(1)));
     bool moved = false;
     const auto is_open = [&] { return dependent_residual(p, w) > creeping_gap * scene_size(p, w); };
-    for (int k = 0; k < max_row_choices && (is_open() || (k == 0 && w.now.rows.distance < near_singular)); ++k) {
+    for (int k = 0; k < max_row_choices && (is_open() || (k == 0 && w.now.rows.distance < near_singular_pivot)); ++k) {
         configure(p, w, t, q, v);
         choose_rows(p, w, rank_tolerance, rank);
         moved |= project_position(p, w, t, q, v);

@@ -6,10 +6,6 @@
 
 namespace pn {
 
-// Gaps above this fraction of the scene's size in dependent rows are closed by projection, which may move sticking
-// elements.
-constexpr double creeping_gap = 1e-11;
-
 // Project q and v. The workspace is configured there on return.
 bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
 // Project q and v and evaluate the result.

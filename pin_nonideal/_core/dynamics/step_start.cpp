@@ -8,6 +8,7 @@
 #include "dynamics/state_projection.hpp"
 #include "dynamics/acceleration.hpp"
 #include "tree/mass_factor.hpp"
+#include "math/tolerances.hpp"
 
 namespace pn {
 

@@ -5,6 +5,7 @@
 
 #include "complementarity/fixed_point/interval_solver.hpp"
 #include "dynamics/reactions.hpp"
+#include "math/tolerances.hpp"
 
 namespace pn {
 

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include "math/tolerances.hpp"
+
 namespace pn {
 
 static void size(const Program& p, RunState& state) {

@@ -11,11 +11,16 @@
 #include "dynamics/implicit_drives.hpp"
 #include "dynamics/program.hpp"
 #include "complementarity/fixed_point/equation.hpp"
+#include "math/tolerances.hpp"
 
 namespace pn {
 
 // Maximum iterations of a projection, each with stored multipliers. Newton's method takes three if it converges well.
 constexpr int projection_limit = 12;
+
+// Rank tolerance while elements stick. A direction held by a smaller part of their forces counts as free. It is the
+// square root of response_rank_threshold (complementarity/box_lcp.hpp), because a response is a square of rows.
+constexpr double rank_tolerance_sticking = 3e-7;
 
 struct Counters {
     long evaluations = 0, factorizations = 0, projections = 0, iterations = 0;

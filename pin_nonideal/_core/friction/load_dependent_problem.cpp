@@ -4,6 +4,7 @@
 
 #include "dynamics/implicit_friction.hpp"
 #include "dynamics/friction_limit.hpp"
+#include "math/tolerances.hpp"
 
 namespace pn {
 

@@ -2,6 +2,7 @@
 
 #include "dynamics/acceleration.hpp"
 #include "math/lanes.hpp"
+#include "math/tolerances.hpp"
 #include "tree/mass_factor.hpp"
 
 namespace pn {

@@ -6,11 +6,6 @@
 
 namespace pn {
 
-// Rounding of accelerations, relative to their scale.
-constexpr double relative_acceleration_rounding = 1e-12;
-// Minimum response to a force under constraints, relative to its free response. Smaller responses are rounding.
-constexpr double min_constrained_response = 1e-13;
-
 struct FrictionProblem {
     std::vector<int> elements, dims;  // element i has dims[i] consecutive rows of alpha and f
     int rows = 0;

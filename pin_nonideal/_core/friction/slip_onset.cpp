@@ -4,6 +4,7 @@
 
 #include "complementarity/socp_mode_newton.hpp"
 #include "complementarity/load_dependent/solver.hpp"
+#include "math/tolerances.hpp"
 
 namespace pn {
 

@@ -15,6 +15,7 @@
 #include "complementarity/load_dependent/enumeration.hpp"
 #include "friction/load_dependent_problem.hpp"
 #include "complementarity/load_dependent/solver.hpp"
+#include "math/tolerances.hpp"
 
 namespace pn {
 

@@ -8,11 +8,6 @@
 
 namespace pn {
 
-// Slip below this fraction of the scene's speed is rest, because event location leaves rounding.
-constexpr double rest_speed = 1e-11;
-// Slip up to this fraction may remain if sticking rows are almost redundant, because such rows amplify rounding.
-constexpr double raised_rest = 1e-9;
-
 // Set up the mode problem from the slip velocities of the rows last evaluated. Elements at rest stick or have come to
 // rest (`also` among them). Moving elements slip along their velocities.
 ModeQuestion question(const Program& p, Workspace& w, const VecX& v, int also = -1);

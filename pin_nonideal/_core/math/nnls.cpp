@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "math/decompositions.hpp"
+#include "math/tolerances.hpp"
 
 namespace pn {
 

@@ -17,9 +17,6 @@ namespace pn {
 using VecX = Eigen::VectorXd;
 using MatX = Eigen::MatrixXd;
 
-// Divisor in place of a smaller scale, such as the limit of an element without load. Quotients stay finite.
-constexpr double min_scale = 1e-300;
-
 struct Vec3 {
     alignas(32) Lanes x = {};  // alignment of the wide registers, even without AVX2 at compile time
 

@@ -6,6 +6,7 @@
 #include "dynamics/friction_limit.hpp"
 #include "friction/stick_slip.hpp"
 #include "friction/problem.hpp"
+#include "math/tolerances.hpp"
 
 namespace pn {
 
@@ -69,7 +70,7 @@ bool FollowedRun::follow(double end, const OutsideStep::Interpolant& interpolant
     if (!bridges_cluster()) find_event();
     accept({stepper.h, end, true}, event);
     record(event);
-    system.on_constraints = w.now.rows.distance < near_singular && !w.now.rows.blocks.empty();
+    system.on_constraints = w.now.rows.distance < near_singular_pivot && !w.now.rows.blocks.empty();
     const bool breaks_here = breaks.reached() && !done();
     if (breaks_here) pass_break();
     if (event || breaks_here || options.method.one_step) moved_before_ = progress.moved_energy;

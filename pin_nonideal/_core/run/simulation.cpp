@@ -7,6 +7,7 @@
 #include "dynamics/evaluation.hpp"
 #include "dynamics/projection.hpp"
 #include "dynamics/step_start.hpp"
+#include "math/tolerances.hpp"
 #include "run/events/events.hpp"
 
 namespace pn {
@@ -265,10 +266,10 @@ std::optional<double> Simulation::integrate(const Proposal& proposal) {
 std::optional<double> Simulation::try_step(const Proposal& proposal) {
     const double size = proposal.size;
     const double start_pivot = w.now.rows.distance;
-    system.on_constraints = start_pivot < near_singular && !w.now.rows.blocks.empty();
+    system.on_constraints = start_pivot < near_singular_pivot && !w.now.rows.blocks.empty();
     system.smallest_pivot = 1.0;
     stepper.take(progress.t, size);
-    if (system.smallest_pivot < near_singular && !system.on_constraints) {
+    if (system.smallest_pivot < near_singular_pivot && !system.on_constraints) {
         system.on_constraints = true;
         stepper.take(progress.t, size);
     }

@@ -5,6 +5,7 @@
 
 #include "complementarity/box_lcp.hpp"
 #include "math/decompositions.hpp"
+#include "math/tolerances.hpp"
 
 namespace pn {
 

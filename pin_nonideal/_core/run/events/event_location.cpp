@@ -11,6 +11,7 @@
 #include "dynamics/friction_limit.hpp"
 #include "dynamics/step_start.hpp"
 #include "friction/stick_slip.hpp"
+#include "math/tolerances.hpp"
 
 namespace pn {
 

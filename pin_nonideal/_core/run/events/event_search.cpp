@@ -11,6 +11,7 @@
 #include "dynamics/reactions.hpp"
 #include "dynamics/friction_limit.hpp"
 #include "math/roots.hpp"
+#include "math/tolerances.hpp"
 
 namespace pn {
 
@@ -77,7 +78,7 @@ double EventSearch::noise() const {
 
 // Return the speed with which an element of deferred sticking may slip against its mode.
 double EventSearch::allowance(int e) const {
-    return w.state.lingers[e] ? raised_rest * (1.0 + system_.velocity(stepper_.y0).cwiseAbs().maxCoeff()) : 0.0;
+    return w.state.lingers[e] ? raised_rest_speed * (1.0 + system_.velocity(stepper_.y0).cwiseAbs().maxCoeff()) : 0.0;
 }
 
 // Check if a sticking element is beyond its limit at the step's end, or may have been between two stages.

@@ -17,6 +17,10 @@
 
 namespace pn {
 
+// Slip that may remain if sticking rows are almost redundant, relative to 1 + the largest speed of the scene [rad/s or
+// m/s]. Such rows amplify rounding.
+constexpr double raised_rest_speed = 1e-9;
+
 // Margin that may cross zero inside the step.
 struct Watch {
     enum class Kind { slip, stick, contact, load, gap } kind;

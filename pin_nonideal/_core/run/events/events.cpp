@@ -10,6 +10,7 @@
 #include "dynamics/friction_limit.hpp"
 #include "dynamics/step_start.hpp"
 #include "friction/mode_update.hpp"
+#include "math/tolerances.hpp"
 #include "run/events/unloaded_contacts.hpp"
 
 namespace pn {
@@ -23,7 +24,7 @@ constexpr double held_limit_rounding = 1e-9;
 
 bool hardly_moves(const System& system, int e) {
     const double slip = slip_velocity(system.w.now, system.p.frictions[e]).norm();
-    return slip <= raised_rest * (1.0 + system.v.cwiseAbs().maxCoeff());
+    return slip <= raised_rest_speed * (1.0 + system.v.cwiseAbs().maxCoeff());
 }
 
 // Select the modes of all elements at rest together, and project the state. Elements that turn out to move are removed

@@ -12,6 +12,8 @@ namespace pn {
 
 namespace {
 
+// Rounding of a closed gap [m], relative to the scene's size.
+constexpr double gap_rounding = 1e-14;
 // Bound of the accelerations between the stages of an accepted step, relative to the largest one at the stages.
 constexpr double between_stages = 2.0;
 // Maximum number of samples of a gap that stays near its plane. After that it counts as closed.

@@ -7,6 +7,7 @@
 #include "dynamics/evaluation.hpp"
 #include "dynamics/projection.hpp"
 #include "dynamics/step_start.hpp"
+#include "math/tolerances.hpp"
 #include "run/events/unloaded_contacts.hpp"
 #include "tree/lie_group.hpp"
 

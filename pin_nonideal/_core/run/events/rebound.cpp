@@ -10,6 +10,7 @@
 #include "dynamics/projection.hpp"
 #include "dynamics/friction_limit.hpp"
 #include "tree/lie_group.hpp"
+#include "math/tolerances.hpp"
 
 namespace pn {
 

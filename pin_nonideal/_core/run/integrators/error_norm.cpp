@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "dynamics/projection.hpp"
+#include "math/tolerances.hpp"
 #include "tree/lie_group.hpp"
 
 namespace pn {

@@ -5,6 +5,7 @@
 
 #include "dynamics/evaluation.hpp"
 #include "dynamics/step_start.hpp"
+#include "math/tolerances.hpp"
 #include "run/output/archive.hpp"
 
 namespace pn {

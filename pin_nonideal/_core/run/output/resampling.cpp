@@ -6,6 +6,7 @@
 #include "dynamics/state_projection.hpp"
 #include "dynamics/friction_limit.hpp"
 #include "dynamics/step_start.hpp"
+#include "math/tolerances.hpp"
 
 namespace pn {
 
@@ -61,7 +62,7 @@ static void take_directions(const Program& p, Workspace& w, const System& system
     update_kinematics(p, w, inside.t[k], system.q, system.v);
     for (size_t e = 0; e < sought.size(); ++e) {
         const Vec3 u = slip_velocity(w.now, p.frictions[e]);
-        if (!sought[e] && u.norm() > directed_speed * (1.0 + system.v.cwiseAbs().maxCoeff()))
+        if (!sought[e] && u.norm() > min_directed_speed * (1.0 + system.v.cwiseAbs().maxCoeff()))
             state.last_direction[e] = u.normalized();
     }
     state.seeks_directions = true;

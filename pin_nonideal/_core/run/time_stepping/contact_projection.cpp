@@ -6,6 +6,7 @@
 #include "contact/queries.hpp"
 #include "dynamics/evaluation.hpp"
 #include "dynamics/projection.hpp"
+#include "math/tolerances.hpp"
 #include "tree/lie_group.hpp"
 
 namespace pn {
@@ -79,14 +80,14 @@ bool ContactProjection::close_gaps(const Program& p, Workspace& w, double t, Vec
 
 // Check if a closed contact is left open or penetrates.
 bool ContactProjection::is_open(const Program& p, const Workspace& w) const {
-    const double allowed = open_gap * scene_size(p, w);
+    const double allowed = max_projected_gap * scene_size(p, w);
     return std::any_of(w.now.touching.begin(), w.now.touching.end(),
                        [&](int i) { return !is_bare(p, i) && std::abs(gap_width(p, w, i)) > allowed; });
 }
 
 // Open closed contacts whose gap other contacts keep open. Return true if there are any.
 bool ContactProjection::open_held_apart(const Program& p, Workspace& w) {
-    const double allowed = open_gap * scene_size(p, w);
+    const double allowed = max_projected_gap * scene_size(p, w);
     const auto is_apart = [&](int i) { return !is_bare(p, i) && gap_width(p, w, i) > allowed; };
     if (std::none_of(w.now.touching.begin(), w.now.touching.end(), is_apart)) return false;
     closed_ = w.state.closed;

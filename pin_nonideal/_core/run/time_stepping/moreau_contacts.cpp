@@ -14,6 +14,7 @@
 #include "run/time_stepping/moreau.hpp"
 #include "tree/lie_group.hpp"
 #include "tree/terms.hpp"
+#include "math/tolerances.hpp"
 
 namespace pn {
 

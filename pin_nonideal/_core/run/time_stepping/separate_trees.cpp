@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "math/tolerances.hpp"
+
 namespace pn {
 
 SeparateTrees::SeparateTrees(const Program& p) : blocks_(p) {}

@@ -2,6 +2,7 @@
 
 #include "dynamics/acceleration.hpp"
 #include "friction/problem.hpp"
+#include "math/tolerances.hpp"
 #include "tree/mass_factor.hpp"
 
 namespace pn {

@@ -1,0 +1,53 @@
+// Tolerances that several rooms of the core share. Others stand beside their algorithm.
+//
+// The unit roundoff is 1e-16. Relative tolerances are multiples of it by the operations or the condition behind a value.
+#pragma once
+
+namespace pn {
+
+// --- Rows of constraints
+// Rank tolerance on the pivots of B^T, with each row divided by its greatest length. On the manifold, rounding and
+// constraint drift reach about 1e-12. True directions of light mechanisms lie above 1e-7.
+constexpr double rank_tolerance = 1e-10;
+// Pivot of the rows' unit-diagonal factor below which a position is near a singular one. The pivot is the squared sine
+// of the angle between the nearest row and the other rows: 3 degrees.
+constexpr double near_singular_pivot = 2.5e-3;
+// Entry of a unit null-space vector of multipliers below which a row shares no load.
+constexpr double min_null_space_entry = 1e-9;
+
+// --- Projection onto the constraints
+// Residual that is rounding, relative to the scene's size: a few hundred operations of unit roundoff.
+constexpr double projection_floor = 2e-14;
+// Gap after a projection above which the projection has failed, relative to the scene's size. Projection closes gaps to
+// rounding after every step, in singular positions too.
+constexpr double max_projected_gap = 1e-9;
+// Velocity [rad/s or m/s] of a scene without freedom below which it is rounding of the last event.
+constexpr double immobile_speed = 1e-8;
+
+// --- Slip. Speeds are relative to 1 + the largest speed of the scene [rad/s or m/s].
+// Speed of a slip that is rest, because event location leaves rounding.
+constexpr double rest_speed = 1e-11;
+// Speed of a slip below which its direction is rounding only.
+constexpr double min_directed_speed = 1e-9;
+
+// --- Forces and accelerations
+// Rounding of accelerations, relative to their scale.
+constexpr double relative_acceleration_rounding = 1e-12;
+// Acceleration of a tree at rest that counts as rounding, relative to that without forces.
+constexpr double tree_acceleration_rounding = 1e-9;
+// Minimum response to a force under constraints, relative to its free response. Smaller responses are rounding.
+constexpr double min_constrained_response = 1e-13;
+// Impulse that is rounding, relative to the largest impulse of an impact.
+constexpr double impulse_rounding = 1e-14;
+
+// --- Gaps
+// Width below which a gap touches [m or rad]. Penetrations after a step are compared with it times the scene's size.
+constexpr double touching_width = 1e-12;
+// Minimum difference of the biases of two gaps, or of one gap before and after a hand-over, relative to all accelerations.
+constexpr double min_bias_jump = 1e-6;
+
+// --- Any quantity
+// Divisor in place of a smaller scale, such as the limit of an element without load. Quotients stay finite.
+constexpr double min_scale = 1e-300;
+
+}  // namespace pn
