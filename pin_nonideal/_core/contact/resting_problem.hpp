@@ -1,0 +1,92 @@
+// Cone problem of contacts at rest. With normal and friction forces f as unknowns, the accelerations of gaps and slips
+// are w = w0 + W f. The laws of Signorini and Coulomb give a cone problem (complementarity/cone/problem.hpp). Its solution
+// shows the lifting contacts and the slip directions, even for shared loads.
+#pragma once
+
+#include <vector>
+
+#include "complementarity/cone/solver.hpp"
+#include "contact/contact_rows.hpp"
+#include "friction/slip_onset.hpp"
+
+namespace pn {
+
+struct RestingMotion {
+    std::vector<char> closed;     // by gap
+    std::vector<char> loaded;     // closed contacts that press, by gap
+    std::vector<Mode> modes;      // by element
+    std::vector<Vec3> direction;  // slip direction at onset, by element
+    std::vector<Vec3> friction;   // friction of each element, along its directions
+    bool several = false;         // rest is admissible, and a motion from rest as well
+    bool shared = false;          // contacts are hyperstatic
+    bool is_near = false;         // only an initial guess for the search of the motion
+
+    bool slides() const;  // some contact slips or begins to slip
+    // Set the modes of elements at rest and their slip directions at onset. An initial guess sets its friction only.
+    void answer(const Program& p, Workspace& w, ModeQuestion& question) const;
+};
+
+struct ClosingQuestion {
+    std::vector<char> rest;     // contacts at rest on each other
+    int opening = -1;           // contact of `rest` whose load just reached zero
+    int arrived = -1;           // element that just came to rest or reached its limit
+    std::vector<int> breaking;  // elements that stuck and just reached their limit: they slip
+    bool prescribed = false;    // the caller sets the modes
+    bool struck = false;        // after an impact the velocity decides if a sticking element slips
+};
+// Check if an element rests in the question, with the run state before it.
+bool is_at_rest(const Program& p, const Workspace& w, const VecX& v, const ClosingQuestion& question,
+                const RunState& before, int element);
+
+class RestingProblem {
+public:
+    bool several = false;  // rest holds, though a motion was found too
+
+    // Set up the problem of the closed contacts `gaps` and of other friction elements at rest. The workspace must hold
+    // the motion without their forces.
+    RestingProblem(const Program& program, Workspace& workspace, const VecX& velocity, const std::vector<int>& gaps,
+                   const std::vector<int>& others, const ClosingQuestion& asked, const RunState& state);
+
+    // Solve for the forces. Return false if no motion was found. `shared`: contacts are hyperstatic.
+    bool solve(bool& shared);
+    // Solve for forces that hold all contacts at rest. Rest is preferred to motion if both are possible.
+    bool hold(ConeComplementarity& solver);
+    // Store the motion under the forces.
+    void read(RestingMotion& out) const;
+
+private:
+    MatX chosen(const MatX& of_all) const;
+    double limit(int element) const;
+    // Rows of a cone that belong to a normal, and those of its friction.
+    int head(size_t i) const { return cones[i].is(ConeElement::Kind::contact); }
+    int tail(size_t i) const { return cones[i].dim - head(i); }
+    auto tail_of(const VecX& x, size_t i) const { return x.segment(first[i] + head(i), tail(i)); }
+    VecX accelerations();
+    // Scale of the accelerations of all rows, or of some rows. That of all rows would hide the slip of a body beside much
+    // lighter ones.
+    double in_play() const;
+    double in_play(int row, int count) const;
+    // Accelerations of these rows, and of the slip of a cone, that are rounding.
+    double rounding(int row, int count) const;
+    double slip_rounding(size_t i) const { return rounding(first[i] + head(i), tail(i)); }
+    bool at_its_limit(size_t i) const;
+    bool moves() const;
+    bool release();
+    bool solve_cones(bool warm, bool& shared);
+    bool take_turns(const VecX& free);
+
+    const Program& p;
+    Workspace& w;
+    const VecX& v;
+    const ClosingQuestion& question;
+    const RunState& before;
+    ContactRows rows;
+    std::vector<char> slides;            // contacts with a known slip direction
+    std::vector<ConeElement> cones;      // cones of the contacts (slipping contacts: normal row only)
+    std::vector<int> first;              // first row of each in the problem
+    MatX drag;                           // friction of slipping contacts along all rows, per unknown
+    MatX W, dragging;  // accelerations of the problem's rows for a unit of each unknown, and for its friction
+    VecX w0, f;
+};
+
+}  // namespace pn
