@@ -2,24 +2,15 @@
 // accelerations, or along the accelerations slightly past the load of their common slip onset.
 #pragma once
 
-#include "friction/problem.hpp"
 #include "complementarity/load_dependent/equation.hpp"
+#include "friction/mode_question.hpp"
+#include "friction/problem.hpp"
 
 namespace pn {
 
 constexpr double slip_limit_rounding = 1e-13;    // rounding relative to a limit
 constexpr double limit_slack = 1e-9;             // allowed violation of a mode's condition, relative to a limit
 
-// Modes to compute: modes of moving elements are known, the other elements are at rest along their directions.
-struct ModeQuestion {
-    std::vector<Mode> modes;  // by element, ignored for elements at rest
-    std::vector<int> at_rest;
-    // Elements at rest that just reached their limit: they slip at the limit even with zero acceleration.
-    std::vector<int> breaking;
-    bool several = false;       // another motion than the answer is known
-    bool answered = false;      // `modes` belong to a motion solved with all contacts
-    std::vector<Vec3> near;     // friction of all elements in a nearby motion, if known
-};
 // Compute the modes for the forces f of a program with these limits. Slip directions are stored in the workspace.
 std::vector<Mode> modes_of(Workspace& w, const ModeQuestion& question, const FrictionProblem& problem, const VecX& f,
                            const FrictionLimits& limits);

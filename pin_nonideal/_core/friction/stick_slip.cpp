@@ -14,6 +14,7 @@
 #include "friction/mode_enumeration.hpp"
 #include "complementarity/load_dependent/enumeration.hpp"
 #include "friction/load_dependent_problem.hpp"
+#include "friction/rest_motions.hpp"
 #include "complementarity/load_dependent/solver.hpp"
 #include "math/tolerances.hpp"
 
@@ -38,10 +39,13 @@ struct Search {
     const ModeQuestion& question;
     const std::vector<int>& list;  // elements at rest
     std::vector<int> slipping;     // slipping elements with load-dependent limits
+    RestMotions motions;           // those of load-dependent limits
+    bool presses = true;           // the motion of the iteration has no contact in tension
 
     Search(const Program& program, Workspace& workspace, double time, const VecX& q_, const VecX& v_,
            const ModeQuestion& asked)
-        : p(program), w(workspace), t(time), q(q_), v(v_), question(asked), list(asked.at_rest) {
+        : p(program), w(workspace), t(time), q(q_), v(v_), question(asked), list(asked.at_rest),
+          motions(program, workspace, time, list) {
         for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e)
             if (!contains(list, e) && slips(asked.modes[e]) && p.frictions[e].reaction == Reaction::total)
                 slipping.push_back(e);
@@ -76,110 +80,6 @@ struct Search {
         });
     }
 
-    // Solve for the forces of all elements for the current factors of their limits. A few elements: select among all
-    // motions. More elements: the motion in which all stick, else any motion.
-    bool find(RestProblem& problem, VecX& x) {
-        const RestEquation& equation = problem.equation;
-        const AllMotions all = all_motions(equation);
-        if (all.complete && !problem.has_pieces()) {
-            std::vector<VecX> motions;
-            for (const VecX& forces : all.forces)
-                if (problem.is_motion(forces)) motions.push_back(forces);
-            // If a contact has tension in all motions, it is about to open.
-            return choose(problem, motions.empty() ? all.forces : motions, x);
-        }
-        VecX held = equation.holding_forces();
-        if (!refine_rest(equation, held) || !all_stick(equation, held)) return solve_rest(equation, x);
-        x = held;
-        return true;
-    }
-
-    // Solve for one zero-load set after the other until the motion is consistent with its own set. If this fails, try
-    // all sets.
-    bool find_in_pieces(RestProblem& problem, VecX& x) {
-        for (int turn = 0; turn < max_zero_load_sets && find(problem, x); ++turn) {
-            if (!problem.has_pieces() || problem.is_motion(x)) return true;
-            problem.enter_piece(x);
-        }
-        if (!problem.has_pieces()) return false;
-        for (const std::vector<char>& unloaded : load_pieces(p, w)) {
-            problem.enter_piece(unloaded);
-            x.setZero();
-            if (find(problem, x) && problem.is_motion(x)) return true;
-        }
-        return false;
-    }
-
-    // Refine by Newton's method alone, near a solution.
-    bool refine_in_pieces(RestProblem& problem, VecX& x) {
-        for (int turn = 0; turn < max_zero_load_sets; ++turn) {
-            if (problem.has_pieces()) problem.enter_piece(x);
-            if (!refine_rest(problem.equation, x)) return false;
-            if (!problem.has_pieces() || problem.is_motion(x)) return true;
-        }
-        return false;
-    }
-
-    // Check if forces within their limits hold all elements at rest, for any zero-load set, although the iteration
-    // found slip.
-    bool rests(RestProblem& problem, VecX& x) {
-        const auto begin = problem.equation.elements.begin();
-        const auto may_stick = [](const RestElement& e) { return e.may_stick; };  // the constraints drive the others
-        if (!std::all_of(begin, begin + list.size(), may_stick)) return false;
-        x = problem.equation.holding_forces();
-        for (int turn = 0; turn < max_zero_load_sets; ++turn) {
-            const bool holds = hold_at_rest(problem.equation, x);
-            if (!problem.has_pieces() || problem.is_motion(x)) return holds;
-            problem.enter_piece(x);
-        }
-        return false;
-    }
-
-    // Select the motion in which all elements stick that stick in any other motion. Elements at rest stay at rest.
-    bool choose(const RestProblem& problem, const std::vector<VecX>& motions, VecX& x) {
-        const RestEquation& equation = problem.equation;
-        proven = true;
-        if (motions.empty()) return false;
-        for (const VecX& one : motions) {
-            const bool stickiest = std::all_of(motions.begin(), motions.end(), [&](const VecX& other) {
-                return &other == &one || sticks_more(equation.sticks(one), equation.sticks(other));
-            });
-            if (!stickiest) continue;
-            w.now.several = motions.size() > 1;
-            w.now.several_element = list.front();
-            x = one;
-            return true;
-        }
-        double determinant = HUGE_VAL;
-        for (const VecX& one : motions) determinant = std::min(determinant, equation.determinant(one));
-        paradox(problem, determinant, motions);
-    }
-
-    // Throw a paradox with the forces of possible motions in `motions`, and store two of them.
-    [[noreturn]] void paradox(const RestProblem& problem, double determinant, const std::vector<VecX>& motions) const {
-        Failure failure(Failure::Kind::paradox, t, list, determinant);
-        failure.solutions = motions.empty() ? Failure::Solutions::none : Failure::Solutions::several;
-        for (size_t i = 0; i < std::min<size_t>(2, motions.size()); ++i) {
-            VecX alpha;
-            FrictionLimits limits;
-            problem.equation.respond(motions[i], alpha, limits);
-            failure.limits.push_back(limits.size.head(list.size()));
-            failure.accelerations.push_back(problem.acceleration(motions[i]));
-        }
-        throw failure;
-    }
-
-    bool all_stick(const RestEquation& equation, const VecX& x) const {
-        const std::vector<bool> sticks = equation.sticks(x);
-        return std::all_of(sticks.begin(), sticks.begin() + list.size(), [](bool one) { return one; });
-    }
-
-    static bool sticks_more(const std::vector<bool>& one, const std::vector<bool>& other) {
-        for (size_t i = 0; i < one.size(); ++i)
-            if (other[i] && !one[i]) return false;
-        return one != other;
-    }
-
     // Set the kinetic limit of elements at slip onset. Return true if any limit changed.
     bool release(const RestProblem& problem, RestEquation& equation, const std::vector<Mode>& modes) {
         bool any = false;
@@ -202,7 +102,7 @@ struct Search {
             const double middle = limits.middle[equation.elements[i].row];
             w.state.unknown[e] = limits[i] - (slips(modes[e]) ? modes[e] * middle : 0.0);
         }
-        apply(modes, proven);
+        apply(modes, motions.are_complete());
     }
 
     // Compute the motion under the forces f of the elements at rest, and update the limits from its loads. Slipping
@@ -318,7 +218,7 @@ struct Search {
         // A complete search includes this motion. If all elements hold, no other motion has more sticking elements.
         const bool all_known = is_searched(equation) && !problem.has_pieces();
         if (slid && !all_known && equation.loaded()) {
-            if (rests(problem, x)) {
+            if (motions.hold(problem, x)) {
                 w.now.several = trusted;
                 w.now.several_element = list.front();
                 std::vector<Mode> modes = question.modes;
@@ -330,70 +230,25 @@ struct Search {
         }
         if (trusted && !is_searched(equation)) return false;
         x = VecX::Zero(equation.n);
-        bool solved = find_in_pieces(problem, x), one_limit = true;
+        bool solved = motions.find(problem, x), one_limit = true;
         if (!solved && !question.near.empty()) {
             x = near(equation);
-            solved = refine_in_pieces(problem, x);
+            solved = motions.refine(problem, x);
         }
         if (!solved && release(problem, equation, std::vector<Mode>(p.frictions.size(), slip_plus))) {
             one_limit = false;  // static and kinetic limits differ: the search missed such motions
-            solved = find_in_pieces(problem, x);
+            solved = motions.find(problem, x);
         }
-        while (solved && release(problem, equation, modes_of(w, question, equation, x))) solved = find_in_pieces(problem, x);
-        if (trusted && !(proven && solved)) return false;
-        if (!solved && proven && one_limit && !found)
-            paradox(problem, std::min(0.0, equation.determinant_far_away()), {});
+        while (solved && release(problem, equation, modes_of(w, question, equation, x))) solved = motions.find(problem, x);
+        if (trusted && !(motions.are_complete() && solved)) return false;
+        if (!solved && motions.are_complete() && one_limit && !found)
+            motions.paradox(problem, std::min(0.0, equation.determinant_far_away()), {});
         if (solved) settle(equation, x, modes_of(w, question, equation, x));
         return solved;
     }
-
-    bool presses = true;  // the iteration's motion has no contact in tension
-    bool proven = false;  // the set of motions is complete
 };
 
 }  // namespace
-
-static bool hardly_slips(const Program& p, const Workspace& w, int e, const VecX& v) {
-    return slip_velocity(w.now, p.frictions[e]).norm() <= rest_speed * (1.0 + v.cwiseAbs().maxCoeff());
-}
-
-bool at_rest(const Program& p, const Workspace& w, int e, const VecX& v) {
-    return w.state.mode[e] == sticking || hardly_slips(p, w, e, v);
-}
-
-void follow_velocity(const Program& p, Workspace& w, int e, ModeQuestion& question) {
-    const Vec3 u = slip_velocity(w.now, p.frictions[e]);
-    question.modes[e] = p.frictions[e].dim > 1 || u[0] > 0.0 ? slip_plus : slip_minus;
-    if (p.frictions[e].dim > 1) w.state.slip_direction[e] = w.state.last_direction[e] = u.normalized();
-}
-
-ModeQuestion question(const Program& p, Workspace& w, const VecX& v, int also) {
-    ModeQuestion asked{w.state.mode, {}, {}};
-    for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
-        if (is_open(p, w, e)) continue;
-        if (e != also && !at_rest(p, w, e, v) && !w.state.lingers[e]) {
-            follow_velocity(p, w, e, asked);
-            continue;
-        }
-        asked.at_rest.push_back(e);
-        if (e == also) asked.modes[e] = sticking;
-    }
-    return asked;
-}
-
-ModeQuestion first_question(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
-    ModeQuestion asked{w.state.mode, {}, {}};
-    if (p.frictions.empty()) return asked;
-    w.state.warm = false;
-    update_kinematics(p, w, t, q, v);
-    for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
-        if (is_open(p, w, e)) continue;
-        asked.modes[e] = sticking;
-        if (hardly_slips(p, w, e, v)) asked.at_rest.push_back(e);
-        else follow_velocity(p, w, e, asked);
-    }
-    return asked;
-}
 
 void resolve_modes(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
                    const ModeQuestion& question) {

@@ -1,0 +1,50 @@
+#include "friction/mode_question.hpp"
+
+#include "dynamics/evaluation.hpp"
+#include "math/tolerances.hpp"
+
+namespace pn {
+
+static bool hardly_slips(const Program& p, const Workspace& w, int e, const VecX& v) {
+    return slip_velocity(w.now, p.frictions[e]).norm() <= rest_speed * (1.0 + v.cwiseAbs().maxCoeff());
+}
+
+bool at_rest(const Program& p, const Workspace& w, int e, const VecX& v) {
+    return w.state.mode[e] == sticking || hardly_slips(p, w, e, v);
+}
+
+void follow_velocity(const Program& p, Workspace& w, int e, ModeQuestion& question) {
+    const Vec3 u = slip_velocity(w.now, p.frictions[e]);
+    question.modes[e] = p.frictions[e].dim > 1 || u[0] > 0.0 ? slip_plus : slip_minus;
+    if (p.frictions[e].dim > 1) w.state.slip_direction[e] = w.state.last_direction[e] = u.normalized();
+}
+
+ModeQuestion question(const Program& p, Workspace& w, const VecX& v, int also) {
+    ModeQuestion asked{w.state.mode, {}, {}};
+    for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
+        if (is_open(p, w, e)) continue;
+        if (e != also && !at_rest(p, w, e, v) && !w.state.lingers[e]) {
+            follow_velocity(p, w, e, asked);
+            continue;
+        }
+        asked.at_rest.push_back(e);
+        if (e == also) asked.modes[e] = sticking;
+    }
+    return asked;
+}
+
+ModeQuestion first_question(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+    ModeQuestion asked{w.state.mode, {}, {}};
+    if (p.frictions.empty()) return asked;
+    w.state.warm = false;
+    update_kinematics(p, w, t, q, v);
+    for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
+        if (is_open(p, w, e)) continue;
+        asked.modes[e] = sticking;
+        if (hardly_slips(p, w, e, v)) asked.at_rest.push_back(e);
+        else follow_velocity(p, w, e, asked);
+    }
+    return asked;
+}
+
+}  // namespace pn
