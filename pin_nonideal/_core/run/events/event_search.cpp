@@ -17,20 +17,6 @@ namespace pn {
 
 namespace {
 
-// --- Candidates for a crossing. Speeds [rad/s or m/s] are relative to 1 + the largest speed of the scene.
-// Rounding tolerances relative to a friction limit: for a constant force, and for the force / limit ratio at the
-// stages.
-constexpr double release_limit_rounding = 1e-12, share_rounding = 1e-9;
-// Safety margins of the force / limit ratio between the stages. The first is a factor on the rise of a parabola above
-// three stages, the second a fraction of the ratio's range.
-constexpr double times_parabola = 3.0, range_between = 0.02;
-// Allowed reverse speed of an element that has just begun to slip, relative to the speed of rest.
-constexpr double fresh_slip = 1e-3;
-// A minimum speed between two stages counts as a dip below zero if it is below this fraction of the speeds' range. The
-// error of the cubics through the stages is smaller.
-constexpr double dip_part = 0.02;
-
-// --- The interpolant
 constexpr int location_grid = 24;  // grid intervals of a step at which a margin is sampled first
 constexpr double location_spacing = 1.0 / location_grid;
 // A parabola through three points falls below the middle one by at most 1/8 of its second difference. Dips up to twice
@@ -52,9 +38,8 @@ constexpr double left_part = 0.1;
 }  // namespace
 
 EventSearch::EventSearch(System& system, Stepper& stepper, const std::vector<char>& pulls, GapWatch& watch)
-    : system_(system), stepper_(stepper), p(system.p), w(system.w), pulls_(pulls),
-      gaps_(system, stepper, watch), probe_(VecX::Zero(system.ny)),
-      probe_rate_(probe_) {}
+    : system_(system), stepper_(stepper), p(system.p), w(system.w), gaps_(system, stepper, watch),
+      candidates_(system, stepper, pulls, gaps_), probe_(VecX::Zero(system.ny)), probe_rate_(probe_) {}
 
 double EventSearch::margin(const Watch& watch, double t, const VecX& y) {
     if (watch.kind == Watch::Kind::contact) return contact_press(p, w, watch.index).margin;
@@ -64,121 +49,10 @@ double EventSearch::margin(const Watch& watch, double t, const VecX& y) {
         evaluate_gap(p, w, t, system_.v, watch.index);
         return gap_width(p, w, watch.index) - gaps_.plane(watch.index);
     }
-    if (watch.kind == Watch::Kind::slip) return slip_along_mode(p, w, watch.index) + allowance(watch.index);
+    if (watch.kind == Watch::Kind::slip) return slip_along_mode(p, w, watch.index) + candidates_.allowance(watch.index);
     system_.read(y);
     const HoldingForce held = holding_force(p, w, watch.index, t, system_.q, system_.v);
     return held.limit * (1.0 + release_limit_rounding) - held.force.norm();
-}
-
-// --- Candidates for a crossing ---------------------------------------------------------------------------------------
-
-double EventSearch::noise() const {
-    return fresh_slip * rest_speed * (1.0 + system_.velocity(stepper_.y1).cwiseAbs().maxCoeff());
-}
-
-// Return the speed with which an element of deferred sticking may slip against its mode.
-double EventSearch::allowance(int e) const {
-    return w.state.lingers[e] ? raised_rest_speed * (1.0 + system_.velocity(stepper_.y0).cwiseAbs().maxCoeff()) : 0.0;
-}
-
-// Check if a sticking element is beyond its limit at the step's end, or may have been between two stages.
-bool EventSearch::may_reach_limit(int e) {
-    const std::vector<Stepper::Look>& looks = stepper_.looks();
-    const auto share = [&](size_t k) { return system_.share(*looks[k].rate, e); };
-    double least = share(0), most = least, rise = 0.0;
-    for (size_t k = 1; k < looks.size(); ++k) {
-        least = std::min(least, share(k));
-        most = std::max(most, share(k));
-    }
-    const double range = most - least;
-    if (range <= share_rounding) return most > 1.0 + share_rounding || least < -1.0 - share_rounding;
-    for (size_t k = 2; k < looks.size(); ++k) {
-        const double t0 = looks[k - 2].part, t1 = looks[k - 1].part, t2 = looks[k].part;
-        rise = std::max({rise, rise_between(t0, share(k - 2), t1, share(k - 1), t2, share(k)),
-                         rise_between(t0, -share(k - 2), t1, -share(k - 1), t2, -share(k))});
-    }
-    return std::max(most, -least) + times_parabola * rise + range_between * range > 1.0 + release_limit_rounding;
-}
-
-// Check if a slipping element has reversed at the step's end, or may have done so inside.
-bool EventSearch::may_stop(int e) const { return slip_along_mode(p, w, e) + allowance(e) < -noise() || dips(e); }
-
-// Check if a slip speed may dip through zero and back. Speeds and their rates are known at the stages and at both ends.
-// The minima of the cubics through them decide.
-bool EventSearch::dips(int e) const {
-    if (stepper_.method.order < 2) return false;
-    const std::vector<Stepper::Look>& looks = stepper_.looks();
-    const double allowed = allowance(e), below_rest = -noise();
-    const auto speed = [&](size_t k) { return system_.slip(*looks[k].rate, e) + allowed; };
-    double least = HUGE_VAL, most = -HUGE_VAL;
-    bool below = false;
-    for (size_t k = 0; k < looks.size(); ++k) {
-        least = std::min(least, speed(k));
-        most = std::max(most, speed(k));
-        below |= k > 0 && k + 1 < looks.size() && speed(k) < below_rest;
-    }
-    if (below) return true;
-    if (most <= allowed - below_rest) return false;  // held by sticking elements, it never left rest
-    const double dip = dip_part * (most - least);
-    for (size_t k = 0; k + 1 < looks.size(); ++k) {
-        const double length = (looks[k + 1].part - looks[k].part) * stepper_.h;
-        const double from = speed(k), to = speed(k + 1), leaves = length * system_.slip_rate(*looks[k].rate, e),
-                     comes = length * system_.slip_rate(*looks[k + 1].rate, e);
-        if (lower_bound_inside(from, leaves, to, comes) < dip && least_inside(from, leaves, to, comes) < dip) return true;
-    }
-    return false;
-}
-
-// Add contacts that begin to carry tension: one of each load-sharing group in which no contact carries tension yet.
-void EventSearch::add_pulls(std::vector<Watch>& list) {
-    const auto may_pull = [&](int i) { return !pulls_[i] && normal_force(p, w, i) < 0.0; };
-    const int n = static_cast<int>(p.contacts.size());
-    int first = 0;
-    while (first < n && !may_pull(first)) ++first;
-    if (first == n) return;
-    std::vector<char> told = pulls_;
-    for (int i = first; i < n; ++i) {
-        if (told[i] || !may_pull(i)) continue;
-        const Press found = contact_press(p, w, i);
-        if (found.must_pull && std::none_of(found.sharing.begin(), found.sharing.end(), [&](int j) { return told[j]; }))
-            list.push_back({Watch::Kind::contact, i});
-        for (int j : found.sharing) told[j] = 1;
-    }
-}
-
-// Check if the normal force of a closed contact is negative at the step's end, or may have been between two stages.
-bool EventSearch::may_pull(int gap) {
-    const std::vector<Stepper::Look>& looks = stepper_.looks();
-    const auto load = [&](size_t k) { return system_.load(*looks[k].rate, gap); };
-    double least = load(0), most = least, fall = 0.0;
-    for (size_t k = 1; k < looks.size(); ++k) {
-        least = std::min(least, load(k));
-        most = std::max(most, load(k));
-    }
-    for (size_t k = 2; k < looks.size(); ++k)
-        fall = std::max(fall, rise_between(looks[k - 2].part, -load(k - 2), looks[k - 1].part, -load(k - 1),
-                                           looks[k].part, -load(k)));
-    return least - times_parabola * fall - range_between * (most - least) < -load_rounding(p, w, gap);
-}
-
-// Return the margins that are negative at the step's end, or may have crossed zero inside. The workspace must be
-// evaluated at the step's end.
-std::vector<Watch> EventSearch::crossed() {
-    std::vector<Watch> list;
-    if (stepper_.method.order > 1) add_pulls(list);
-    for (int e : w.now.loaded) {
-        if (w.state.mode[e] != sticking) {
-            if (may_stop(e)) list.push_back({Watch::Kind::slip, e});
-        } else if (!w.state.indeterminate && may_reach_limit(e)) {
-            list.push_back({Watch::Kind::stick, e});
-        }
-    }
-    if (p.gaps.empty()) return list;
-    if (!w.now.rows.redundant)  // redundant loads are checked together
-        for (int i : w.now.touching)
-            if (!is_bare(p, i) && may_pull(i)) list.push_back({Watch::Kind::load, i});
-    for (const GapSearch::Doubt& doubt : gaps_.doubtful()) list.push_back({Watch::Kind::gap, doubt.gap});
-    return list;
 }
 
 // Only candidate gaps of the step are checked.
@@ -247,7 +121,7 @@ double EventSearch::margin_inside(const Watch& watch, Source source, double part
     }
     if (source == Source::velocities) {
         const int first = system_.nq + p.blocks[f->block].dof;
-        double along = allowance(watch.index);
+        double along = candidates_.allowance(watch.index);
         if (f->dim == 1) return along + w.state.mode[watch.index] * stepper_.interpolated(part, first);
         for (int k = 0; k < f->dim; ++k)
             along += w.state.slip_direction[watch.index][k] * stepper_.interpolated(part, first + k);
@@ -354,7 +228,7 @@ Crossing EventSearch::confirmed(const Crossing& told) {
 }
 
 std::optional<Crossing> EventSearch::first() {
-    const std::vector<Watch> watches = crossed();
+    const std::vector<Watch> watches = candidates_.find();
     if (watches.empty()) return std::nullopt;
     stepper_.make_interpolant();
     std::vector<std::pair<Crossing, bool>> list;  // crossing, and whether it is confirmed

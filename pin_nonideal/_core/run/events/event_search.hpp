@@ -1,31 +1,16 @@
-// Search for the first zero crossing of a margin in a step just taken. There are four kinds of margins:
-// - slip speed of a slipping element,
-// - distance of a sticking element to its limit,
-// - normal force of a contact,
-// - gap of an open contact.
+// Location of the first zero crossing of a margin in a step just taken, among the candidates of event_candidates.hpp.
 //
-// Speeds, forces and limits at the stages show which margins may have crossed. The method's own interpolant locates the
-// crossing. Slip uses interpolated velocities, which need no evaluation. Sticking uses the rate of the integrated force
-// / limit ratio, which one or two evaluations confirm.
+// The method's own interpolant locates the crossing. Slip uses interpolated velocities, which need no evaluation. Sticking
+// uses the rate of the integrated force / limit ratio, which one or two evaluations confirm.
 #pragma once
 
 #include <optional>
 #include <vector>
 
 #include "friction/stick_slip.hpp"
-#include "run/events/gap_search.hpp"
+#include "run/events/event_candidates.hpp"
 
 namespace pn {
-
-// Slip that may remain if sticking rows are almost redundant, relative to 1 + the largest speed of the scene [rad/s or
-// m/s]. Such rows amplify rounding.
-constexpr double raised_rest_speed = 1e-9;
-
-// Margin that may cross zero inside the step.
-struct Watch {
-    enum class Kind { slip, stick, contact, load, gap } kind;
-    int index;  // index of the friction element, the bilateral contact or the gap
-};
 
 struct Crossing {
     Watch watch;
@@ -53,16 +38,7 @@ private:
     // or a whole evaluation.
     enum class Source { velocities, shares, kinematics, evaluation };
 
-    double noise() const;
-    double allowance(int element) const;
-    bool may_reach_limit(int element);
-    bool may_stop(int element) const;
-    bool dips(int element) const;
     bool slows_down(int element, double rest) const;
-    void add_pulls(std::vector<Watch>& list);
-    std::vector<Watch> crossed();
-    bool may_pull(int gap);
-
     Source source(const Watch& watch) const;
     bool integrates() const;
     double interpolated_share(int element, double part) const;
@@ -78,8 +54,8 @@ private:
     Stepper& stepper_;
     const Program& p;
     Workspace& w;
-    const std::vector<char>& pulls_;
     GapSearch gaps_;
+    EventCandidates candidates_;
     double doubt_ = 0.0;        // error of the sampled force / limit ratio
     VecX probe_, probe_rate_;
 };

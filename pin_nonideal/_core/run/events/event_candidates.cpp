@@ -1,0 +1,136 @@
+#include "run/events/event_candidates.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "contact/active_set.hpp"
+#include "contact/queries.hpp"
+#include "dynamics/reactions.hpp"
+#include "math/roots.hpp"
+#include "math/tolerances.hpp"
+
+namespace pn {
+
+namespace {
+
+// Rounding tolerance of the force / limit ratio at the stages.
+constexpr double share_rounding = 1e-9;
+// Safety margins of the force / limit ratio between the stages. The first is a factor on the rise of a parabola above
+// three stages, the second a fraction of the ratio's range.
+constexpr double times_parabola = 3.0, range_between = 0.02;
+// Allowed reverse speed of an element that has just begun to slip, relative to the speed of rest.
+constexpr double fresh_slip = 1e-3;
+// A minimum speed between two stages counts as a dip below zero if it is below this fraction of the speeds' range. The
+// error of the cubics through the stages is smaller.
+constexpr double dip_part = 0.02;
+
+}  // namespace
+
+// Return the reverse slip speed up to which an element has not stopped.
+double EventCandidates::noise() const {
+    return fresh_slip * rest_speed * (1.0 + system_.velocity(stepper_.y1).cwiseAbs().maxCoeff());
+}
+
+double EventCandidates::allowance(int e) const {
+    return w.state.lingers[e] ? raised_rest_speed * (1.0 + system_.velocity(stepper_.y0).cwiseAbs().maxCoeff()) : 0.0;
+}
+
+// Check if a sticking element is beyond its limit at the step's end, or may have been between two stages.
+bool EventCandidates::may_reach_limit(int e) {
+    const std::vector<Stepper::Look>& looks = stepper_.looks();
+    const auto share = [&](size_t k) { return system_.share(*looks[k].rate, e); };
+    double least = share(0), most = least, rise = 0.0;
+    for (size_t k = 1; k < looks.size(); ++k) {
+        least = std::min(least, share(k));
+        most = std::max(most, share(k));
+    }
+    const double range = most - least;
+    if (range <= share_rounding) return most > 1.0 + share_rounding || least < -1.0 - share_rounding;
+    for (size_t k = 2; k < looks.size(); ++k) {
+        const double t0 = looks[k - 2].part, t1 = looks[k - 1].part, t2 = looks[k].part;
+        rise = std::max({rise, rise_between(t0, share(k - 2), t1, share(k - 1), t2, share(k)),
+                         rise_between(t0, -share(k - 2), t1, -share(k - 1), t2, -share(k))});
+    }
+    return std::max(most, -least) + times_parabola * rise + range_between * range > 1.0 + release_limit_rounding;
+}
+
+// Check if a slipping element has reversed at the step's end, or may have done so inside.
+bool EventCandidates::may_stop(int e) const { return slip_along_mode(p, w, e) + allowance(e) < -noise() || dips(e); }
+
+// Check if a slip speed may dip through zero and back. Speeds and their rates are known at the stages and at both ends.
+// The minima of the cubics through them decide.
+bool EventCandidates::dips(int e) const {
+    if (stepper_.method.order < 2) return false;
+    const std::vector<Stepper::Look>& looks = stepper_.looks();
+    const double allowed = allowance(e), below_rest = -noise();
+    const auto speed = [&](size_t k) { return system_.slip(*looks[k].rate, e) + allowed; };
+    double least = HUGE_VAL, most = -HUGE_VAL;
+    bool below = false;
+    for (size_t k = 0; k < looks.size(); ++k) {
+        least = std::min(least, speed(k));
+        most = std::max(most, speed(k));
+        below |= k > 0 && k + 1 < looks.size() && speed(k) < below_rest;
+    }
+    if (below) return true;
+    if (most <= allowed - below_rest) return false;  // held by sticking elements, it never left rest
+    const double dip = dip_part * (most - least);
+    for (size_t k = 0; k + 1 < looks.size(); ++k) {
+        const double length = (looks[k + 1].part - looks[k].part) * stepper_.h;
+        const double from = speed(k), to = speed(k + 1), leaves = length * system_.slip_rate(*looks[k].rate, e),
+                     comes = length * system_.slip_rate(*looks[k + 1].rate, e);
+        if (lower_bound_inside(from, leaves, to, comes) < dip && least_inside(from, leaves, to, comes) < dip) return true;
+    }
+    return false;
+}
+
+// Add contacts that begin to carry tension: one of each load-sharing group in which no contact carries tension yet.
+void EventCandidates::add_pulls(std::vector<Watch>& list) {
+    const auto may_pull = [&](int i) { return !pulls_[i] && normal_force(p, w, i) < 0.0; };
+    const int n = static_cast<int>(p.contacts.size());
+    int first = 0;
+    while (first < n && !may_pull(first)) ++first;
+    if (first == n) return;
+    std::vector<char> told = pulls_;
+    for (int i = first; i < n; ++i) {
+        if (told[i] || !may_pull(i)) continue;
+        const Press found = contact_press(p, w, i);
+        if (found.must_pull && std::none_of(found.sharing.begin(), found.sharing.end(), [&](int j) { return told[j]; }))
+            list.push_back({Watch::Kind::contact, i});
+        for (int j : found.sharing) told[j] = 1;
+    }
+}
+
+// Check if the normal force of a closed contact is negative at the step's end, or may have been between two stages.
+bool EventCandidates::may_pull(int gap) {
+    const std::vector<Stepper::Look>& looks = stepper_.looks();
+    const auto load = [&](size_t k) { return system_.load(*looks[k].rate, gap); };
+    double least = load(0), most = least, fall = 0.0;
+    for (size_t k = 1; k < looks.size(); ++k) {
+        least = std::min(least, load(k));
+        most = std::max(most, load(k));
+    }
+    for (size_t k = 2; k < looks.size(); ++k)
+        fall = std::max(fall, rise_between(looks[k - 2].part, -load(k - 2), looks[k - 1].part, -load(k - 1),
+                                           looks[k].part, -load(k)));
+    return least - times_parabola * fall - range_between * (most - least) < -load_rounding(p, w, gap);
+}
+
+std::vector<Watch> EventCandidates::find() {
+    std::vector<Watch> list;
+    if (stepper_.method.order > 1) add_pulls(list);
+    for (int e : w.now.loaded) {
+        if (w.state.mode[e] != sticking) {
+            if (may_stop(e)) list.push_back({Watch::Kind::slip, e});
+        } else if (!w.state.indeterminate && may_reach_limit(e)) {
+            list.push_back({Watch::Kind::stick, e});
+        }
+    }
+    if (p.gaps.empty()) return list;
+    if (!w.now.rows.redundant)  // redundant loads are checked together
+        for (int i : w.now.touching)
+            if (!is_bare(p, i) && may_pull(i)) list.push_back({Watch::Kind::load, i});
+    for (const GapSearch::Doubt& doubt : gaps_.doubtful()) list.push_back({Watch::Kind::gap, doubt.gap});
+    return list;
+}
+
+}  // namespace pn

@@ -1,0 +1,57 @@
+// Margins that may have crossed zero in a step just taken. There are five kinds of margins:
+// - slip speed of a slipping element,
+// - distance of a sticking element to its limit,
+// - normal force of a bilateral contact,
+// - load of a closed unilateral contact,
+// - gap of an open contact.
+//
+// Speeds, forces and limits at the stages show the candidates. Bounds on the motion show the gaps.
+#pragma once
+
+#include <vector>
+
+#include "run/events/gap_search.hpp"
+
+namespace pn {
+
+// Rounding of the margin of a sticking element under a constant force, relative to the friction limit.
+constexpr double release_limit_rounding = 1e-12;
+// Slip that may remain if sticking rows are almost redundant, relative to 1 + the largest speed of the scene [rad/s or
+// m/s]. Such rows amplify rounding.
+constexpr double raised_rest_speed = 1e-9;
+
+// Margin that may cross zero inside the step.
+struct Watch {
+    enum class Kind { slip, stick, contact, load, gap } kind;
+    int index;  // index of the friction element, the bilateral contact or the gap
+};
+
+class EventCandidates {
+public:
+    // `pulls`: true for each contact in tension at the step's start.
+    EventCandidates(System& system, Stepper& stepper, const std::vector<char>& pulls, GapSearch& gaps)
+        : system_(system), stepper_(stepper), p(system.p), w(system.w), pulls_(pulls), gaps_(gaps) {}
+
+    // Return the margins that are negative at the step's end, or may have crossed zero inside. The workspace must be
+    // evaluated at the step's end.
+    std::vector<Watch> find();
+    // Return the speed with which an element of deferred sticking may slip against its mode.
+    double allowance(int element) const;
+
+private:
+    double noise() const;
+    bool may_reach_limit(int element);
+    bool may_stop(int element) const;
+    bool dips(int element) const;
+    void add_pulls(std::vector<Watch>& list);
+    bool may_pull(int gap);
+
+    System& system_;
+    Stepper& stepper_;
+    const Program& p;
+    Workspace& w;
+    const std::vector<char>& pulls_;
+    GapSearch& gaps_;
+};
+
+}  // namespace pn
