@@ -4,7 +4,7 @@
 #include <string>
 
 #include "python/arrays.hpp"
-#include "run/simulation.hpp"
+#include "run/whole_run.hpp"
 
 namespace pn {
 

@@ -28,13 +28,6 @@ constexpr double shortened = 0.3;
 constexpr double shortest_measured = 1e-7;
 // Minimum step, in floating-point spacings of the time. Smaller steps raise a Failure.
 constexpr double least_spacings = 4.0;
-// Minimum progress after `early_steps` steps, relative to the duration. Slower runs raise a Failure.
-constexpr long early_steps = 20000;
-constexpr double least_progress = 1e-10;
-
-// Number of steps between two progress reports.
-constexpr long steps_a_tick = 16;
-
 // Step after one that ended before a rest, relative to the time to the rest. The rest then lies inside the step.
 constexpr double past_rest = 1.02;
 
@@ -45,9 +38,10 @@ constexpr double shortest_sought = 1e-9;
 
 Simulation::Simulation(const Program& program, Workspace& workspace, const Options& run_options, Recording& recording)
     : p(program), w(workspace), options(run_options), out(recording), t_end(options.end()),
-      system(program, workspace, options.record.energy), norm(system, options.rtol, options.atol, progress.rounding),
-      stepper(options.method, system, norm), control(options.method, options.rtol),
-      choice(system, stepper, progress, run_options), stiffness(system, stepper, progress, run_options),
+      run_limits(run_options, workspace, progress, recording), system(program, workspace, options.record.energy),
+      norm(system, options.rtol, options.atol, progress.rounding), stepper(options.method, system, norm),
+      control(options.method, options.rtol), choice(system, stepper, progress, run_options),
+      stiffness(system, stepper, progress, run_options),
       floor(system, stepper, norm, progress, recording), growth(system, progress, run_options, recording),
       watch(system, progress.gaps),
       locator(system, stepper, norm, progress.slip_at_start, progress.pulls, watch), hand_over(system, progress),
@@ -126,43 +120,12 @@ void Simulation::run() {
         if (!w.now.no_motion) evaluate(p, w, progress.t, system.q, system.v);
         output.now();
     }
-    if (options.save) save();
+    run_limits.save();
 }
 
-void Simulation::watch_evaluations() {
-    if (!options.tick && !(options.max_wall > 0.0)) return;
-    w.watch = [this](double at) {
-        if (options.tick) options.tick(at);
-        if (is_late()) throw EndOfRun{Failure(Failure::Kind::wall, progress.t, {}, options.max_wall)};
-    };
-}
-
-Simulation::~Simulation() { w.watch = nullptr; }
-
-bool Simulation::is_late() const {
-    return options.max_wall > 0.0 && std::chrono::duration<double>(Clock::now() - begun).count() > options.max_wall;
-}
-
-// Runs are saved only here, because the state between two steps is all that the next step needs.
 bool Simulation::between_steps() {
-    try {
-        if (options.tick && ++ticks % steps_a_tick == 0) options.tick(progress.t);
-    } catch (...) {
-        if (options.save) save();
-        throw;
-    }
-    if (options.save && Clock::now() >= next_save) save();
-    if (out.steps == early_steps && progress.t - options.t0 < least_progress * options.duration)
-        throw Failure(Failure::Kind::step_size, progress.t, {}, static_cast<double>(out.steps));
-    if (options.max_steps > 0 && out.steps >= options.max_steps)
-        throw Failure(Failure::Kind::steps, progress.t, {}, static_cast<double>(out.steps));
-    if (is_late()) throw Failure(Failure::Kind::wall, progress.t, {}, options.max_wall);
+    run_limits.check();
     return !options.callback || torques.ask_callback();
-}
-
-void Simulation::save() {
-    options.save(to_bytes(w, progress, out));
-    next_save = Clock::now() + options.save_interval;
 }
 
 void Simulation::restore(const std::string& state) {
@@ -412,37 +375,6 @@ void Simulation::accept(const Proposal& proposal, const std::optional<FoundEvent
 void Simulation::record(const std::optional<FoundEvent>& event) {
     if (event && event->changes_modes()) output.now();
     else output.end_step(!value_events.found().empty());
-}
-
-// --- Runs -----------------------------------------------------------------------------------------------------------
-
-template <class Steps>
-static void keep_what_stops(Recording& out, Steps steps) {
-    try {
-        steps();
-    } catch (const Failure& failure) {
-        out.failure = failure;
-    } catch (const EndOfRun& end) {
-        out.failure = end.failure;
-    } catch (...) {
-        out.error = std::current_exception();
-    }
-}
-
-void simulate(const Program& p, Workspace& w, const VecX& q0, const VecX& v0, const Options& options, Recording& out) {
-    Simulation simulation(p, w, options, out);
-    simulation.watch_evaluations();
-    keep_what_stops(out, [&] {
-        simulation.start(q0, v0);
-        simulation.run();
-    });
-}
-
-void resume(const Program& p, Workspace& w, const std::string& state, const Options& options, Recording& out) {
-    Simulation simulation(p, w, options, out);
-    simulation.watch_evaluations();
-    simulation.restore(state);
-    keep_what_stops(out, [&] { simulation.run(); });
 }
 
 }  // namespace pn

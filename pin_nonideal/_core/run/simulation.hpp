@@ -11,15 +11,11 @@
 #include "run/integrators/rounding_floor.hpp"
 #include "run/integrators/step_control.hpp"
 #include "run/integrators/stepper_choice.hpp"
+#include "run/run_limits.hpp"
 
 namespace pn {
 
-// Simulate from (q0, v0) into `out`. A failure ends the run, is stored in `out`, and keeps the samples.
-void simulate(const Program& p, Workspace& w, const VecX& q0, const VecX& v0, const Options& options, Recording& out);
-// Resume a run in a new workspace from the bytes that `save` received, with the same options. Throw
-// std::invalid_argument if the bytes do not fit the scene.
-void resume(const Program& p, Workspace& w, const std::string& state, const Options& options, Recording& out);
-
+// Time loop of one run. SteppedRun and FollowedRun advance the same loop from outside.
 class Simulation {
 public:
     Simulation(const Program& p, Workspace& w, const Options& options, Recording& out);
@@ -27,9 +23,8 @@ public:
     void restore(const std::string& state);
     // Integrate to the end, from the start or from a restored state.
     void run();
-    // Look at signals and the wall time every few evaluations too. A step may take many of them.
-    void watch_evaluations();
-    ~Simulation();
+    // Report progress and check the wall time at evaluations too. A step may take many of them.
+    void watch_evaluations() { run_limits.watch_evaluations(); }
 
 protected:
     struct Proposal {
@@ -60,10 +55,8 @@ protected:
     bool leaves_rate(const Proposal& proposal) const;
 
     bool done() const { return progress.t >= t_end || value_events.ends_run(); }
-    // Report progress, save, check the limits of the run and call the callback. Return false if the run must stop.
+    // Check the limits of the run and call the callback. Return false if the run must stop.
     bool between_steps();
-    bool is_late() const;
-    void save();
 
     // Set-up of the run, the same in all steps.
     const Program& p;
@@ -75,7 +68,8 @@ protected:
 
     Progress progress;  // state from step to step, with the current time, state and step size
 
-    // Parts of the step. They read and change `progress`.
+    // Parts of the run. They read and change `progress`.
+    RunLimits run_limits;
     System system;
     ErrorNorm norm;
     Stepper stepper;
@@ -104,11 +98,6 @@ protected:
     bool watched = false;      // a contact was closed or an element active at the step's start
     bool hand_over_ahead = false;  // the step ends before a hand-over
     std::optional<Failure> opened;  // loop that a trial of this step could not close
-
-    // Progress reports, checkpoints and the limit of the wall time.
-    long ticks = 0;
-    Clock::time_point next_save;
-    const Clock::time_point begun = Clock::now();
 };
 
 }  // namespace pn

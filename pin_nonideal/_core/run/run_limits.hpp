@@ -1,0 +1,36 @@
+// Limits of a run on steps and wall time, with its progress reports and checkpoints.
+#pragma once
+
+#include "run/options.hpp"
+#include "run/output/checkpoint.hpp"
+
+namespace pn {
+
+class RunLimits {
+public:
+    RunLimits(const Options& options, Workspace& workspace, Progress& progress, Recording& out)
+        : options_(options), w(workspace), progress_(progress), out_(out) {}
+    ~RunLimits() { w.watch = nullptr; }
+    RunLimits(const RunLimits&) = delete;
+    RunLimits& operator=(const RunLimits&) = delete;
+
+    // Report progress and check the wall time at evaluations too. A step may take many of them.
+    void watch_evaluations();
+    // Report progress, save a checkpoint if one is due, and check the limits, between two steps.
+    void check();
+    // Save a checkpoint, if the run has a place for it.
+    void save();
+
+private:
+    bool is_late() const;
+
+    const Options& options_;
+    Workspace& w;
+    Progress& progress_;
+    Recording& out_;
+    long ticks_ = 0;
+    Clock::time_point next_save_;
+    const Clock::time_point begun_ = Clock::now();
+};
+
+}  // namespace pn
