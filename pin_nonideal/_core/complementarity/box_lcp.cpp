@@ -90,14 +90,14 @@ void BoxProgram::measure(const MatX& W, const VecX& alpha0, const VecX& forces) 
     noise_ = noise_of_others * size_.maxCoeff();
 }
 
-// Set start forces within the limits, close to `near`: each at its limit or free.
-void BoxProgram::start(const VecX& s, const VecX* near) {
+// Set start forces within the limits, close to `initial`: each at its limit or free.
+void BoxProgram::start(const VecX& s, const VecX* initial) {
     const int n = static_cast<int>(s.size());
     f_.setZero(n);
     is_free_.assign(n, 1);
     for (int i = 0; i < n; ++i) {
-        is_free_[i] = s[i] > 0.0 && (!near || std::abs((*near)[i]) < s[i] * (1.0 - box_limit_tolerance));
-        if (near && s[i] > 0.0) f_[i] = is_free_[i] ? (*near)[i] : (*near)[i] > 0.0 ? s[i] : -s[i];
+        is_free_[i] = s[i] > 0.0 && (!initial || std::abs((*initial)[i]) < s[i] * (1.0 - box_limit_tolerance));
+        if (initial && s[i] > 0.0) f_[i] = is_free_[i] ? (*initial)[i] : (*initial)[i] > 0.0 ? s[i] : -s[i];
     }
 }
 
@@ -185,20 +185,20 @@ bool BoxProgram::pivot_blocks(const MatX& W, const VecX& alpha0, const VecX& s) 
     return false;
 }
 
-void BoxProgram::solve(const MatX& W, const VecX& alpha0, const VecX& s, const VecX* near, VecX& f) {
+void BoxProgram::solve(const MatX& W, const VecX& alpha0, const VecX& s, const VecX* initial, VecX& f) {
     const int n = static_cast<int>(s.size());
-    if (near) near_ = *near;
-    else near_.setZero(n);
+    if (initial) initial_ = *initial;
+    else initial_.setZero(n);
     alpha_.resize(n);
     left_.resize(n);
     f_.setZero(n);
     is_free_.assign(n, 1);
-    for (int i = 0; near && i < n; ++i) {
-        is_free_[i] = std::abs(near_[i]) < s[i] * (1.0 - box_limit_tolerance);
-        if (!is_free_[i]) f_[i] = near_[i] > 0.0 ? s[i] : -s[i];
+    for (int i = 0; initial && i < n; ++i) {
+        is_free_[i] = std::abs(initial_[i]) < s[i] * (1.0 - box_limit_tolerance);
+        if (!is_free_[i]) f_[i] = initial_[i] > 0.0 ? s[i] : -s[i];
     }
     if (!pivot_blocks(W, alpha0, s)) {
-        start(s, near ? &near_ : nullptr);
+        start(s, initial ? &initial_ : nullptr);
         descend(W, alpha0, s);
     }
     f = f_;
@@ -217,9 +217,9 @@ VecX least_norm_solution(const MatX& W, const VecX& r) {
     return x;
 }
 
-VecX box_program(const MatX& W, const VecX& alpha0, const VecX& s, const VecX* near) {
+VecX box_program(const MatX& W, const VecX& alpha0, const VecX& s, const VecX* initial) {
     VecX f;
-    BoxProgram().solve(W, alpha0, s, near, f);
+    BoxProgram().solve(W, alpha0, s, initial, f);
     return f;
 }
 

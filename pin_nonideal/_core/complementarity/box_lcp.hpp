@@ -14,15 +14,15 @@ constexpr double response_rank_threshold = 1e-13;
 // Solver with persistent buffers: a program no larger than an earlier one allocates no memory.
 class BoxProgram {
 public:
-    // Solve for f. `near` holds the forces of a similar program (warm start), and its set of forces at their limits is
-    // tried first. f may be the same vector as `near`.
-    void solve(const MatX& W, const VecX& alpha0, const VecX& s, const VecX* near, VecX& f);
+    // Solve for f. `initial` holds the forces of a similar program (warm start), and its set of forces at their limits is
+    // tried first. f may be the same vector as `initial`.
+    void solve(const MatX& W, const VecX& alpha0, const VecX& s, const VecX* initial, VecX& f);
     // Compute the minimum-norm x with W x = r, for a symmetric positive semidefinite W. If no x gives all of r, x gives
     // a part of it.
     void solve_all(const MatX& W, const VecX& r, VecX& x);
 
 private:
-    void start(const VecX& s, const VecX* near);
+    void start(const VecX& s, const VecX* initial);
     bool pivot_blocks(const MatX& W, const VecX& alpha0, const VecX& s);
     void descend(const MatX& W, const VecX& alpha0, const VecX& s);
     void solve_free(const MatX& W);
@@ -31,7 +31,7 @@ private:
 
     std::vector<char> is_free_;
     std::vector<int> list_, wrong_;
-    VecX near_, f_, alpha_, r_, x_, left_;
+    VecX initial_, f_, alpha_, r_, x_, left_;
     VecX size_;           // scale of the accelerations, by element
     double noise_ = 0.0;  // rounding that the largest accelerations leave in all elements
     Buffer A_, L_, inverse_, scale_, rhs_, part_, change_;
@@ -39,6 +39,6 @@ private:
 };
 
 VecX least_norm_solution(const MatX& W, const VecX& r);
-VecX box_program(const MatX& W, const VecX& alpha0, const VecX& s, const VecX* near = nullptr);
+VecX box_program(const MatX& W, const VecX& alpha0, const VecX& s, const VecX* initial = nullptr);
 
 }  // namespace pn

@@ -241,9 +241,9 @@ VecX ball_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dim
 }
 
 VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& s,
-                      const VecX* near) {
+                      const VecX* initial) {
     if (alpha0.size() == 0) return VecX::Zero(0);
-    if (std::all_of(dims.begin(), dims.end(), [](int d) { return d == 1; })) return box_program(W, alpha0, s, near);
+    if (std::all_of(dims.begin(), dims.end(), [](int d) { return d == 1; })) return box_program(W, alpha0, s, initial);
     return ball_program(W, alpha0, dims, s);
 }
 

@@ -13,7 +13,7 @@ namespace pn {
 VecX ball_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& s);
 // Solve the same program, as a box program if every element has one direction.
 VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& s,
-                      const VecX* near = nullptr);
+                      const VecX* initial = nullptr);
 VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const FrictionLimits& limits);
 // Return slip accelerations slightly beyond the load of slip onset. At onset they are rounding. If elements share a
 // load, their forces give the directions of a common slip only to the square root of rounding.

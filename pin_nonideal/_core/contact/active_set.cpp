@@ -219,7 +219,7 @@ void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, con
     std::optional<Failure> failure;  // of the first active set without a motion
     const auto seek = [&](const Choice& start, const RestingMotion* answer, bool aligned) {
         Choice first = start;
-        if (question.opening >= 0) first[question.opening] = 0;
+        if (question.opening_gap >= 0) first[question.opening_gap] = 0;
         Search search{p, w, t, v, question.rest, find_modes, answer, aligned, {}, {}};
         if (search.walk(first) || search.enumerate()) return true;
         if (!failure) failure = search.failure;

@@ -27,7 +27,7 @@ double strength(const Friction& f) { return f.gap >= 0 ? f.mu : f.constant; }
 bool is_at_rest(const Program& p, const Workspace& w, const VecX& v, const ClosingQuestion& question,
                 const RunState& before, int e) {
     const bool known = before.mode[e] == sticking || before.lingers[e];
-    return e == question.arrived || (known && !question.struck) ||
+    return e == question.arrived_element || (known && !question.after_impact) ||
            slip_velocity(w.now, p.frictions[e]).norm() <= rest_speed * (1.0 + v.cwiseAbs().maxCoeff());
 }
 

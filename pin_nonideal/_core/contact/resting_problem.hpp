@@ -28,11 +28,11 @@ struct RestingMotion {
 
 struct ClosingQuestion {
     std::vector<char> rest;     // contacts at rest on each other
-    int opening = -1;           // contact of `rest` whose load just reached zero
-    int arrived = -1;           // element that just came to rest or reached its limit
+    int opening_gap = -1;  // contact of `rest` whose load just reached zero
+    int arrived_element = -1;  // element that just came to rest or reached its limit
     std::vector<int> breaking;  // elements that stuck and just reached their limit: they slip
     bool prescribed = false;    // the caller sets the modes
-    bool struck = false;        // after an impact the velocity decides if a sticking element slips
+    bool after_impact = false;  // after an impact the velocity decides if a sticking element slips
 };
 // Check if an element rests in the question, with the run state before it.
 bool is_at_rest(const Program& p, const Workspace& w, const VecX& v, const ClosingQuestion& question,

@@ -54,7 +54,7 @@ void Runner::choose_contacts(double t, const std::optional<std::vector<Mode>>& m
     set_closed(*p, *w, std::vector<char>(p->gaps.size(), 0));
     ClosingQuestion question;
     question.rest = touching_contacts(*p, *w, t, q, v, true).rest;
-    question.struck = true;
+    question.after_impact = true;
     question.prescribed = modes.has_value();
     close_contacts(*p, *w, t, q, v, question, [&](const RestingMotion* together) {
         update_kinematics(*p, *w, t, q, v);

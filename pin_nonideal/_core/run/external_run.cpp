@@ -61,7 +61,7 @@ bool FollowedRun::bridges_cluster() const {
 
 bool FollowedRun::follow(double end, const OutsideStep::Interpolant& interpolant) {
     between_steps();
-    progress.moved_energy = moved_before_;
+    progress.numerical_energy = numerical_energy_before_;
     stepper.y0 = progress.y;
     stepper.start_rate() = progress.rate;
     stepper.follow(progress.t, end - progress.t, interpolant);
@@ -73,7 +73,7 @@ bool FollowedRun::follow(double end, const OutsideStep::Interpolant& interpolant
     system.on_constraints = w.now.rows.distance < near_singular_pivot && !w.now.rows.blocks.empty();
     const bool breaks_here = breaks.reached() && !done();
     if (breaks_here) pass_break();
-    if (event || breaks_here || options.method.one_step) moved_before_ = progress.moved_energy;
+    if (event || breaks_here || options.method.one_step) numerical_energy_before_ = progress.numerical_energy;
     return event.has_value() || breaks_here;
 }
 

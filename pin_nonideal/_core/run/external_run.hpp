@@ -42,7 +42,7 @@ private:
     bool bridges_cluster() const;
 
     VecX inside_, inside_rate_;
-    double moved_before_ = 0.0;  // projection energy up to the state from which the integrator continues
+    double numerical_energy_before_ = 0.0;  // projection energy up to the state from which the integrator continues
 };
 
 }  // namespace pn

@@ -44,7 +44,7 @@ Simulation::Simulation(const Program& program, Workspace& workspace, const Optio
       stiffness(system, stepper, progress, run_options),
       floor(system, stepper, norm, progress, recording), growth(system, progress, run_options, recording),
       watch(system, progress.gaps),
-      locator(system, stepper, norm, progress.slip_at_start, progress.pulls, watch), hand_over(system, progress),
+      locator(system, stepper, norm, progress.slip_at_start, progress.in_tension, watch), hand_over(system, progress),
       output(system, stepper, progress, run_options, recording), notices(system, stepper, progress, recording),
       value_events(run_options.events, system, stepper, progress), breaks(system, progress, output, recording),
       torques(system, progress, run_options, output, breaks),
@@ -58,12 +58,12 @@ Simulation::Simulation(const Program& program, Workspace& workspace, const Optio
     const bool in_time = options.method.scheme == Method::Scheme::moreau;
     w.continues = options.continues || (in_time && system.ng > 0);
     progress.slip_at_start.assign(p.frictions.size(), 0.0);
-    progress.pulls.assign(p.contacts.size(), 0);
+    progress.in_tension.assign(p.contacts.size(), 0);
 }
 
 void Simulation::start(const VecX& q0, const VecX& v0) {
     progress.t = options.t0;
-    progress.stands = false;
+    progress.is_stationary = false;
     progress.y.setZero();
     progress.y.head(system.nq) = q0;
     progress.y.segment(system.nq, system.nv) = v0;
@@ -174,16 +174,16 @@ Simulation::Proposal Simulation::propose() {
 std::optional<double> Simulation::to_hand_over() {
     const bool adaptive = options.method.adaptive();
     hand_over_ahead = false;
-    if (system.ng == 0 || (adaptive && !progress.hands_over)) return std::nullopt;
+    if (system.ng == 0 || (adaptive && !progress.may_hand_over)) return std::nullopt;
     bool asks = true;
     for (;;) {
         const double size = std::min(adaptive ? progress.h : options.dt, torques.next_stop(progress.t, t_end) - progress.t);
         const std::optional<HandOver::Found> next = hand_over.first(size);
-        progress.hands_over = next.has_value();
+        progress.may_hand_over = next.has_value();
         if (!next || next->time >= size * whole_way) return std::nullopt;  // passed in the step after a stop
         if (hand_over.is_reached(next->time)) {
             hand_over.pass(next->time);
-            progress.handed_over = progress.t;
+            progress.hand_over_time = progress.t;
         } else if (!std::exchange(asks, false) || !hand_over.is_unloaded(next->gap)) {
             hand_over_ahead = true;
             return HandOver::step_before(next->time);
@@ -202,7 +202,7 @@ void Simulation::pass_break() {
 // --- Integrate ------------------------------------------------------------------------------------------------------
 
 std::optional<double> Simulation::integrate(const Proposal& proposal) {
-    opened.reset();  // valid for this step only: a shorter one may fail for another reason
+    open_loop.reset();  // valid for this step only: a shorter one may fail for another reason
     watched = system.watches();
     if (watched) before_step = w.state;
     const int active = system.active();
@@ -219,7 +219,7 @@ std::optional<double> Simulation::integrate(const Proposal& proposal) {
         if (!options.method.adaptive() || (proposal.size < tiny && !runs_away) ||
             failure.kind == Failure::Kind::interrupted)
             throw;
-        if (failure.kind == Failure::Kind::closure) opened = failure;
+        if (failure.kind == Failure::Kind::closure) open_loop = failure;
         back_to_start();  // rows and warm starts of the failed step do not serve the next trial
         return failed_error;
     }
@@ -247,7 +247,7 @@ std::optional<double> Simulation::try_step(const Proposal& proposal) {
     const bool measures = p.driven_exactly && options.method.adaptive() &&
                           size > shortest_measured * std::max(1.0, std::abs(progress.t));
     if (measures) {
-        moved_ = stepper.y1;
+        projection_move = stepper.y1;
         w.now.projected_gap = w.now.projected_rate = 0.0;
     }
     if (!leaves_rate(proposal) || !system.is_on_constraints(progress.t + size, stepper.y1))
@@ -257,8 +257,8 @@ std::optional<double> Simulation::try_step(const Proposal& proposal) {
     if (measures) {
         // If constraints drive the motion, the stages do not contain this error. The projection removes it, so its move
         // is measured.
-        moved_ -= stepper.y1;
-        error = std::max(error, norm.of_projection(moved_, stepper.y0, stepper.y1, progress.t, size));
+        projection_move -= stepper.y1;
+        error = std::max(error, norm.of_projection(projection_move, stepper.y0, stepper.y1, progress.t, size));
     }
     choice.look();
     return error;
@@ -268,12 +268,12 @@ std::optional<double> Simulation::try_step(const Proposal& proposal) {
 
 bool Simulation::control_error(const Proposal& proposal, std::optional<double> error) {
     const bool accepted = control.accepts(error, proposal.size, proposal.last, progress.h);
-    if (accepted) opened.reset();
+    if (accepted) open_loop.reset();
     else ++out.rejected;
-    progress.hands_over |= !accepted;
+    progress.may_hand_over |= !accepted;
     const double spacing = std::abs(std::nextafter(progress.t, t_end) - progress.t);
     if (accepted || !error || progress.h >= least_spacings * spacing) return accepted;
-    if (opened) throw *opened;
+    if (open_loop) throw *open_loop;
     throw Failure(Failure::Kind::step_size, progress.t);
 }
 
@@ -299,7 +299,7 @@ bool Simulation::locate_event(const Proposal& proposal) {
         if (!options.method.adaptive() || proposal.size < tiny || failure.kind == Failure::Kind::interrupted) throw;
     }
     ++out.rejected;
-    progress.hands_over = true;
+    progress.may_hand_over = true;
     progress.h = shortened * proposal.size;
     back_to_start();
     return false;
@@ -317,7 +317,7 @@ bool Simulation::leaves_rate(const Proposal& proposal) const {
 // neither applies.
 bool Simulation::goes_on(const Failure& failure) {
     const bool may_end = modes.may_end(failure);
-    const bool at_hand_over = hand_over_ahead || progress.t - progress.handed_over <= chatter_time;
+    const bool at_hand_over = hand_over_ahead || progress.t - progress.hand_over_time <= chatter_time;
     const bool of_hand_over = at_hand_over && ModeChanges::of_closed_contacts(failure);
     const bool leads_on = of_hand_over || ModeChanges::leads_on(failure);
     if (!may_end && !leads_on) return false;
@@ -348,7 +348,7 @@ void Simulation::accept(const Proposal& proposal, const std::optional<FoundEvent
     const std::optional<double> to_rest = event ? std::nullopt : locator.time_to_rest();
     if (to_rest) progress.h = past_rest * *to_rest;
     progress.t = event ? event->time : proposal.last && !to_rest ? proposal.stop : stepper.t0 + stepper.h;
-    progress.moved_energy += system.moved_energy;
+    progress.numerical_energy += system.numerical_energy;
     const bool arrives = event && event->kind == FoundEvent::Kind::rest_or_limit;
     remember_directions(system, progress.slip_at_start, arrives ? event->index : -1);
     progress.y.head(stepper.active) = stepper.y1.head(stepper.active);

@@ -92,12 +92,12 @@ protected:
     ModeChanges modes;
 
     // Data of the current step only.
-    VecX moved_;  // move by the projection of the step's end
+    VecX projection_move;  // move by the projection of the step's end
     std::optional<FoundEvent> event;  // event in the step just taken
     RunState before_step;      // run state at the step's start, set if `watched`
     bool watched = false;      // a contact was closed or an element active at the step's start
     bool hand_over_ahead = false;  // the step ends before a hand-over
-    std::optional<Failure> opened;  // loop that a trial of this step could not close
+    std::optional<Failure> open_loop;  // loop that a trial of this step could not close
 };
 
 }  // namespace pn

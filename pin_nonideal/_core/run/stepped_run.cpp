@@ -7,7 +7,7 @@ void SteppedRun::begin(const VecX& q0, const VecX& v0, double period, bool only)
     stepper.forget();
     stiffness.forget();
     event.reset();
-    opened.reset();
+    open_loop.reset();
     choice.forget();
     out.steps = 0;  // the guards against runs without progress count from zero
     periods_ = 0;
@@ -17,7 +17,7 @@ void SteppedRun::begin(const VecX& q0, const VecX& v0, double period, bool only)
 }
 
 void SteppedRun::advance(double period) {
-    progress.stands = false;  // torques may have changed
+    progress.is_stationary = false;  // torques may have changed
     t_end = options.t0 + static_cast<double>(++periods_) * period;
     run();
 }

@@ -21,11 +21,11 @@ bool LeastMove::pose() {
     factored_.assign(islands_.size(), 0);
     probed_.assign(islands_.size(), 0);
     island_of_.assign(problem.nodes.size(), -1);
-    held_.assign(problem.nodes.size(), 0);
+    immobile_.assign(problem.nodes.size(), 0);
     for (int i = 0; i < islands_.size(); ++i)
         for (int node : islands_[i].nodes) island_of_[node] = i;
     weight_.assign(islands_.size(), most_weight);
-    own_.resize(problem.rows);
+    own_response_.resize(problem.rows);
     if (scaled_.size() < problem.rows) scaled_.resize(problem.rows);
     G_.assign(9 * problem.elements.size(), 0.0);
     return true;
@@ -39,8 +39,8 @@ bool LeastMove::factor(int i) {
         double most = 0.0;
         for (int r = 0; r < e.dim(); ++r) most = std::max(most, W.c[r][r]);
         for (int r = 0; r < e.dim(); ++r) {
-            own_[e.row + r] = W.c[r][r] > min_block_response * most ? W.c[r][r] : most;
-            G_[9 * k + r * (e.dim() + 1)] = own_[e.row + r] > 0.0 ? weight_[i] / own_[e.row + r] : 0.0;
+            own_response_[e.row + r] = W.c[r][r] > min_block_response * most ? W.c[r][r] : most;
+            G_[9 * k + r * (e.dim() + 1)] = own_response_[e.row + r] > 0.0 ? weight_[i] / own_response_[e.row + r] : 0.0;
         }
     }
     factors_[i].analyse(problem, islands_[i]);
@@ -55,12 +55,12 @@ double LeastMove::longest_single(int i, const VecX& r) {
     for (int k : islands_[i].elements) {
         const BlockElement& e = problem.elements[k];
         for (int row = e.row; row < e.row + e.dim(); ++row) {
-            if (r[row] == 0.0 || !(own_[row] > 0.0)) continue;
+            if (r[row] == 0.0 || !(own_response_[row] > 0.0)) continue;
             for (int side = 0; side < 2 && e.node[side] >= 0; ++side) {
                 const BlockNode& node = problem.nodes[e.node[side]];
                 single_.segment(node.first, node.size).setZero();
             }
-            scaled_[row] = r[row] / own_[row];
+            scaled_[row] = r[row] / own_response_[row];
             problem.push(e, scaled_, single_);
             scaled_[row] = 0.0;
             for (int side = 0; side < 2 && e.node[side] >= 0; ++side) {
@@ -152,17 +152,17 @@ void LeastMove::probe(int i) {
     for (int n : islands_[i].nodes) {
         const BlockNode& node = problem.nodes[n];
         const double* M = problem.M.data() + node.M;
-        held_[n] = 1;
+        immobile_[n] = 1;
         for (int k = 0; k < node.size; ++k)
-            if (!(std::abs(probe_[node.first + k]) * std::sqrt(M[k * (node.size + 1)]) <= most_left)) held_[n] = 0;
+            if (!(std::abs(probe_[node.first + k]) * std::sqrt(M[k * (node.size + 1)]) <= most_left)) immobile_[n] = 0;
     }
 }
 
-bool LeastMove::is_held(int node) {
+bool LeastMove::is_immobile(int node) {
     const int i = island_of_[node];
     if (i < 0) return false;
     if (!probed_[i]) probe(i);
-    return held_[node];
+    return immobile_[node];
 }
 
 }  // namespace pn

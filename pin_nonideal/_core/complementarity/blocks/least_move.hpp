@@ -24,7 +24,7 @@ public:
     // Largest residual.
     double largest(const VecX& r) const { return problem.rows > 0 ? r.head(problem.rows).cwiseAbs().maxCoeff() : 0.0; }
     // Check if the rows leave a node no freedom.
-    bool is_held(int node);
+    bool is_immobile(int node);
 
 private:
     bool factor(int island);
@@ -37,9 +37,9 @@ private:
     std::vector<BlockFactor> factors_;    // one for each island
     std::vector<char> factored_, probed_;  // by island
     std::vector<int> island_of_;          // by node
-    std::vector<char> held_;              // by node of a probed island
+    std::vector<char> immobile_;  // by node of a probed island
     std::vector<double> weight_;          // by island
-    std::vector<double> own_, G_;         // own response of each row, and weights, nine numbers an element
+    std::vector<double> own_response_, G_;  // own response of each row, and weights, nine numbers an element
     VecX probe_, scaled_, single_;
 };
 

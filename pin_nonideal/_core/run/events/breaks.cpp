@@ -80,7 +80,7 @@ void Breaks::enter(double at) {
     const auto after = std::upper_bound(p.breaks.begin(), p.breaks.end(), at);
     double last = after == p.breaks.begin() ? -HUGE_VAL : *(after - 1);
     next_ = after == p.breaks.end() ? HUGE_VAL : *after;
-    double& found = progress_.found_break;
+    double& found = progress_.detected_break;
     if (found <= at) {
         last = std::max(last, found);
         found = HUGE_VAL;
@@ -91,7 +91,7 @@ void Breaks::enter(double at) {
 
 double Breaks::next(double after) const {
     const auto stated = std::upper_bound(p.breaks.begin(), p.breaks.end(), after);
-    const double found = progress_.found_break > after ? progress_.found_break : HUGE_VAL;
+    const double found = progress_.detected_break > after ? progress_.detected_break : HUGE_VAL;
     return std::min(found, stated == p.breaks.end() ? HUGE_VAL : *stated);
 }
 
@@ -145,7 +145,7 @@ void Breaks::jump(const std::vector<double>& before, const std::vector<double>& 
     tell(before, after, v_minus, impulse);
     system_.write(progress_.y);
     if (system_.energy) system_.work(progress_.y)[constraint_power] += work;
-    else progress_.moved_energy += work;
+    else progress_.numerical_energy += work;
     if (!p.gaps.empty()) set_closed(p, w, closed);
     if (!p.frictions.empty()) set_modes(p, w, modes);
 }
@@ -185,7 +185,7 @@ void Breaks::look(double end, bool adaptive) {
         if (!found) continue;
         if (std::abs(found->f[0] - before.f[0]) > value_jump)
             throw Failure(Failure::Kind::closure, found->t, {motion.block}, std::abs(found->f[0] - before.f[0]));
-        if (found->t < progress_.found_break) progress_.found_break = found->t;
+        if (found->t < progress_.detected_break) progress_.detected_break = found->t;
         enter();
         end = w.now.row_time(end);
     }

@@ -23,7 +23,7 @@ Clusters::Clusters(System& system, Progress& progress, const Options& options, S
       out_(out) {}
 
 bool Clusters::bridge(int element, double t_end) {
-    std::vector<double>& recent = progress_.recent_events;
+    std::vector<double>& recent = progress_.recent_event_times;
     if (recent.size() > chatter_events) recent.erase(recent.begin());
     if (recent.size() < chatter_events || progress_.t - recent.front() > chatter_time) return false;
     if (!options_.method.outside()) {
@@ -37,20 +37,20 @@ bool Clusters::bridge(int element, double t_end) {
 }
 
 void Clusters::remember() {
-    std::vector<double>& last = progress_.last_changes;
+    std::vector<double>& last = progress_.mode_change_times;
     if (!last.empty() && last.back() == progress_.t) return;
     if (last.size() == dwindling_events) last.erase(last.begin());
     last.push_back(progress_.t);
 }
 
 bool Clusters::dwindles() const {
-    const std::vector<double>& last = progress_.last_changes;
+    const std::vector<double>& last = progress_.mode_change_times;
     return last.size() == dwindling_events && progress_.t - last.front() <= chatter_time;
 }
 
 // Return the length [s] of the next stretch: twice the last one if events crowded again right after it.
 double Clusters::next_stretch() const {
-    const std::vector<double>& recent = progress_.recent_events;
+    const std::vector<double>& recent = progress_.recent_event_times;
     const double first = recent.empty() ? progress_.t : recent.front();
     const bool again = progress_.bridged_time > 0.0 && first - progress_.bridged_end < progress_.bridged_time;
     return again ? std::min(chatter_growth * progress_.bridged_time, longest_chatter) : chatter_time;
@@ -58,8 +58,8 @@ double Clusters::next_stretch() const {
 
 void Clusters::step_over(int element, double t_end) {
     progress_.bridged_time = next_stretch();
-    progress_.recent_events.clear();
-    progress_.last_changes.clear();
+    progress_.recent_event_times.clear();
+    progress_.mode_change_times.clear();
     const double dt = progress_.bridged_time / chatter_steps;
     out_.events.push_back({progress_.t, Event::Kind::chatter, element});
     const double stop = std::min(t_end, progress_.t + progress_.bridged_time);

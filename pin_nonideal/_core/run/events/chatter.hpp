@@ -14,7 +14,7 @@ public:
              TimeStepping& time_stepping, Recording& out);
 
     // Count an event at the current time that changes the motion.
-    void count() { progress_.recent_events.push_back(progress_.t); }
+    void count() { progress_.recent_event_times.push_back(progress_.t); }
     // Record the current time as an instant of mode changes.
     void remember();
     // Bridge a stretch by time stepping if events crowd. `element`: friction element of the last event. Return true if

@@ -129,7 +129,7 @@ std::vector<Watch> EventCandidates::find() {
     if (!w.now.rows.redundant)  // redundant loads are checked together
         for (int i : w.now.touching)
             if (!is_bare(p, i) && may_pull(i)) list.push_back({Watch::Kind::load, i});
-    for (const GapSearch::Doubt& doubt : gaps_.doubtful()) list.push_back({Watch::Kind::gap, doubt.gap});
+    for (const GapSearch::Candidate& candidate : gaps_.find_candidates()) list.push_back({Watch::Kind::gap, candidate.gap});
     return list;
 }
 

@@ -181,7 +181,7 @@ std::optional<FoundEvent> EventLocator::locate() {
     std::optional<Crossing> crossing = search_.first();
     if (crossing) step_onto(*crossing);
     for (int k = 0; k < most_closed_before && crossing; ++k) {
-        const std::optional<Crossing> before = search_.entered(crossing->watch);
+        const std::optional<Crossing> before = search_.deepest_penetration(crossing->watch);
         if (!before) break;
         crossing = before;
         step_onto(*crossing);

@@ -56,17 +56,17 @@ double EventSearch::margin(const Watch& watch, double t, const VecX& y) {
 }
 
 // Only candidate gaps of the step are checked.
-std::optional<Crossing> EventSearch::entered(const Watch& touches) {
+std::optional<Crossing> EventSearch::deepest_penetration(const Watch& touches) {
     std::optional<Crossing> out;
-    if (gaps_.doubted().empty()) return out;
+    if (gaps_.candidates().empty()) return out;
     double least = -touching_width * scene_size(p, w);
-    for (const GapSearch::Doubt& doubt : gaps_.doubted()) {
-        const Watch watch{Watch::Kind::gap, doubt.gap};
+    for (const GapSearch::Candidate& candidate : gaps_.candidates()) {
+        const Watch watch{Watch::Kind::gap, candidate.gap};
         if (touches.kind == watch.kind && touches.index == watch.index) continue;
         const double deep = margin(watch, stepper_.t0 + stepper_.h, stepper_.y1);
         if (!(deep < least)) continue;
         least = deep;
-        out = Crossing{watch, 1.0, gap_rate(p, w, doubt.gap) * stepper_.h};
+        out = Crossing{watch, 1.0, gap_rate(p, w, candidate.gap) * stepper_.h};
     }
     return out;
 }
@@ -117,7 +117,7 @@ double EventSearch::margin_inside(const Watch& watch, Source source, double part
     if (source == Source::shares && !of_element)
         return stepper_.interpolated_rate(part, system_.ns + 2 * system_.ne + watch.index);
     if (source == Source::shares) {
-        return 1.0 + release_limit_rounding - doubt_ - std::abs(interpolated_share(watch.index, part));
+        return 1.0 + release_limit_rounding - share_error_ - std::abs(interpolated_share(watch.index, part));
     }
     if (source == Source::velocities) {
         const int first = system_.nq + p.blocks[f->block].dof;
@@ -205,7 +205,7 @@ Crossing EventSearch::cross(const Watch& watch, Source from) {
         const auto touch = gaps_.first_touch(watch.index);
         return touch ? Crossing{watch, touch->part, touch->slope} : Crossing{watch, no_crossing, 0.0};
     }
-    if (from == Source::shares && watch.kind == Watch::Kind::stick) doubt_ = share_error(watch.index);
+    if (from == Source::shares && watch.kind == Watch::Kind::stick) share_error_ = share_error(watch.index);
     const double part = first_crossing(watch, from);
     if (part == no_crossing) return {watch, part, 0.0};
     if (watch.kind == Watch::Kind::load)

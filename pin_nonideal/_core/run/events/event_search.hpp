@@ -28,7 +28,7 @@ public:
     std::optional<Crossing> first();
     // Return the deepest penetrating gap at the end of a repeated step, other than the gap that touches there. This gap
     // closed before, because the motion differs slightly from the interpolant.
-    std::optional<Crossing> entered(const Watch& touches);
+    std::optional<Crossing> deepest_penetration(const Watch& touches);
 
     // Return a margin, positive before the event and zero at it. The workspace must be evaluated at the state.
     double margin(const Watch& watch, double t, const VecX& y);
@@ -56,7 +56,7 @@ private:
     Workspace& w;
     GapSearch gaps_;
     EventCandidates candidates_;
-    double doubt_ = 0.0;        // error of the sampled force / limit ratio
+    double share_error_ = 0.0;  // error of the sampled force / limit ratio
     VecX probe_, probe_rate_;
 };
 

@@ -155,10 +155,10 @@ void close_and_find(System& system, double t, bool starts, FrictionSwitch& frict
     const bool landing = starts || event->kind == FoundEvent::Kind::touch;
     ClosingQuestion question;
     question.rest = system.touching.at(p, system.w, t, system.q, system.v, starts).rest;
-    if (event && event->kind == FoundEvent::Kind::lift) question.opening = event->index;
-    if (event && !event->of_gap()) question.arrived = event->index;
+    if (event && event->kind == FoundEvent::Kind::lift) question.opening_gap = event->index;
+    if (event && !event->of_gap()) question.arrived_element = event->index;
     question.breaking = friction.breaking();
-    question.struck = landing;
+    question.after_impact = landing;
     const VecX q = system.q, v = system.v;
     close_contacts(p, system.w, t, q, v, question, [&](const RestingMotion* together) {
         system.q = q;

@@ -68,28 +68,28 @@ void GapSearch::look_at_starts(const std::vector<int>& gaps) {
     kinematics(p.mechanism, w.now.terms, system_.q, system_.v);
 }
 
-const std::vector<GapSearch::Doubt>& GapSearch::doubtful() {
-    doubtful_.clear();
+const std::vector<GapSearch::Candidate>& GapSearch::find_candidates() {
+    candidates_.clear();
     bound_rates();
     const std::vector<int>& unseen = watch_.follow(speed_, stepper_.h);
     system_.read(stepper_.y1);
     if (!unseen.empty()) look_at_starts(unseen);
-    if (start_.near_gaps.empty()) return doubtful_;
+    if (start_.near_gaps.empty()) return candidates_;
     rounding_ = gap_rounding * scene_size(p, w);
     reach_.bound_bodies(w, speed_, acceleration_, stepper_.h);
-    held_.clear();
+    closed_round_.clear();
     for (int i : w.now.touching)
-        if (Separation::has(p, i)) held_.push_back(i);
+        if (Separation::has(p, i)) closed_round_.push_back(i);
     for (int i : start_.near_gaps) {
         follow_gap(p, w, stepper_.t0 + stepper_.h, system_.v, i);
         watch_.end.push_back(Look::here(p, w, i, 1.0));
         if (start_.near[i] == GapState::from_the_end || travel_factor * reach_.travel(i) < start_.width[i]) continue;
-        if (has_held_copy(i)) continue;
+        if (has_closed_copy(i)) continue;
         const Look end = above(watch_.end.back(), level_here(i, 1.0));
         const Bends bent = bends(i, end);
-        if (!stays_open(i, look_at_start(i), end, bent.below)) doubtful_.push_back({i, end, bent});
+        if (!stays_open(i, look_at_start(i), end, bent.below)) candidates_.push_back({i, end, bent});
     }
-    return doubtful_;
+    return candidates_;
 }
 
 // Check if a gap stays open between two samples. The two parabolas of the bound through both samples lie below the gap.
@@ -110,13 +110,13 @@ bool GapSearch::stays_open(int gap, const Look& a, const Look& b, double bound) 
 }
 
 // Check if a duplicate of the gap is closed. The gap follows the duplicate.
-bool GapSearch::has_held_copy(int gap) const {
+bool GapSearch::has_closed_copy(int gap) const {
     const std::vector<int>& touching = w.now.touching;
     return std::any_of(touching.begin(), touching.end(), [&](int held) { return are_copies(p, held, gap); });
 }
 
 bool GapSearch::slides_on(int gap) const {
-    return std::any_of(held_.begin(), held_.end(), [&](int held) { return same_bodies(p, gap, held); });
+    return std::any_of(closed_round_.begin(), closed_round_.end(), [&](int held) { return same_bodies(p, gap, held); });
 }
 
 GapSearch::Look GapSearch::above(Look look, double level) const {
@@ -128,7 +128,7 @@ GapSearch::Look GapSearch::above(Look look, double level) const {
 double GapSearch::level_here(int gap, double part) const {
     double level = plane(gap);
     if (!Separation::has(p, gap)) return level;
-    for (int held : held_) {
+    for (int held : closed_round_) {
         if (!same_bodies(p, gap, held)) continue;
         measure_gap(p, w, stepper_.t0 + part * stepper_.h, system_.v, held);
         level = std::min(level, gap_width(p, w, held));
@@ -140,7 +140,7 @@ GapSearch::Look GapSearch::look_at_start(int gap) const {
     const Look out{0.0, start_.width[gap], start_.rate[gap], std::nullopt};
     if (!Separation::has(p, gap)) return above(out, plane(gap));
     double level = plane(gap);
-    for (int held : held_)
+    for (int held : closed_round_)
         if (same_bodies(p, gap, held)) level = std::min(level, start_.width[held]);
     return above({0.0, start_.width[gap], start_.rate[gap], start_.separation[gap]}, level);
 }
@@ -204,10 +204,11 @@ bool GapSearch::stays_on_plane(int gap, const Look& a, const Look& b) {
 std::optional<GapSearch::Touch> GapSearch::first_touch(int gap) {
     looks_ = 0;
     stepper_.make_interpolant();
-    const auto doubt = std::find_if(doubtful_.begin(), doubtful_.end(), [&](const Doubt& d) { return d.gap == gap; });
+    const auto is_asked = [&](const Candidate& candidate) { return candidate.gap == gap; };
+    const auto candidate = std::find_if(candidates_.begin(), candidates_.end(), is_asked);
     const Look start = look_at_start(gap);
-    if (stays_on_plane(gap, start, doubt->end)) looks_ = most_looks + 1;
-    return search(gap, start, doubt->end, doubt->bends);
+    if (stays_on_plane(gap, start, candidate->end)) looks_ = most_looks + 1;
+    return search(gap, start, candidate->end, candidate->bends);
 }
 
 }  // namespace pn

@@ -17,13 +17,13 @@ public:
 
     // Candidates: gaps that may close in the step. The workspace must be evaluated at the step's end, and stays so.
     struct Bends { double below, above; };  // bounds of the second derivative: magnitude below zero, and largest value
-    struct Doubt {
+    struct Candidate {
         int gap;
         GapLook end;  // sample at the step's end
         Bends bends;  // bounds over the step
     };
-    const std::vector<Doubt>& doubtful();
-    const std::vector<Doubt>& doubted() const { return doubtful_; }  // candidates of the last search
+    const std::vector<Candidate>& find_candidates();
+    const std::vector<Candidate>& candidates() const { return candidates_; }  // candidates of the last search
     // Part of the step at which a candidate closes, and rate of the gap there per step. The search leaves the workspace
     // at another state.
     struct Touch { double part, slope; };
@@ -44,7 +44,7 @@ private:
     std::optional<Touch> search(int gap, const Look& a, const Look& b, const Bends& bends);
     Touch between(int gap, const Look& a, const Look& b);
     void bound_rates();
-    bool has_held_copy(int gap) const;
+    bool has_closed_copy(int gap) const;
     bool slides_on(int gap) const;  // the same two bodies touch at another point
     void look_at_starts(const std::vector<int>& gaps);
     Bends bends(int gap, const Look& end) const;
@@ -56,8 +56,8 @@ private:
     GapWatch& watch_;
     GapState& start_;
     Reach reach_;
-    std::vector<Doubt> doubtful_;
-    std::vector<int> held_;  // closed gaps of round bodies, their next contact point is not lower
+    std::vector<Candidate> candidates_;
+    std::vector<int> closed_round_;  // closed gaps of round bodies, their next contact point is not lower
     VecX speed_, acceleration_, probe_;
     double rounding_ = 0.0;
     int looks_ = 0;

@@ -36,7 +36,7 @@ bool Landing::strike_once(bool starts) {
     for (const Event& event : found.events) out_.events.push_back(event);
     progress_.impact_energy += found.work;
     if (system_.energy && p.moves_in_time) system_.work(progress_.y)[constraint_power] += found.work_of_constraints;
-    else progress_.moved_energy += found.work_of_constraints;
+    else progress_.numerical_energy += found.work_of_constraints;
     double size = 0.0;
     for (const Event& event : found.events) size += std::abs(event.energy_change);
     if (!options_.strict || !(found.work > gain_rounding * size)) return true;

@@ -78,7 +78,7 @@ bool ModeChanges::leads_on(const Failure& failure) {
 
 bool ModeChanges::may_end(const Failure& failure) const {
     return of_modes(failure) && options_.method.adaptive() && system_.ng > 0 &&
-           progress_.t >= progress_.left + leaving_apart * tiny_step_at(progress_.t);
+           progress_.t >= progress_.forced_switch_time + leaving_apart * tiny_step_at(progress_.t);
 }
 
 bool ModeChanges::leave() {
@@ -93,7 +93,7 @@ bool ModeChanges::leave() {
         progress_.y = y;
         return false;
     }
-    progress_.left = progress_.t;
+    progress_.forced_switch_time = progress_.t;
     output_.now();
     return true;
 }

@@ -33,7 +33,7 @@ std::vector<int> bounded_drives(const Program& p) {
 }  // namespace
 
 ValueEvents::ValueEvents(const std::vector<UserEvent>& asked, System& system, Stepper& stepper, Progress& progress)
-    : asked_(asked), system_(system), stepper_(stepper), drives_(bounded_drives(system.p)), side_(progress.sides),
+    : asked_(asked), system_(system), stepper_(stepper), drives_(bounded_drives(system.p)), side_(progress.event_signs),
       count_(asked.size() + drives_.size(), 0), asked_y_(VecX::Zero(system.ns)), asked_torque_(VecX::Zero(system.nv)),
       probe_(VecX::Zero(system.ny)) {
     side_.assign(count_.size(), 0.0);

@@ -19,15 +19,15 @@ void Notices::tell_pulls(const std::optional<FoundEvent>& event) {
         const Press found = contact_press(p, w, i);
         for (int j : found.sharing) asked[j] = 1;
         if (!found.must_pull && !located) return;
-        for (int j : found.sharing) now[j] = progress_.pulls[j];
+        for (int j : found.sharing) now[j] = progress_.in_tension[j];
         for (int j : found.pulling) now[j] = 1;
     };
     if (event && event->kind == FoundEvent::Kind::pull) ask(event->index, true);
     for (int i = 0; i < n; ++i)
         if (!asked[i] && normal_force(p, w, i) < 0.0) ask(i, false);
     for (int i = 0; i < n; ++i)
-        if (now[i] && !progress_.pulls[i]) out_.events.push_back({progress_.t, Event::Kind::pull, p.contacts[i]});
-    progress_.pulls = now;
+        if (now[i] && !progress_.in_tension[i]) out_.events.push_back({progress_.t, Event::Kind::pull, p.contacts[i]});
+    progress_.in_tension = now;
 }
 
 std::optional<double> Notices::begin_several(bool after_step) {

@@ -20,9 +20,9 @@ public:
     // Record the instant from which the laws allow several motions, once each time. At the end of a time step this
     // includes laws that allow no motion. Return the recorded instant, which can lie inside the step.
     std::optional<double> several(bool after_step) {
-        const bool before = progress_.several;
-        progress_.several = w.state.unique == Uniqueness::several || w.now.several || w.now.no_motion;
-        if (before || !progress_.several) return std::nullopt;
+        const bool before = progress_.several_motions;
+        progress_.several_motions = w.state.unique == Uniqueness::several || w.now.several || w.now.no_motion;
+        if (before || !progress_.several_motions) return std::nullopt;
         return begin_several(after_step);
     }
 

@@ -112,9 +112,9 @@ void System::project_and_evaluate(double t, VecX& y, VecX& dy) {
     moved |= begin_step_on_rates(p, w, t, v);
     write(y);
     write_rate(t, dy);
-    moved_energy = 0.0;
+    numerical_energy = 0.0;
     if (!moved || !energy) return;
-    moved_energy =
+    numerical_energy =
         kinetic_energy(p.mechanism, w.now.terms, v) + potential_energy(p.mechanism, w.now.terms) - before;
 }
 
@@ -155,7 +155,7 @@ void System::evaluate_step_end(double t, const VecX& y, VecX& dy, bool goes_thro
 void System::settle(double t, VecX& y, VecX& dy, bool evaluates, bool goes_through) {
     read(y);
     read_law_states(y);
-    moved_energy = 0.0;
+    numerical_energy = 0.0;
     w.now.no_motion = false;
     if (!evaluates && keeps_to_rows(p, w, t, q, v)) return write(y);
     const auto total = [&] {
@@ -186,7 +186,7 @@ void System::settle(double t, VecX& y, VecX& dy, bool evaluates, bool goes_throu
     moved |= !found;
     write(y);
     if (evaluates) write_rate(t, dy, found && !goes_through);
-    if (moved && energy) moved_energy = total() - before;
+    if (moved && energy) numerical_energy = total() - before;
 }
 
 bool System::is_on_constraints(double t, const VecX& y) {

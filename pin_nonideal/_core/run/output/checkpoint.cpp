@@ -45,19 +45,19 @@ static void fields(Archive& a, GapState& x) {
 }
 
 static void fields(Archive& a, Progress& x) {
-    auto& [t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, found_break, recent_events,
-           last_changes, sides, bridged_time, bridged_end, slip_at_start, pulls, gaps, left, impact_energy, several,
-           stiff_steps, quiet_steps, rounding, next_look, growth_times, growth_speeds, growth_steps, stands,
-           evaluated, turning_steps, hands_over, handed_over] = x;
-    a(t, h, y, rate, configured_t, configured_y, moved_energy, samples, next_period, found_break, sides, bridged_time,
-      bridged_end, slip_at_start, pulls, left, impact_energy, several, stiff_steps, quiet_steps, rounding, next_look,
-      stands, evaluated, turning_steps, hands_over, handed_over);
+    auto& [t, h, y, rate, configured_t, configured_y, numerical_energy, samples, next_period, detected_break,
+           recent_event_times, mode_change_times, event_signs, bridged_time, bridged_end, slip_at_start, in_tension, gaps,
+           forced_switch_time, impact_energy, several_motions, stiff_steps, quiet_steps, rounding, next_look, growth_times,
+           growth_speeds, growth_steps, is_stationary, has_forces, turning_steps, may_hand_over, hand_over_time] = x;
+    a(t, h, y, rate, configured_t, configured_y, numerical_energy, samples, next_period, detected_break, event_signs,
+      bridged_time, bridged_end, slip_at_start, in_tension, forced_switch_time, impact_energy, several_motions, stiff_steps,
+      quiet_steps, rounding, next_look, is_stationary, has_forces, turning_steps, may_hand_over, hand_over_time);
     fields(a, gaps);
-    a.list(recent_events);
+    a.list(recent_event_times);
     a.list(growth_times);
     a.list(growth_speeds);
     a.list(growth_steps);
-    a.list(last_changes);
+    a.list(mode_change_times);
 }
 
 static void fields(Archive& a, Event& x) {
@@ -123,7 +123,7 @@ static void evaluate_anew(System& system, const Progress& progress) {
     system.read(progress.configured_y);
     configure(p, w, progress.configured_t, system.q, system.v);
     update_kinematics(p, w, progress.configured_t, system.q, system.v);
-    if (progress.stands && progress.evaluated) {  // the next step reads its motion
+    if (progress.is_stationary && progress.has_forces) {  // the next step reads its motion
         VecX rate = progress.rate;
         system.evaluate_step_end(progress.t, progress.y, rate, true);
     }

@@ -16,31 +16,31 @@ struct Progress {
     // Time and state of the workspace's last configuration: the current state, or a sample inside the last step.
     double configured_t = 0.0;
     VecX configured_y;
-    double moved_energy = 0.0;  // total energy change by projections [J]
+    double numerical_energy = 0.0;  // total energy change by projections and by the scheme of time stepping [J]
     long samples = 0;           // number of samples on the output grid
     long next_period = 0;       // index of the next period of sampled control
-    double found_break = HUGE_VAL;  // time of a break that was detected in a user's time function
-    std::vector<double> recent_events;  // times of recent events, for the detection of chatter
-    std::vector<double> last_changes;   // times of the last instants at which modes changed
-    std::vector<double> sides;          // signs of the values of value events
+    double detected_break = HUGE_VAL;  // time of a break that was detected in a user's time function
+    std::vector<double> recent_event_times;  // times of recent events, for the detection of chatter
+    std::vector<double> mode_change_times;  // times of the last instants at which modes changed
+    std::vector<double> event_signs;  // signs of the values of value events
     double bridged_time = 0.0, bridged_end = 0.0;  // length and end of the last bridged stretch [s]
     std::vector<double> slip_at_start;  // slip speed at the step's start, by element
-    std::vector<char> pulls;            // true for each bilateral contact in tension
+    std::vector<char> in_tension;  // true for each bilateral contact in tension
     GapState gaps;                      // gaps at the step's start
-    double left = -HUGE_VAL;           // time of the last forced mode switch
+    double forced_switch_time = -HUGE_VAL;  // time of the last forced mode switch
     double impact_energy = 0.0;         // total work of impacts [J]
-    bool several = false;               // several motions are possible, which was recorded
+    bool several_motions = false;  // several motions are possible, which was recorded
     long stiff_steps = 0, quiet_steps = 0;  // steps near the stability limit, steps away from it since
     VecX rounding;          // last measured rounding of the rates, scaled to the tolerances that it requires
     long next_look = 0;     // step number of the next measurement of rounding
     // Decades of the largest speed: time, value and number of steps when it was reached.
     std::vector<double> growth_times, growth_speeds;
     std::vector<long> growth_steps;
-    // Time stepping: the last step left the state unchanged; accelerations and forces are those at its end.
-    bool stands = false, evaluated = false;
+    // Time stepping: the last step left the state unchanged; the accelerations and forces are those at its end.
+    bool is_stationary = false, has_forces = false;
     int turning_steps = 0;  // consecutive stiff steps with turning slip, negative: not counted yet
-    bool hands_over = false;  // a closed contact may pass to the next feature in the next step
-    double handed_over = -HUGE_VAL;  // time of the last hand-over
+    bool may_hand_over = false;  // a closed contact may pass to the next feature in the next step
+    double hand_over_time = -HUGE_VAL;  // time of the last hand-over
 };
 
 std::string to_bytes(Workspace& w, Progress& progress, Recording& out);

@@ -20,7 +20,7 @@ void DenseRecorder::state_at_point() {
         for (int k = 0; k < 3; ++k) out_.directions.push_back(n[k]);
 }
 
-void DenseRecorder::step(double moved_energy) {
+void DenseRecorder::step(double numerical_energy) {
     RunState& state = system_.w.state;
     const std::vector<Vec3> by_end = state.last_direction;
     stepper_.make_interpolant();
@@ -30,23 +30,23 @@ void DenseRecorder::step(double moved_energy) {
         stepper_.interpolate(part(k, n), state_);
         state_at_point();
     }
-    rest_of_step(stepper_.t0, stepper_.t0 + stepper_.h, moved_energy, stepper_.collocates());
+    rest_of_step(stepper_.t0, stepper_.t0 + stepper_.h, numerical_energy, stepper_.collocates());
 }
 
-void DenseRecorder::straight(double t0, const VecX& y0, double t1, const VecX& y1, double moved_energy) {
+void DenseRecorder::straight(double t0, const VecX& y0, double t1, const VecX& y1, double numerical_energy) {
     const int n = points(stepper_.method);
     for (int k = 0; k < n; ++k) {
         state_ = y0 + part(k, n) * (y1 - y0);
         system_.normalize(state_);
         state_at_point();
     }
-    rest_of_step(t0, t1, moved_energy, false);
+    rest_of_step(t0, t1, numerical_energy, false);
 }
 
-void DenseRecorder::rest_of_step(double t0, double t1, double moved_energy, bool sought) {
+void DenseRecorder::rest_of_step(double t0, double t1, double numerical_energy, bool sought) {
     const Workspace& w = system_.w;
     out_.times.insert(out_.times.end(), {t0, t1});
-    out_.moved.push_back(moved_energy);
+    out_.moved.push_back(numerical_energy);
     out_.sought.push_back(sought);
     for (int e = 0; e < system_.ne; ++e) out_.modes.push_back(w.state.mode[e]);
     if (!holds_torque_) return;

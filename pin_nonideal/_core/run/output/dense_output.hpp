@@ -31,13 +31,13 @@ public:
     DenseRecorder(System& system, Stepper& stepper, bool holds_torque, DenseOutput& out);
 
     // Record the step just taken. Leaves the workspace at other states.
-    void step(double moved_energy);
+    void step(double numerical_energy);
     // Record a step of time stepping as a straight line between both states.
-    void straight(double t0, const VecX& y0, double t1, const VecX& y1, double moved_energy);
+    void straight(double t0, const VecX& y0, double t1, const VecX& y1, double numerical_energy);
 
 private:
     void state_at_point();
-    void rest_of_step(double t0, double t1, double moved_energy, bool sought);
+    void rest_of_step(double t0, double t1, double numerical_energy, bool sought);
 
     System& system_;
     Stepper& stepper_;

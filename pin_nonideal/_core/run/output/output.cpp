@@ -29,7 +29,7 @@ void Output::emit(double at, const VecX& state, bool evaluated) {
     if (!out_.t.empty() && (jumps_ ? at < out_.t.back() : at <= out_.t.back())) return;
     jumps_ = false;
     const GapState& gaps = progress_.gaps;
-    recorder_.sample(at, state, {progress_.impact_energy, progress_.moved_energy}, evaluated,
+    recorder_.sample(at, state, {progress_.impact_energy, progress_.numerical_energy}, evaluated,
                      gaps.current ? &gaps.far : nullptr);
 }
 
@@ -77,11 +77,11 @@ void Output::look_inside(const Look& look) {
 }
 
 void Output::keep_step() {
-    if (options_.record.dense) look_inside([&] { dense_.step(progress_.moved_energy); });
+    if (options_.record.dense) look_inside([&] { dense_.step(progress_.numerical_energy); });
 }
 
 void Output::keep_time_step(double from, const VecX& y_from) {
-    if (options_.record.dense) dense_.straight(from, y_from, progress_.t, progress_.y, progress_.moved_energy);
+    if (options_.record.dense) dense_.straight(from, y_from, progress_.t, progress_.y, progress_.numerical_energy);
 }
 
 void Output::emit_between(double at) {

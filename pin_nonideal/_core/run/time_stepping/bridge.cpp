@@ -37,8 +37,8 @@ TimeStepping::TimeStepping(System& system, Progress& progress, GapWatch& watch, 
                            Recording& out)
     : p(system.p), w(system.w), system_(system), progress_(progress), options_(options), torques_(torques),
       output_(output), notices_(notices), value_events_(value_events), out_(out), moreau_(system),
-      moreau_contacts_(system, watch), lasts_(!may_differ(system.p, options)),
-      asked_always_(asks_always(system.p, options)) {}
+      moreau_contacts_(system, watch), is_autonomous_(!may_differ(system.p, options)),
+      always_evaluated_(asks_always(system.p, options)) {}
 
 // End of a step of this size: at a stop, a jump of the actuation or a due sample before it. Times that differ by rounding
 // are one end, the last of them.
@@ -61,13 +61,13 @@ double TimeStepping::end_of_step(double size, double stop, double t_end) const {
 
 // Check if nothing moves and the sticking elements leave no freedom.
 bool TimeStepping::rests() const {
-    return lasts_ && (system_.velocity(progress_.y).array() == 0.0).all() && is_immobile(p, w);
+    return is_autonomous_ && (system_.velocity(progress_.y).array() == 0.0).all() && is_immobile(p, w);
 }
 
 // Check if accelerations and forces are needed at the step's end: by a sample, by the end of the run, or by slip. Slip
 // needs them if its direction or limit depends on them.
 bool TimeStepping::asks_for_motion(double end, double t_end) const {
-    if (asked_always_ || end >= t_end || end >= options_.end() || output_.next() <= end + rounding_)
+    if (always_evaluated_ || end >= t_end || end >= options_.end() || output_.next() <= end + rounding_)
         return true;
     return system_.ng == 0 && std::any_of(w.now.slipping.begin(), w.now.slipping.end(), [&](int e) {
         return p.frictions[e].dim > 1 || p.frictions[e].reaction != Reaction::none;
@@ -79,35 +79,36 @@ void TimeStepping::take_part(double end, double t_end, double least) {
     double& t = progress_.t;
     const double left = end - t, h = std::max(moreau_contacts_.allowed(t, left, progress_.y), least);
     const bool whole = h >= (1.0 - min_remainder) * left;
-    moreau_contacts_.step(t, whole ? left : h, progress_.y, progress_.moved_energy, progress_.impact_energy);
+    moreau_contacts_.step(t, whole ? left : h, progress_.y, progress_.numerical_energy, progress_.impact_energy);
     t = whole ? end : t + h;
-    const MoreauContacts::Relaxed& relaxed = moreau_contacts_.relaxed();
-    if (relaxed.block >= 0 && !relaxes_) {
+    const MoreauContacts::LawMiss& relaxed = moreau_contacts_.law_miss();
+    if (relaxed.block >= 0 && !misses_laws_) {
         out_.events.push_back({t, Event::Kind::relaxed, relaxed.block});
         out_.events.back().miss = relaxed.miss;
     }
-    relaxes_ = relaxed.block >= 0;
-    const bool asks = progress_.evaluated = whole && asks_for_motion(end, t_end);
-    if (moreau_contacts_.project(t, progress_.y, progress_.moved_energy)) {
+    misses_laws_ = relaxed.block >= 0;
+    const bool asks = progress_.has_forces = whole && asks_for_motion(end, t_end);
+    if (moreau_contacts_.project(t, progress_.y, progress_.numerical_energy)) {
         if (asks) system_.evaluate_step_end(t, progress_.y, progress_.rate, true);
         return;
     }
     system_.settle(t, progress_.y, progress_.rate, asks, true);
-    progress_.moved_energy += system_.moved_energy;
+    progress_.numerical_energy += system_.numerical_energy;
 }
 
 // A step that starts and ends at rest with the same contacts and modes leaves the state unchanged.
 void TimeStepping::take_with_contacts(double end, double t_end) {
     const double least = least_cut * (end - progress_.t);
-    const bool may_stand = lasts_ && (system_.velocity(progress_.y).array() == 0.0).all();
+    const bool may_stand = is_autonomous_ && (system_.velocity(progress_.y).array() == 0.0).all();
     if (may_stand) {
         y_from_ = progress_.y;
         before_step_ = w.state.mode;
         closed_before_step_ = w.state.closed;
     }
     while (progress_.t < end) take_part(end, t_end, least);
-    progress_.stands = may_stand && !relaxes_ && progress_.y == y_from_ && same_bytes<Mode>(before_step_, w.state.mode) &&
-              same_bytes(closed_before_step_, w.state.closed);
+    progress_.is_stationary = may_stand && !misses_laws_ && progress_.y == y_from_ &&
+                              same_bytes<Mode>(before_step_, w.state.mode) &&
+                              same_bytes(closed_before_step_, w.state.closed);
 }
 
 void TimeStepping::take(double end, double t_end) {
@@ -120,26 +121,26 @@ void TimeStepping::take(double end, double t_end) {
         y_from = y;
         before = w.state.mode;
     }
-    const double moved_from = progress_.moved_energy;
-    moreau_.step(t, end - t, y, progress_.moved_energy);
+    const double energy_before = progress_.numerical_energy;
+    moreau_.step(t, end - t, y, progress_.numerical_energy);
     t = end;
     const bool held = rested && std::equal(before.begin(), before.end(), w.state.mode.begin());
     if (!held) {
         const bool bridges = options_.method.scheme != Method::Scheme::moreau;
         system_.settle(t, y, progress_.rate, asks_for_motion(end, t_end), bridges);
-        progress_.moved_energy += system_.moved_energy;
+        progress_.numerical_energy += system_.numerical_energy;
         return;
     }
     // Remove the rounding from a motion held at rest. Law states continue.
     y.head(system_.nq + system_.nv) = y_from.head(system_.nq + system_.nv);
     system_.work(y) = system_.work(y_from);
-    progress_.moved_energy = moved_from;
+    progress_.numerical_energy = energy_before;
     system_.read(y);
     system_.read_law_states(y);
     begin_step(p, w, t, system_.q, system_.v);
     system_.rate_of_evaluation(t, y, progress_.rate);
-    progress_.evaluated = true;
-    progress_.stands = y == y_from;
+    progress_.has_forces = true;
+    progress_.is_stationary = y == y_from;
 }
 
 // Elements at rest have the modes of the end of a first step. It solves its laws at far less cost than accelerations.
@@ -149,8 +150,8 @@ void TimeStepping::begin(double size) {
     set_closed(p, w, closed);
     moreau_contacts_.forget();
     VecX y = progress_.y;
-    double moved_energy = 0.0, impact_energy = 0.0;
-    moreau_contacts_.step(progress_.t, size, y, moved_energy, impact_energy);
+    double numerical_energy = 0.0, impact_energy = 0.0;
+    moreau_contacts_.step(progress_.t, size, y, numerical_energy, impact_energy);
     for (size_t i = 0; i < closed.size(); ++i) closed[i] = closed[i] && w.state.closed[i];
     const std::vector<Mode> modes = w.state.mode;
     set_closed(p, w, closed);
@@ -175,7 +176,7 @@ void TimeStepping::step(double size, double stop, double t_end) {
         open_before_ = !watched;
     }
     const VecX y_from = options_.record.dense ? y : VecX();
-    if (!progress_.stands || (!progress_.evaluated && asks_for_motion(end, t_end))) take(end, t_end);
+    if (!progress_.is_stationary || (!progress_.has_forces && asks_for_motion(end, t_end))) take(end, t_end);
     t = end;
     ++out_.steps;
     output_.configured_now();

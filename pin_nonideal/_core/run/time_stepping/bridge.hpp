@@ -40,10 +40,10 @@ private:
     Recording& out_;
     Moreau moreau_;
     MoreauContacts moreau_contacts_;
-    const bool lasts_;     // a state that a step leaves unchanged stays unchanged
-    bool relaxes_ = false;  // the last step missed the laws of contact
+    const bool is_autonomous_;  // a state that a step leaves unchanged stays unchanged
+    bool misses_laws_ = false;  // the last step missed the laws of contact
     double rounding_ = 0.0;  // difference of two times that are one end of a step
-    const bool asked_always_;  // accelerations are needed at every step's end
+    const bool always_evaluated_;  // accelerations are needed at every step's end
     VecX y_from_;
     Modes before_, before_step_;
     std::vector<char> closed_before_, closed_before_step_;

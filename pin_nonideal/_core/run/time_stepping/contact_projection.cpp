@@ -120,7 +120,7 @@ void ContactProjection::rest(const Program& p, Workspace& w, VecX& v) {
     for (size_t n = 0; n < least_.problem.nodes.size(); ++n) {
         const BlockNode& node = least_.problem.nodes[n];
         const double speed = v.segment(node.first, node.size).cwiseAbs().maxCoeff();
-        if (speed > 0.0 && speed <= immobile_speed && least_.is_held(static_cast<int>(n)))
+        if (speed > 0.0 && speed <= immobile_speed && least_.is_immobile(static_cast<int>(n)))
             v.segment(node.first, node.size).setZero();
     }
     hold_locked(p, w, v);

@@ -16,7 +16,7 @@ public:
     // rows hold, with a velocity of rounding, comes to rest. Return false, with q and v unchanged, if the trees cannot be
     // projected one by one.
     bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
-    double moved_energy() const { return moved_energy_; }  // energy that the last projection added, if `energy`
+    double numerical_energy() const { return moved_energy_; }  // energy that the last projection added, if `energy`
 
     bool energy = false;  // measure the energy
 

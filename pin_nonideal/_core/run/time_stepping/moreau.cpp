@@ -38,11 +38,11 @@ Moreau::Moreau(System& system)
       unloaded_(modes_), mean_(p), drives_(p), flight_(p, drives_), q_mid_(VecX::Zero(system.nq)),
       power_(VecX::Zero(system.nw)), limit_(system.ne, problem_.rows),
       force_limit_(limit_) {
-    problem_.alpha0 = alpha_ = near_ = VecX::Zero(problem_.rows);
+    problem_.alpha0 = alpha_ = initial_force_ = VecX::Zero(problem_.rows);
     for (int dim : problem_.dims) boxes_ = boxes_ && dim == 1;
 }
 
-void Moreau::step(double t, double h, VecX& y, double& moved_energy) {
+void Moreau::step(double t, double h, VecX& y, double& numerical_energy) {
     const Mechanism& m = p.mechanism;
     h_ = h;
     v0_ = system_.velocity(y);
@@ -59,8 +59,8 @@ void Moreau::step(double t, double h, VecX& y, double& moved_energy) {
     while (mean_.move()) sweep(middle, drives, p.has_user_rows);
     flight_.move(p, w, h, y.data(), v0_, mean_.value(), v1_);
     if (system_.energy) {
-        moved_energy += drives.energy(mean_.start(), mean_.finish());
-        book_work(y, moved_energy);
+        numerical_energy += drives.energy(mean_.start(), mean_.finish());
+        book_work(y, numerical_energy);
     }
     set_modes(p, w, modes_);
     if (system_.nz > 0) y.segment(system_.nq + system_.nv, system_.nz) += h * w.now.dz;
@@ -126,7 +126,7 @@ void Moreau::apply_forces() {
 // Update the limits to the loads of the motion in the workspace. Return their largest change.
 double Moreau::update_limits(double t) {
     double change = 0.0;
-    even_ = true;
+    symmetric_limits_ = true;
     for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e) {
         const Friction& friction = p.frictions[e];
         const SlipLimits load = load_limits(p, w, friction, t, w.now.terms.q, mean_.value());
@@ -136,7 +136,7 @@ double Moreau::update_limits(double t) {
         change = std::max({change, std::abs(limit.reach() - limit_[e]), std::abs(limit.middle() - limit_.middle[at])});
         limit_.size[e] = limit.reach();
         limit_.middle[at] = limit.middle();
-        even_ = even_ && limit.middle() == 0.0;
+        symmetric_limits_ = symmetric_limits_ && limit.middle() == 0.0;
     }
     return change;
 }
@@ -145,7 +145,7 @@ double Moreau::update_limits(double t) {
 void Moreau::solve_friction(double t) {
     int at = 0;  // warm start from forces of the last step, whose modes usually persist
     for (const Friction& friction : p.frictions)
-        for (int k = 0; k < friction.dim; ++k) near_[at++] = w.state.percussion[p.blocks[friction.block].row + k];
+        for (int k = 0; k < friction.dim; ++k) initial_force_[at++] = w.state.percussion[p.blocks[friction.block].row + k];
     force_.setZero(problem_.rows);
     double last_change = HUGE_VAL;
     for (int pass = 0; pass < max_load_passes; ++pass) {
@@ -156,10 +156,10 @@ void Moreau::solve_friction(double t) {
         const bool stalls = change > min_load_decrease * last_change && change <= stalled_load_tolerance * largest;
         last_change = change;
         if (pass > 0 && (change <= element_load_tolerance * largest || stalls || !p.needs_reactions)) return;
-        if (!even_) force_ = friction_program(problem_.W, problem_.alpha0, problem_.dims, limit_);
-        else if (problem_.rows > 0 && boxes_) box_.solve(problem_.W, problem_.alpha0, limit_.size, &near_, force_);
-        else force_ = friction_program(problem_.W, problem_.alpha0, problem_.dims, limit_.size, &near_);
-        near_ = force_;
+        if (!symmetric_limits_) force_ = friction_program(problem_.W, problem_.alpha0, problem_.dims, limit_);
+        else if (problem_.rows > 0 && boxes_) box_.solve(problem_.W, problem_.alpha0, limit_.size, &initial_force_, force_);
+        else force_ = friction_program(problem_.W, problem_.alpha0, problem_.dims, limit_.size, &initial_force_);
+        initial_force_ = force_;
         force_limit_ = limit_;
         if (pass + 1 == max_load_passes) throw Failure(Failure::Kind::not_converged, t, problem_.elements);
     }
@@ -181,16 +181,16 @@ void Moreau::end_velocity() {
         if (dim == 1) shifted_[0] -= force_limit_.middle[at];
         const double slip = alpha_.segment(at, dim).norm();
         const bool rests = h_ * slip <= still && slip <= rounding;
-        const bool held = shifted_.norm() < force_limit_[e] * (1.0 - box_force_rounding) || rests;
-        modes_[e] = held ? sticking : dim > 1 || alpha_[at] > 0.0 ? slip_plus : slip_minus;
+        const bool sticks = shifted_.norm() < force_limit_[e] * (1.0 - box_force_rounding) || rests;
+        modes_[e] = sticks ? sticking : dim > 1 || alpha_[at] > 0.0 ? slip_plus : slip_minus;
         const Block& block = p.blocks[p.frictions[e].block];
-        if (held && block.dof >= 0) v1_.segment(block.dof, block.total).setZero();
+        if (sticks && block.dof >= 0) v1_.segment(block.dof, block.total).setZero();
     }
 }
 
 // Add the work over the step, by the mean velocity. If a slip reverses inside the step, the friction that opposes its
 // end can do positive work on its mean velocity. This work is due to the scheme, not to friction.
-void Moreau::book_work(VecX& y, double& moved_energy) {
+void Moreau::book_work(VecX& y, double& numerical_energy) {
     w.now.lam = lam_free_;
     w.now.lam.noalias() += problem_.multipliers * force_;
     move_ = 0.5 * (mean_.start() + mean_.finish());
@@ -200,7 +200,7 @@ void Moreau::book_work(VecX& y, double& moved_energy) {
         double& power = power_[first_law_power + p.frictions[e].law];
         power += alpha_.segment(at, problem_.dims[e]).dot(force_.segment(at, problem_.dims[e]));
         if (!(power > 0.0)) continue;
-        moved_energy += h_ * power;
+        numerical_energy += h_ * power;
         power = 0.0;
     }
     system_.work(y) += h_ * power_;

@@ -25,9 +25,9 @@ class Moreau {
 public:
     explicit Moreau(System& system);
 
-    // Take one step of size h from y at t. The energy added by the scheme itself is added to moved_energy. The modes
+    // Take one step of size h from y at t. The energy added by the scheme itself is added to numerical_energy. The modes
     // are set for the step's end. The caller must project and evaluate the end.
-    void step(double t, double h, VecX& y, double& moved_energy);
+    void step(double t, double h, VecX& y, double& numerical_energy);
 
 private:
     void sweep(double t, JointDrives::Step& drives, bool anew);
@@ -38,7 +38,7 @@ private:
     void apply_forces();
     double update_limits(double t);
     void end_velocity();
-    void book_work(VecX& y, double& moved_energy);
+    void book_work(VecX& y, double& numerical_energy);
 
     System& system_;
     const Program& p;
@@ -51,12 +51,12 @@ private:
     JointDrives drives_;
     FreeFlight flight_;
     VecX q_mid_, v0_, v1_, move_, b_, a_free_, lam_free_;  // free: without friction of the elements
-    VecX a_friction_, alpha_, near_;
+    VecX a_friction_, alpha_, initial_force_;
     BoxProgram box_;
     bool boxes_ = true;  // every element has one direction
     VecX force_, power_;                  // forces and powers of the elements
     FrictionLimits limit_, force_limit_;  // current limits, and the limits for which the force was found
-    bool even_ = true;                    // all limits are equal forward and backward
+    bool symmetric_limits_ = true;  // all limits are equal forward and backward
     VecX shifted_;
 };
 

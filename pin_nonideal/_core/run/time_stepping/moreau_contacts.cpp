@@ -67,7 +67,7 @@ double MoreauContacts::allowed(double t, double h, const VecX& y) {
     return shortest;
 }
 
-void MoreauContacts::step(double t, double h, VecX& y, double& moved_energy, double& impact_energy) {
+void MoreauContacts::step(double t, double h, VecX& y, double& numerical_energy, double& impact_energy) {
     const Mechanism& m = p.mechanism;
     h_ = h;
     v0_ = system_.velocity(y);
@@ -75,14 +75,14 @@ void MoreauContacts::step(double t, double h, VecX& y, double& moved_energy, dou
     retract(m, y.data(), force_.data(), q_mid_.data());
     const double middle = t + 0.5 * h;
     const bool watched = system_.watches();
-    if (watched || marked_) {
+    if (watched || had_contacts_) {
         std::copy(w.state.mode.begin(), w.state.mode.end(), modes_.begin());
         was_closed_ = w.state.closed;
     }
-    marked_ |= watched;
-    relaxed_ = {};
-    if (watch_.gaps.current || q_looked_.size() == 0) {
-        q_looked_ = y.head(system_.nq);
+    had_contacts_ |= watched;
+    law_miss_ = {};
+    if (watch_.gaps.current || q_sampled_.size() == 0) {
+        q_sampled_ = y.head(system_.nq);
         watch_.begin_time_steps(width_rounding * scene_size(p, w));
     }
     t0_ = t;
@@ -97,11 +97,11 @@ void MoreauContacts::step(double t, double h, VecX& y, double& moved_energy, dou
     for (const StepRow& row : elements_.rows) flight_.touch(p.blocks[row.block]);
     flight_.move(p, w, h, y.data(), v0_, mean_.value(), v1_);
     if (system_.energy) {
-        moved_energy += drives.energy(mean_.start(), mean_.finish());
-        book_work(y, moved_energy, impact_energy);
+        numerical_energy += drives.energy(mean_.start(), mean_.finish());
+        book_work(y, numerical_energy, impact_energy);
     }
     select(closed_, modes_, elements_.rows.empty());
-    marked_ = watched || !elements_.rows.empty();
+    had_contacts_ = watched || !elements_.rows.empty();
     if (system_.nz > 0) y.segment(system_.nq + system_.nv, system_.nz) += h * w.now.dz;
     force_ = 0.5 * h * v1_;
     retract(m, q_mid_.data(), force_.data(), y.data());
@@ -109,14 +109,14 @@ void MoreauContacts::step(double t, double h, VecX& y, double& moved_energy, dou
     y.segment(system_.nq, system_.nv) = v1_;
 }
 
-bool MoreauContacts::project(double t, VecX& y, double& moved_energy) {
+bool MoreauContacts::project(double t, VecX& y, double& numerical_energy) {
     if (!separate_) return false;
     const bool rests = (v0_.array() == 0.0).all() && (v1_.array() == 0.0).all() && same_bytes(closed_, was_closed_);
     if (rests || (w.now.touching.empty() && w.now.loaded.empty())) return true;
     system_.read(y);
     if (!projection_.project(p, w, t, system_.q, system_.v)) return false;
     system_.write(y);
-    moved_energy += projection_.moved_energy();
+    numerical_energy += projection_.numerical_energy();
     return true;
 }
 
@@ -184,10 +184,10 @@ void MoreauContacts::solve_free(double t) {
 // Return the travel of each dof since the last sample of the gaps, including projections. It is at least that of the
 // velocity, because angles wrap around.
 const VecX& MoreauContacts::way_since_last() {
-    q_looked_ -= q_mid_;
-    ambient_to_tangent(p.mechanism, q_mid_.data(), q_looked_.data(), v1_.data());
+    q_sampled_ -= q_mid_;
+    ambient_to_tangent(p.mechanism, q_mid_.data(), q_sampled_.data(), v1_.data());
     force_ = v1_.cwiseAbs().cwiseMax(h_ * v0_.cwiseAbs());
-    q_looked_ = q_mid_;
+    q_sampled_ = q_mid_;
     return force_;
 }
 
@@ -284,7 +284,7 @@ bool MoreauContacts::solve_laws() {
     guess_ = f_.head(n);
     const double error = separate_ ? trees_.solve(elements_.cones, middle_, f_) : HUGE_VAL;
     bool solved = error <= most_miss;
-    const bool starts = v0_.cwiseAbs().maxCoeff() <= rest_speed && !(unheld_.size() > 0 && unheld_ == q0_);
+    const bool starts = v0_.cwiseAbs().maxCoeff() <= rest_speed && !(q_without_rest_.size() > 0 && q_without_rest_ == q0_);
     if (solved && !(starts && moves())) return true;
     responses_.find(p, w, elements_.rows);
     if (!solved) {
@@ -311,7 +311,7 @@ bool MoreauContacts::solve_laws() {
 void MoreauContacts::relax() {
     const BlockSolver::Miss& miss = trees_.miss();
     const StepElements::Part& part = elements_.parts[miss.element];
-    relaxed_ = {part.gap >= 0 ? p.gaps[part.gap].block : p.frictions[part.element].block, h_ * miss.velocity};
+    law_miss_ = {part.gap >= 0 ? p.gaps[part.gap].block : p.frictions[part.element].block, h_ * miss.velocity};
 }
 
 // Compute the rows under the forces f.
@@ -338,7 +338,7 @@ bool MoreauContacts::keep_rest(bool solved) {
                        cone_force_rounding * w1_.head(n).cwiseAbs().maxCoeff();
     if (solved && !moves) return false;
     const bool holds = solver_.hold(W, w1_.head(n), elements_.cones, f_.head(n));
-    if (!holds) unheld_ = q0_;  // the next sweeps and the step after the start need not ask again
+    if (!holds) q_without_rest_ = q0_;  // the next sweeps and the step after the start need not ask again
     return holds;
 }
 
@@ -367,8 +367,8 @@ void MoreauContacts::solve(double t) {
         ++w.counters.iterations;
     }
     if (n == 0) apply();
-    if (presses_ || n > 0) w.state.percussion.setZero();
-    presses_ = n > 0;
+    if (has_percussions_ || n > 0) w.state.percussion.setZero();
+    has_percussions_ = n > 0;
     for (int i = 0; i < n; ++i) w.state.percussion[p.blocks[elements_.rows[i].block].row + elements_.rows[i].k] = f_[i];
     if (n == 0) return;
     const ConeResiduals r = residuals();
@@ -394,7 +394,7 @@ void MoreauContacts::end_velocity() {
     const int n = static_cast<int>(elements_.rows.size());
     if (n > 0) measure_end();
     mean_.end(w.now.a, v1_);
-    if (marked_) {
+    if (had_contacts_) {
         std::fill(closed_.begin(), closed_.end(), char(0));
         std::fill(modes_.begin(), modes_.end(), unloaded);
     }
@@ -411,24 +411,24 @@ void MoreauContacts::end_velocity() {
         const double size = dim == 1 ? std::abs(f_[at + head] - part.middle) : f_.segment(at + head, dim).norm();
         const double slip = w1_.segment(at + head, dim).norm();
         const bool stops = slip <= most_stopped * fastest || slip * limit <= (limit - size) * fastest;
-        const bool held = (limit - size > clear && stops) || slip <= still;
+        const bool sticks = (limit - size > clear && stops) || slip <= still;
         const bool forward = dim > 1 || (dim > 0 && w1_[at + head] > 0.0);
-        modes_[part.element] = held && dim > 0 ? sticking : forward ? slip_plus : slip_minus;
+        modes_[part.element] = sticks && dim > 0 ? sticking : forward ? slip_plus : slip_minus;
         const Block& block = p.blocks[p.frictions[part.element].block];
-        if (held && block.dof >= 0) v1_.segment(block.dof, block.total).setZero();
+        if (sticks && block.dof >= 0) v1_.segment(block.dof, block.total).setZero();
     }
     if (separate_) trees_.keep_rest(h_, v0_, v1_);
     const auto rest = [&](int e) {  // elements held by the constraints stick
         if (modes_[e] == unloaded && (p.frictions[e].gap < 0 || closed_[p.frictions[e].gap])) modes_[e] = sticking;
     };
-    for (int e : elements_.alone()) rest(e);
+    for (int e : elements_.outside_contacts()) rest(e);
     for (int i : touching_)
         for (int e : p.gaps[i].elements) rest(e);
-    marked_ = true;
+    had_contacts_ = true;
 }
 
 // Add the work as Moreau::book_work does. The work of contacts along their normals belongs to impacts.
-void MoreauContacts::book_work(VecX& y, double& moved_energy, double& impact_energy) {
+void MoreauContacts::book_work(VecX& y, double& numerical_energy, double& impact_energy) {
     const auto& rows = elements_.rows;
     const auto& parts = elements_.parts;
     const auto& cones = elements_.cones;
@@ -449,7 +449,7 @@ void MoreauContacts::book_work(VecX& y, double& moved_energy, double& impact_ene
             else power += part;
         }
         if (parts[e].element < 0) continue;
-        if (power > 0.0) moved_energy += h_ * power;
+        if (power > 0.0) numerical_energy += h_ * power;
         else power_[first_law_power + p.frictions[parts[e].element].law] += power;
     }
     system_.work(y) += h_ * power_;

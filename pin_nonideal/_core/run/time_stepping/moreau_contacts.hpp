@@ -27,27 +27,27 @@ public:
 
     // Forget the gaps and the rest of earlier steps.
     void forget() {
-        q_looked_.resize(0);
-        unheld_.resize(0);
+        q_sampled_.resize(0);
+        q_without_rest_.resize(0);
     }
     // Return the longest step from y at t, up to h. Approaching edges and rims may penetrate by half of their rounding.
     // If they already penetrate, the middle of the step may reach half of the remaining rounding. Deeper edges and rims
     // have no defined normal, and may pass through each other.
     double allowed(double t, double h, const VecX& y);
     // Take one step of size h from y at t. The work of contacts along their normals is added to impact_energy. The
-    // energy added by the scheme itself is added to moved_energy. The modes are set for the step's end. The caller must
+    // energy added by the scheme itself is added to numerical_energy. The modes are set for the step's end. The caller must
     // project and evaluate the end.
-    void step(double t, double h, VecX& y, double& moved_energy, double& impact_energy);
+    void step(double t, double h, VecX& y, double& numerical_energy, double& impact_energy);
     // Project the end y of the last step, at t, tree by tree. Return false if constraints join the trees: the rows of
     // the scene must project it then.
-    bool project(double t, VecX& y, double& moved_energy);
+    bool project(double t, VecX& y, double& numerical_energy);
 
     // Contact whose laws the last step missed, as a block or -1, and the velocity by which it missed them [m/s].
-    struct Relaxed {
+    struct LawMiss {
         int block = -1;
         double miss = 0.0;
     };
-    const Relaxed& relaxed() const { return relaxed_; }
+    const LawMiss& law_miss() const { return law_miss_; }
 
 private:
     bool tells_way_out(int gap, double width) const { return width > -nearly_all * rounded_by_[gap]; }
@@ -70,12 +70,12 @@ private:
     void solve(double t);
     void apply();
     void end_velocity();
-    void book_work(VecX& y, double& moved_energy, double& impact_energy);
+    void book_work(VecX& y, double& numerical_energy, double& impact_energy);
 
     System& system_;
     const Program& p;
     Workspace& w;
-    Relaxed relaxed_;
+    LawMiss law_miss_;
     MeanVelocity mean_;
     JointDrives drives_;
     FreeFlight flight_;
@@ -88,9 +88,9 @@ private:
     std::vector<Mode> modes_, unloaded_;
     std::vector<double> rounded_by_;   // rounding of each gap
     bool rounded_ = false;             // a gap has rounding
-    bool marked_ = false;  // the last step had a closed contact or an active element
-    bool presses_ = true;  // percussions of the last step may be nonzero
-    VecX q_mid_, q_looked_, unheld_, v0_, v1_, a_free_, lam_free_, w0_, w1_, f_, power_;
+    bool had_contacts_ = false;  // the last step had a closed contact or an active element
+    bool has_percussions_ = true;  // percussions of the last step may be nonzero
+    VecX q_mid_, q_sampled_, q_without_rest_, v0_, v1_, a_free_, lam_free_, w0_, w1_, f_, power_;
     VecX offset_, middle_, guess_, relaxed_f_;
     SeparateTrees trees_;
     ContactProjection projection_;

@@ -24,7 +24,7 @@ constexpr double kept_limit = 0.9;
 
 StepElements::StepElements(const Program& p) {
     for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e)
-        if (p.frictions[e].gap < 0) alone_.push_back(e);
+        if (p.frictions[e].gap < 0) outside_contacts_.push_back(e);
     const int most = p.layout.rows;
     rows.reserve(most);
     parts.reserve(most);
@@ -54,7 +54,7 @@ void StepElements::gather(const Program& p, Workspace& w, const std::vector<int>
     rows.clear();
     parts.clear();
     cones.clear();
-    rubbing_ = alone_;
+    rubbing_ = outside_contacts_;
     for (int i : touching) {
         const Gap& gap = p.gaps[i];
         const int slides = gap.sliding < 0 ? 0 : static_cast<int>(p.blocks[p.frictions[gap.sliding].block].kept.size());

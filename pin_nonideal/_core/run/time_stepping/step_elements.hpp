@@ -49,14 +49,14 @@ public:
     // Write the middles of the limits into f. Boxes of the cone problem are centered at zero force.
     void middles(VecX& f) const;
     // Friction elements of no unilateral contact.
-    const std::vector<int>& alone() const { return alone_; }
+    const std::vector<int>& outside_contacts() const { return outside_contacts_; }
 
 private:
     SlipLimits limits(const Program& p, Workspace& w, double t, const MeanVelocity& mean, size_t e) const;
     double coefficient(const Program& p, const Workspace& w, const Part& part) const;
     void add(const Program& p, const Part& part, int block, int kept, const ConeElement& cone);
 
-    std::vector<int> alone_;
+    std::vector<int> outside_contacts_;
     std::vector<int> rubbing_;  // friction elements that take part, except the sliding of contacts
     double last_change_ = 0.0;  // of the limits between two passes
 };
