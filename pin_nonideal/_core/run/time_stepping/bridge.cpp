@@ -81,7 +81,7 @@ void TimeStepping::take_part(double end, double t_end, double least) {
     const bool whole = h >= (1.0 - min_remainder) * left;
     moreau_contacts_.step(t, whole ? left : h, progress_.y, progress_.numerical_energy, progress_.impact_energy);
     t = whole ? end : t + h;
-    const MoreauContacts::LawMiss& relaxed = moreau_contacts_.law_miss();
+    const StepForces::LawMiss& relaxed = moreau_contacts_.law_miss();
     if (relaxed.block >= 0 && !misses_laws_) {
         out_.events.push_back({t, Event::Kind::relaxed, relaxed.block});
         out_.events.back().miss = relaxed.miss;

@@ -20,30 +20,21 @@ namespace pn {
 
 namespace {
 
-constexpr double cone_force_rounding = 1e-9;  // distance of a force at its limit, relative to the limit
 constexpr double most_stopped = 1e-6;  // slip of an element that stops, relative to 1 + the largest velocity
 constexpr double width_rounding = 1e-12;  // uncertainty of a gap at rest, relative to the scene's size
-// Accepted residual relative to the velocities. A step of a turning body can have no exact solution if corners share
-// its load. Also the accepted error of a limit, relative to the forces. The statistics report both.
-constexpr double most_miss = 1e-7;
-// Largest error of the laws that a step may have, relative to an element's forces, if no forces meet them. An event
-// reports it.
-constexpr double most_relaxed = 1e-2;
 
 }  // namespace
 
 MoreauContacts::MoreauContacts(System& system, GapWatch& watch)
     : system_(system), p(system.p), w(system.w), mean_(p), drives_(p), flight_(p, drives_), watch_(watch),
-      elements_(p), was_closed_(system.ng, 0), closed_(system.ng, 0), open_(system.ng, 0), modes_(system.ne, unloaded),
-      unloaded_(modes_), q_mid_(VecX::Zero(system.nq)), v0_(VecX::Zero(system.nv)), v1_(v0_), a_free_(v0_),
-      power_(VecX::Zero(system.nw)), trees_(system.p), projection_(system.p), responses_(system.p), force_(v0_) {
+      elements_(p), forces_(p, w, elements_), was_closed_(system.ng, 0), closed_(system.ng, 0), open_(system.ng, 0),
+      modes_(system.ne, unloaded), unloaded_(modes_), q_mid_(VecX::Zero(system.nq)), v0_(VecX::Zero(system.nv)), v1_(v0_),
+      a_free_(v0_), power_(VecX::Zero(system.nw)), projection_(system.p), force_(v0_) {
     projection_.energy = system.energy;
     if (system.ng == 0) return;
-    solver_.take_misses(most_miss);
     for (const Gap& gap : p.gaps) rounded_by_.push_back(rounded_by(p.blocks[gap.block].kind));
     rounded_ = std::any_of(rounded_by_.begin(), rounded_by_.end(), [](double r) { return r < HUGE_VAL; });
     lam_free_ = VecX::Zero(p.layout.rows);
-    w0_ = w1_ = f_ = offset_ = middle_ = lam_free_;
     touching_.reserve(system.ng);
 }
 
@@ -80,7 +71,7 @@ void MoreauContacts::step(double t, double h, VecX& y, double& numerical_energy,
         was_closed_ = w.state.closed;
     }
     had_contacts_ |= watched;
-    law_miss_ = {};
+    forces_.clear_miss();
     if (watch_.gaps.current || q_sampled_.size() == 0) {
         q_sampled_ = y.head(system_.nq);
         watch_.begin_time_steps(width_rounding * scene_size(p, w));
@@ -110,7 +101,7 @@ void MoreauContacts::step(double t, double h, VecX& y, double& numerical_energy,
 }
 
 bool MoreauContacts::project(double t, VecX& y, double& numerical_energy) {
-    if (!separate_) return false;
+    if (!forces_.is_separate()) return false;
     const bool rests = (v0_.array() == 0.0).all() && (v1_.array() == 0.0).all() && same_bytes(closed_, was_closed_);
     if (rests || (w.now.touching.empty() && w.now.loaded.empty())) return true;
     system_.read(y);
@@ -131,16 +122,7 @@ void MoreauContacts::sweep(double t, JointDrives::Step& drives, bool first) {
     } else {
         move_touching(t);
     }
-    measure_free();
-    if (first || p.has_user_rows) {
-        responses_.forget();
-        separate_ = !elements_.limits_follow_loads(p) &&
-                    trees_.pose(p, w, elements_.rows, elements_.cones, a_free_, offset_);
-    } else if (separate_) {
-        trees_.release(a_free_, offset_);
-    }
-    if (!separate_) responses_.find(p, w, elements_.rows);
-    recall_forces();
+    forces_.pose(mean_, h_, a_free_, first || p.has_user_rows);
     solve(t);
     end_velocity();
 }
@@ -220,35 +202,6 @@ void MoreauContacts::move_touching(double t) {
     elements_.move(p, w);
 }
 
-// Compute the velocities at the step's end without the forces, over h.
-void MoreauContacts::measure_free() {
-    const auto& rows = elements_.rows;
-    const auto& parts = elements_.parts;
-    const auto& cones = elements_.cones;
-    const int n = static_cast<int>(rows.size());
-    for (int i = 0; i < n; ++i) {
-        const Block& block = p.blocks[rows[i].block];
-        if (i == 0 || rows[i].block != rows[i - 1].block) mean_.start_rates(p, w, rows[i].block);
-        const double drift = w.now.values[rows[i].block].drift[block.kept[rows[i].k]];
-        offset_[i] = w.scratch.r[block.row + rows[i].k] / h_ + 0.5 * drift;
-    }
-    for (size_t e = 0, at = 0; e < parts.size(); at += cones[e].dim, ++e)
-        offset_[at] += parts[e].approach / h_;
-    for (int i = 0; i < n; ++i) {
-        const Block& block = p.blocks[rows[i].block];
-        if (i == 0 || rows[i].block != rows[i - 1].block) multiply(block, w.now.A, a_free_, w.scratch.r);
-        w0_[i] = offset_[i] + w.scratch.r[block.row + rows[i].k];
-    }
-}
-
-// Guess the forces of the last step.
-void MoreauContacts::recall_forces() {
-    for (size_t i = 0; i < elements_.rows.size(); ++i) {
-        const StepRow& row = elements_.rows[i];
-        f_[i] = w.state.percussion[p.blocks[row.block].row + row.k];
-    }
-}
-
 // Compute the motion under the forces f.
 void MoreauContacts::apply() {
     const auto& parts = elements_.parts;
@@ -257,101 +210,32 @@ void MoreauContacts::apply() {
     w.now.a = a_free_;
     w.now.renew();
     if (n == 0) return;
-    if (separate_) {
-        trees_.move(f_, w.now.a, w1_);
-    } else {
-        responses_.add_motion(p, w, f_, n, w.now.a);
-    }
+    forces_.add_motion(w.now.a);
     if (w.now.rows.blocks.empty()) w.now.lam.setZero();
     else {
         w.now.lam = lam_free_;
-        responses_.add_multipliers(f_, n, w.now.lam);
+        forces_.add_multipliers(w.now.lam);
     }
     for (size_t e = 0, at = 0; e < parts.size(); at += cones[e].dim, ++e) {
         const int head = parts[e].gap >= 0;
-        if (head) w.now.lam[p.blocks[p.gaps[parts[e].gap].block].row] = f_[at];
+        if (head) w.now.lam[p.blocks[p.gaps[parts[e].gap].block].row] = forces_.f[at];
         if (parts[e].element < 0) continue;
         Vec3& force = w.now.slip_force[parts[e].element];
         force = Vec3::Zero();
-        for (int k = head; k < cones[e].dim; ++k) force[k - head] = f_[at + k];
+        for (int k = head; k < cones[e].dim; ++k) force[k - head] = forces_.f[at + k];
     }
-}
-
-// Solve the laws tree by tree if possible, else with the responses of all rows.
-bool MoreauContacts::solve_laws() {
-    const int n = static_cast<int>(elements_.rows.size());
-    elements_.middles(middle_);
-    guess_ = f_.head(n);
-    const double error = separate_ ? trees_.solve(elements_.cones, middle_, f_) : HUGE_VAL;
-    bool solved = error <= most_miss;
-    const bool starts = v0_.cwiseAbs().maxCoeff() <= rest_speed && !(q_without_rest_.size() > 0 && q_without_rest_ == q0_);
-    if (solved && !(starts && moves())) return true;
-    responses_.find(p, w, elements_.rows);
-    if (!solved) {
-        relaxed_f_ = f_.head(n);
-        f_.head(n) = guess_;
-    }
-    const auto W = responses_.matrix(n);
-    f_.head(n) -= middle_.head(n);
-    w1_.head(n) = w0_.head(n);
-    w1_.head(n).noalias() += W * middle_.head(n);
-    solver_.search_briefly(error <= most_relaxed);
-    if (!solved) solved = solver_.solve(W, w1_.head(n), elements_.cones, true, f_.head(n), true) == ConeStatus::solved;
-    if (starts) solved = keep_rest(solved) || solved;
-    f_.head(n) += middle_.head(n);
-    if (!solved && error <= most_relaxed) {
-        f_.head(n) = relaxed_f_;
-        relax();
-        return true;
-    }
-    return solved;
-}
-
-// Accept the best forces found, although they miss the laws of contact.
-void MoreauContacts::relax() {
-    const BlockSolver::Miss& miss = trees_.miss();
-    const StepElements::Part& part = elements_.parts[miss.element];
-    law_miss_ = {part.gap >= 0 ? p.gaps[part.gap].block : p.frictions[part.element].block, h_ * miss.velocity};
-}
-
-// Compute the rows under the forces f.
-void MoreauContacts::measure_end() {
-    const int n = static_cast<int>(elements_.rows.size());
-    if (separate_) return trees_.move(f_, v1_, w1_);
-    w1_.head(n) = w0_.head(n);
-    w1_.head(n).noalias() += responses_.matrix(n) * f_.head(n);
-}
-
-bool MoreauContacts::moves() {
-    const int n = static_cast<int>(elements_.rows.size());
-    measure_end();
-    if (separate_) return !trees_.rests(v1_);
-    return w1_.head(n).cwiseAbs().maxCoeff() > cone_force_rounding * w0_.head(n).cwiseAbs().maxCoeff();
-}
-
-// Rest goes on if forces within all cones hold it. Returns whether they do, with these forces in place of others. The
-// rows without forces are in w1.
-bool MoreauContacts::keep_rest(bool solved) {
-    const int n = static_cast<int>(elements_.rows.size());
-    const auto W = responses_.matrix(n);
-    const bool moves = (w1_.head(n) + W * f_.head(n)).cwiseAbs().maxCoeff() >
-                       cone_force_rounding * w1_.head(n).cwiseAbs().maxCoeff();
-    if (solved && !moves) return false;
-    const bool holds = solver_.hold(W, w1_.head(n), elements_.cones, f_.head(n));
-    if (!holds) q_without_rest_ = q0_;  // the next sweeps and the step after the start need not ask again
-    return holds;
 }
 
 // Elements at rest can share loads in many ways, so that limits which follow the loads need not converge. Solve the step
 // with a part of these limits. Return true if all elements rest and their forces are within the limits that follow.
 bool MoreauContacts::rest_within_limits(double t) {
     elements_.reduce_limits();
-    if (!solve_laws()) return false;
+    if (!forces_.solve(h_, q0_, v0_)) return false;
     apply();
-    measure_end();
-    const int n = static_cast<int>(elements_.rows.size());
-    const bool stops = h_ * w1_.head(n).cwiseAbs().maxCoeff() <= most_stopped * (1.0 + v0_.cwiseAbs().maxCoeff());
-    return stops && elements_.limits_hold(p, w, t, mean_, f_);
+    forces_.measure_end();
+    const auto end = forces_.end_rows.head(static_cast<Eigen::Index>(elements_.rows.size()));
+    const bool stops = h_ * end.cwiseAbs().maxCoeff() <= most_stopped * (1.0 + v0_.cwiseAbs().maxCoeff());
+    return stops && elements_.limits_hold(p, w, t, mean_, forces_.f);
 }
 
 void MoreauContacts::solve(double t) {
@@ -360,30 +244,24 @@ void MoreauContacts::solve(double t) {
     elements_.begin_passes();
     for (int pass = 0; n > 0; ++pass) {
         if (loads || pass > 0) apply();
-        const double allowed = most_miss * f_.head(n).cwiseAbs().maxCoeff();
+        const double allowed = most_miss * forces_.f.head(n).cwiseAbs().maxCoeff();
         if (elements_.limits_settle(p, w, t, mean_, allowed) && pass > 0) break;
         if (pass == max_load_passes && rest_within_limits(t)) break;
-        if (pass == max_load_passes || !solve_laws()) throw Failure(Failure::Kind::not_converged, t);
+        if (pass == max_load_passes || !forces_.solve(h_, q0_, v0_)) throw Failure(Failure::Kind::not_converged, t);
         ++w.counters.iterations;
     }
     if (n == 0) apply();
     if (has_percussions_ || n > 0) w.state.percussion.setZero();
     has_percussions_ = n > 0;
-    for (int i = 0; i < n; ++i) w.state.percussion[p.blocks[elements_.rows[i].block].row + elements_.rows[i].k] = f_[i];
+    for (int i = 0; i < n; ++i) {
+        const StepRow& row = elements_.rows[i];
+        w.state.percussion[p.blocks[row.block].row + row.k] = forces_.f[i];
+    }
     if (n == 0) return;
-    const ConeResiduals r = residuals();
+    const ConeResiduals r = forces_.residuals();
     w.counters.signorini = std::max(w.counters.signorini, r.signorini);
     w.counters.coulomb = std::max(w.counters.coulomb, r.coulomb);
     w.counters.dissipation = std::max(w.counters.dissipation, r.dissipation);
-}
-
-ConeResiduals MoreauContacts::residuals() {
-    const int n = static_cast<int>(elements_.rows.size());
-    if (separate_) return trees_.residuals(middle_, f_);
-    const auto W = responses_.matrix(n);
-    w1_.head(n) = w0_.head(n);
-    w1_.head(n).noalias() += W * middle_.head(n);
-    return ConeComplementarity::residuals(W, w1_.head(n), elements_.cones, f_.head(n) - middle_.head(n));
 }
 
 // Compute the velocity, the closed contacts and the modes at the step's end. An element sticks if its force stays below
@@ -392,7 +270,9 @@ void MoreauContacts::end_velocity() {
     const auto& parts = elements_.parts;
     const auto& cones = elements_.cones;
     const int n = static_cast<int>(elements_.rows.size());
-    if (n > 0) measure_end();
+    const VecX& f = forces_.f;
+    VecX& end = forces_.end_rows;
+    if (n > 0) forces_.measure_end();
     mean_.end(w.now.a, v1_);
     if (had_contacts_) {
         std::fill(closed_.begin(), closed_.end(), char(0));
@@ -400,24 +280,24 @@ void MoreauContacts::end_velocity() {
     }
     if (n == 0) return;
     const double still = rest_rate(v1_), fastest = 1.0 + v1_.cwiseAbs().maxCoeff();
-    const double clear = cone_force_rounding * f_.head(n).cwiseAbs().maxCoeff();
-    w1_.head(n) *= h_;
+    const double clear = cone_force_rounding * f.head(n).cwiseAbs().maxCoeff();
+    end.head(n) *= h_;
     for (size_t e = 0, at = 0; e < parts.size(); at += cones[e].dim, ++e) {
         const StepElements::Part& part = parts[e];
         const int head = part.gap >= 0, dim = cones[e].dim - head;
-        if (head) closed_[part.gap] = w1_[at] - part.approach <= still;
+        if (head) closed_[part.gap] = end[at] - part.approach <= still;
         if (part.element < 0 || (head && !closed_[part.gap])) continue;
-        const double limit = cones[e].bound * (head ? f_[at] : 1.0);
-        const double size = dim == 1 ? std::abs(f_[at + head] - part.middle) : f_.segment(at + head, dim).norm();
-        const double slip = w1_.segment(at + head, dim).norm();
+        const double limit = cones[e].bound * (head ? f[at] : 1.0);
+        const double size = dim == 1 ? std::abs(f[at + head] - part.middle) : f.segment(at + head, dim).norm();
+        const double slip = end.segment(at + head, dim).norm();
         const bool stops = slip <= most_stopped * fastest || slip * limit <= (limit - size) * fastest;
         const bool sticks = (limit - size > clear && stops) || slip <= still;
-        const bool forward = dim > 1 || (dim > 0 && w1_[at + head] > 0.0);
+        const bool forward = dim > 1 || (dim > 0 && end[at + head] > 0.0);
         modes_[part.element] = sticks && dim > 0 ? sticking : forward ? slip_plus : slip_minus;
         const Block& block = p.blocks[p.frictions[part.element].block];
         if (sticks && block.dof >= 0) v1_.segment(block.dof, block.total).setZero();
     }
-    if (separate_) trees_.keep_rest(h_, v0_, v1_);
+    forces_.stop_resting_trees(h_, v0_, v1_);
     const auto rest = [&](int e) {  // elements held by the constraints stick
         if (modes_[e] == unloaded && (p.frictions[e].gap < 0 || closed_[p.frictions[e].gap])) modes_[e] = sticking;
     };
@@ -432,10 +312,9 @@ void MoreauContacts::book_work(VecX& y, double& numerical_energy, double& impact
     const auto& rows = elements_.rows;
     const auto& parts = elements_.parts;
     const auto& cones = elements_.cones;
-    const int n = static_cast<int>(rows.size());
     if (!w.now.rows.blocks.empty()) {
         w.now.lam = lam_free_;
-        responses_.add_multipliers(f_, n, w.now.lam);
+        forces_.add_multipliers(w.now.lam);
     }
     force_ = 0.5 * (mean_.start() + mean_.finish());
     powers(p, w, force_, power_.data());
@@ -444,7 +323,7 @@ void MoreauContacts::book_work(VecX& y, double& numerical_energy, double& impact
         for (int k = 0; k < cones[e].dim; ++k) {
             const StepRow& row = rows[at + k];
             multiply(p.blocks[row.block], w.now.A, force_, w.scratch.r);
-            const double part = w.scratch.r[p.blocks[row.block].row + row.k] * f_[at + k];
+            const double part = w.scratch.r[p.blocks[row.block].row + row.k] * forces_.f[at + k];
             if (k == 0 && parts[e].gap >= 0) impact_energy += h_ * part;
             else power += part;
         }

@@ -6,15 +6,12 @@
 
 #include <vector>
 
-#include "complementarity/cone/solver.hpp"
 #include "run/events/gap_watch.hpp"
 #include "run/time_stepping/contact_projection.hpp"
 #include "run/time_stepping/free_flight.hpp"
 #include "run/time_stepping/joint_drives.hpp"
 #include "run/time_stepping/mean_velocity.hpp"
-#include "run/time_stepping/separate_trees.hpp"
-#include "run/time_stepping/step_elements.hpp"
-#include "run/time_stepping/step_responses.hpp"
+#include "run/time_stepping/step_forces.hpp"
 
 namespace pn {
 
@@ -28,7 +25,7 @@ public:
     // Forget the gaps and the rest of earlier steps.
     void forget() {
         q_sampled_.resize(0);
-        q_without_rest_.resize(0);
+        forces_.forget();
     }
     // Return the longest step from y at t, up to h. Approaching edges and rims may penetrate by half of their rounding.
     // If they already penetrate, the middle of the step may reach half of the remaining rounding. Deeper edges and rims
@@ -42,12 +39,8 @@ public:
     // the scene must project it then.
     bool project(double t, VecX& y, double& numerical_energy);
 
-    // Contact whose laws the last step missed, as a block or -1, and the velocity by which it missed them [m/s].
-    struct LawMiss {
-        int block = -1;
-        double miss = 0.0;
-    };
-    const LawMiss& law_miss() const { return law_miss_; }
+    // Contact whose laws the last step missed.
+    const StepForces::LawMiss& law_miss() const { return forces_.law_miss(); }
 
 private:
     bool tells_way_out(int gap, double width) const { return width > -nearly_all * rounded_by_[gap]; }
@@ -58,14 +51,6 @@ private:
     const VecX& way_since_last();
     void find_touching(double t);
     void move_touching(double t);
-    void measure_free();
-    void recall_forces();
-    bool solve_laws();
-    void relax();
-    void measure_end();
-    bool moves();
-    bool keep_rest(bool solved);
-    ConeResiduals residuals();
     bool rest_within_limits(double t);
     void solve(double t);
     void apply();
@@ -75,7 +60,6 @@ private:
     System& system_;
     const Program& p;
     Workspace& w;
-    LawMiss law_miss_;
     MeanVelocity mean_;
     JointDrives drives_;
     FreeFlight flight_;
@@ -84,20 +68,16 @@ private:
     GapWatch& watch_;
     std::vector<int> touching_;  // gaps that take part
     StepElements elements_;
+    StepForces forces_;
     std::vector<char> was_closed_, closed_, open_;
     std::vector<Mode> modes_, unloaded_;
     std::vector<double> rounded_by_;   // rounding of each gap
     bool rounded_ = false;             // a gap has rounding
     bool had_contacts_ = false;  // the last step had a closed contact or an active element
     bool has_percussions_ = true;  // percussions of the last step may be nonzero
-    VecX q_mid_, q_sampled_, q_without_rest_, v0_, v1_, a_free_, lam_free_, w0_, w1_, f_, power_;
-    VecX offset_, middle_, guess_, relaxed_f_;
-    SeparateTrees trees_;
+    VecX q_mid_, q_sampled_, v0_, v1_, a_free_, lam_free_, power_;
     ContactProjection projection_;
-    bool separate_ = false;  // solved tree by tree
-    StepResponses responses_;
     VecX b_, force_;
-    ConeComplementarity solver_;
 };
 
 }  // namespace pn

@@ -1,0 +1,146 @@
+#include "run/time_stepping/step_forces.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "math/tolerances.hpp"
+
+namespace pn {
+
+namespace {
+
+// Largest error of the laws that a step may have, relative to an element's forces, if no forces meet them. An event
+// reports it.
+constexpr double most_relaxed = 1e-2;
+
+}  // namespace
+
+StepForces::StepForces(const Program& program, Workspace& workspace, const StepElements& elements)
+    : f(VecX::Zero(program.layout.rows)), end_rows(f), p(program), w(workspace), elements_(elements), trees_(program),
+      responses_(program), free_rows_(f), offset_(f), middle_(f), a_(VecX::Zero(program.mechanism.nv)) {
+    solver_.take_misses(most_miss);
+}
+
+void StepForces::pose(const MeanVelocity& mean, double h, const VecX& a_free, bool anew) {
+    measure_free(mean, h, a_free);
+    if (anew) {
+        responses_.forget();
+        separate_ = !elements_.limits_follow_loads(p) &&
+                    trees_.pose(p, w, elements_.rows, elements_.cones, a_free, offset_);
+    } else if (separate_) {
+        trees_.release(a_free, offset_);
+    }
+    if (!separate_) responses_.find(p, w, elements_.rows);
+    recall_forces();
+}
+
+void StepForces::add_motion(VecX& a) {
+    if (separate_) trees_.move(f, a, end_rows);
+    else responses_.add_motion(p, w, f, static_cast<int>(elements_.rows.size()), a);
+}
+
+void StepForces::add_multipliers(VecX& lam) const {
+    responses_.add_multipliers(f, static_cast<int>(elements_.rows.size()), lam);
+}
+
+// Compute the velocities at the step's end without the forces, over h.
+void StepForces::measure_free(const MeanVelocity& mean, double h, const VecX& a_free) {
+    const auto& rows = elements_.rows;
+    const auto& parts = elements_.parts;
+    const auto& cones = elements_.cones;
+    const int n = static_cast<int>(rows.size());
+    for (int i = 0; i < n; ++i) {
+        const Block& block = p.blocks[rows[i].block];
+        if (i == 0 || rows[i].block != rows[i - 1].block) mean.start_rates(p, w, rows[i].block);
+        const double drift = w.now.values[rows[i].block].drift[block.kept[rows[i].k]];
+        offset_[i] = w.scratch.r[block.row + rows[i].k] / h + 0.5 * drift;
+    }
+    for (size_t e = 0, at = 0; e < parts.size(); at += cones[e].dim, ++e)
+        offset_[at] += parts[e].approach / h;
+    for (int i = 0; i < n; ++i) {
+        const Block& block = p.blocks[rows[i].block];
+        if (i == 0 || rows[i].block != rows[i - 1].block) multiply(block, w.now.A, a_free, w.scratch.r);
+        free_rows_[i] = offset_[i] + w.scratch.r[block.row + rows[i].k];
+    }
+}
+
+// Guess the forces of the last step.
+void StepForces::recall_forces() {
+    for (size_t i = 0; i < elements_.rows.size(); ++i) {
+        const StepRow& row = elements_.rows[i];
+        f[i] = w.state.percussion[p.blocks[row.block].row + row.k];
+    }
+}
+
+bool StepForces::solve(double h, const VecX& q0, const VecX& v0) {
+    const int n = static_cast<int>(elements_.rows.size());
+    elements_.middles(middle_);
+    guess_ = f.head(n);
+    const double error = separate_ ? trees_.solve(elements_.cones, middle_, f) : HUGE_VAL;
+    bool solved = error <= most_miss;
+    const bool starts = v0.cwiseAbs().maxCoeff() <= rest_speed && !(q_without_rest_.size() > 0 && q_without_rest_ == q0);
+    if (solved && !(starts && moves())) return true;
+    responses_.find(p, w, elements_.rows);
+    if (!solved) {
+        best_f_ = f.head(n);
+        f.head(n) = guess_;
+    }
+    const auto W = responses_.matrix(n);
+    f.head(n) -= middle_.head(n);
+    end_rows.head(n) = free_rows_.head(n);
+    end_rows.head(n).noalias() += W * middle_.head(n);
+    solver_.search_briefly(error <= most_relaxed);
+    if (!solved) solved = solver_.solve(W, end_rows.head(n), elements_.cones, true, f.head(n), true) == ConeStatus::solved;
+    if (starts) solved = keep_rest(solved, q0) || solved;
+    f.head(n) += middle_.head(n);
+    if (!solved && error <= most_relaxed) {
+        f.head(n) = best_f_;
+        relax(h);
+        return true;
+    }
+    return solved;
+}
+
+// Accept the best forces found, although they miss the laws of contact by the error of one element.
+void StepForces::relax(double h) {
+    const BlockSolver::Miss& miss = trees_.miss();
+    const StepElements::Part& part = elements_.parts[miss.element];
+    law_miss_ = {part.gap >= 0 ? p.gaps[part.gap].block : p.frictions[part.element].block, h * miss.velocity};
+}
+
+void StepForces::measure_end() {
+    const int n = static_cast<int>(elements_.rows.size());
+    if (separate_) return trees_.move(f, a_, end_rows);
+    end_rows.head(n) = free_rows_.head(n);
+    end_rows.head(n).noalias() += responses_.matrix(n) * f.head(n);
+}
+
+bool StepForces::moves() {
+    const int n = static_cast<int>(elements_.rows.size());
+    measure_end();
+    if (separate_) return !trees_.rests(a_);
+    return end_rows.head(n).cwiseAbs().maxCoeff() > cone_force_rounding * free_rows_.head(n).cwiseAbs().maxCoeff();
+}
+
+// Check if forces within all cones hold a rest, and set f to them then. The rows without forces are in end_rows.
+bool StepForces::keep_rest(bool solved, const VecX& q0) {
+    const int n = static_cast<int>(elements_.rows.size());
+    const auto W = responses_.matrix(n);
+    const bool moves = (end_rows.head(n) + W * f.head(n)).cwiseAbs().maxCoeff() >
+                       cone_force_rounding * end_rows.head(n).cwiseAbs().maxCoeff();
+    if (solved && !moves) return false;
+    const bool holds = solver_.hold(W, end_rows.head(n), elements_.cones, f.head(n));
+    if (!holds) q_without_rest_ = q0;  // the next sweeps and the step after the start need not ask again
+    return holds;
+}
+
+ConeResiduals StepForces::residuals() {
+    const int n = static_cast<int>(elements_.rows.size());
+    if (separate_) return trees_.residuals(middle_, f);
+    const auto W = responses_.matrix(n);
+    end_rows.head(n) = free_rows_.head(n);
+    end_rows.head(n).noalias() += W * middle_.head(n);
+    return ConeComplementarity::residuals(W, end_rows.head(n), elements_.cones, f.head(n) - middle_.head(n));
+}
+
+}  // namespace pn

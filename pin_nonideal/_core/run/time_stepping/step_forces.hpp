@@ -1,0 +1,75 @@
+// Forces of the contacts and the dry friction in one step of time stepping: the cone problem of its elements.
+//
+// Trees that no constraint joins are solved one by one. If this fails, or if constraints join the trees, the responses of
+// all rows are used.
+#pragma once
+
+#include "complementarity/cone/solver.hpp"
+#include "run/time_stepping/separate_trees.hpp"
+#include "run/time_stepping/step_elements.hpp"
+#include "run/time_stepping/step_responses.hpp"
+
+namespace pn {
+
+// Distance of a force at its limit, relative to the limit.
+constexpr double cone_force_rounding = 1e-9;
+// Accepted residual relative to the velocities. A step of a turning body can have no exact solution if corners share
+// its load. Also the accepted error of a limit, relative to the forces. The statistics report both.
+constexpr double most_miss = 1e-7;
+
+class StepForces {
+public:
+    VecX f;         // force of each row, the percussion over the step's length
+    VecX end_rows;  // rows at the step's end under the forces, over the step's length
+
+    StepForces(const Program& p, Workspace& w, const StepElements& elements);
+
+    // Forget the rest of earlier steps.
+    void forget() { q_without_rest_.resize(0); }
+    // Set up the problem of the elements for the acceleration `a_free` without the forces, over a step of length h. The
+    // forces of the last step are the guess. `anew`: the rows have changed.
+    void pose(const MeanVelocity& mean, double h, const VecX& a_free, bool anew);
+    // Solve the laws tree by tree if possible, else with the responses of all rows. The step starts at (q0, v0).
+    bool solve(double h, const VecX& q0, const VecX& v0);
+    // Compute the rows at the step's end under the forces.
+    void measure_end();
+    // Errors of the laws for the forces.
+    ConeResiduals residuals();
+
+    // Add the acceleration by the forces to a, which is the one without them, and the multipliers of the constraints.
+    void add_motion(VecX& a);
+    void add_multipliers(VecX& lam) const;
+    // Set the velocity v1 of trees that rest over the step to zero.
+    void stop_resting_trees(double h, const VecX& v0, VecX& v1) {
+        if (separate_) trees_.keep_rest(h, v0, v1);
+    }
+    // Check if the trees are solved one by one.
+    bool is_separate() const { return separate_; }
+
+    // Contact whose laws the last step missed, as a block or -1, and the velocity by which it missed them [m/s].
+    struct LawMiss {
+        int block = -1;
+        double miss = 0.0;
+    };
+    const LawMiss& law_miss() const { return law_miss_; }
+    void clear_miss() { law_miss_ = {}; }
+
+private:
+    void measure_free(const MeanVelocity& mean, double h, const VecX& a_free);
+    void recall_forces();
+    void relax(double h);
+    bool moves();
+    bool keep_rest(bool solved, const VecX& q0);
+
+    const Program& p;
+    Workspace& w;
+    const StepElements& elements_;
+    SeparateTrees trees_;
+    bool separate_ = false;
+    StepResponses responses_;
+    ConeComplementarity solver_;
+    LawMiss law_miss_;
+    VecX free_rows_, offset_, middle_, guess_, best_f_, q_without_rest_, a_;
+};
+
+}  // namespace pn
