@@ -5,6 +5,7 @@
 
 #include "contact/active_set.hpp"
 #include "contact/queries.hpp"
+#include "dynamics/friction_limit.hpp"
 #include "dynamics/reactions.hpp"
 #include "math/roots.hpp"
 #include "math/tolerances.hpp"
