@@ -1,6 +1,7 @@
 #include "friction/mode_question.hpp"
 
 #include "dynamics/evaluation.hpp"
+#include "dynamics/friction_limit.hpp"
 #include "math/tolerances.hpp"
 
 namespace pn {
