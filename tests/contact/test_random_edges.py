@@ -120,7 +120,7 @@ def deepest(scene: pn.Scene, shapes: pin.GeometryModel, run: pn.Trajectory) -> f
     return depth
 
 
-UNSOLVED = (173,)
+UNSOLVED = (114,)
 FEW = pytest.param(range(3, 9), id="6")  # without the upright cylinder of seed 2, with its many contacts
 
 
@@ -135,7 +135,7 @@ def test_bodies_leave_edges_by_the_laws(those: range) -> None:
 @pytest.mark.xfail(raises=pn.InconsistentConstraintsError, strict=True)
 @pytest.mark.parametrize("seed", UNSOLVED)
 def test_bodies_on_rows_that_nearly_depend(seed: int) -> None:
-    """Closed contacts on both sides of an edge seem to contradict each other by 1e-8 m/s^2."""
+    """Closed contacts on both sides of an edge seem to contradict each other by 5e-8 m/s^2."""
     check(seed)
 
 
