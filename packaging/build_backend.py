@@ -29,7 +29,7 @@ import scikit_build_core.build as backend  # noqa: E402
 
 ROOT = Path(__file__).resolve().parent.parent
 CORE = ROOT / "pin_nonideal" / "_core"
-PROCESSOR_SECONDS = 300.0  # processor time of a whole build, measured by `pin-nonideal bench build`
+PROCESSOR_SECONDS = 200.0  # processor time of a whole build, measured by `pin-nonideal bench build`
 
 get_requires_for_build_sdist = backend.get_requires_for_build_sdist
 get_requires_for_build_wheel = backend.get_requires_for_build_wheel
