@@ -161,15 +161,6 @@ ACTUATION = {
         "crank",
         lambda g: g.scene.replace(actuation=pn.SampledControl(lambda t, q, v: {}, 0.1, joints=["crank"])),
     ),
-    "linear table beside a controller": (
-        "Table",
-        lambda g: g.scene.replace(
-            actuation=[
-                pn.SampledControl(lambda t, q, v: {}, 0.1, joints=["crank_joint"]),
-                pn.Table([0.0, 1.0], {"rocker_joint": [0.0, 1.0]}),
-            ]
-        ),
-    ),
     "table between samples of a controller": (
         "times",
         lambda g: pn.simulate(
