@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .errors import InconsistentConstraintsError, InputError, NonFiniteError, SingularMassError
-from .html_tables import table
+from .html_tables import numbers, table
 from .validation import floats
 
 Array = NDArray[np.floating[Any]]
@@ -78,10 +78,8 @@ class Solution:
 
     def _repr_html_(self) -> str:
         keys = ("a", "F_ideal", "F_nonideal", "lam", "modes", "closed")
-        vectors: dict[str, NDArray[Any]] = {key: getattr(self, key) for key in keys}
-        rows: list[tuple[str, object]] = [
-            (name, np.array2string(x, precision=6, threshold=20)) for name, x in vectors.items() if x.size
-        ]
+        vectors: dict[str, NDArray[np.generic]] = {key: getattr(self, key) for key in keys}
+        rows: list[tuple[str, object]] = [(name, numbers(x)) for name, x in vectors.items() if x.size]
         return table("Solution", [*rows, ("rank", self.rank), ("unique", self.unique)])
 
 

@@ -1,9 +1,12 @@
-"""Small HTML tables that notebooks show for scenes, runs, solutions and sweeps."""
+"""Small HTML tables that notebooks show for scenes, runs, solutions, sweeps and states of rest."""
 
 from __future__ import annotations
 
 import html
 from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
 
 NAMES_MAX = 8  # names in a cell
 CELL_MAX = 400  # characters of a cell
@@ -36,6 +39,15 @@ def names(listed: Sequence[str]) -> str:
         return "none"
     more = ", ..." if len(listed) > NAMES_MAX else ""
     return f"{len(listed)}: {', '.join(listed[:NAMES_MAX])}{more}"
+
+
+def numbers(values: NDArray[np.generic]) -> str:
+    """Return an array with six digits for a cell, shortened beyond 20 numbers.
+
+    Args:
+        values: the numbers.
+    """
+    return np.array2string(values, precision=6, threshold=20)
 
 
 def _cell(tag: str, value: object) -> str:

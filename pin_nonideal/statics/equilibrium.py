@@ -9,6 +9,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from pin_nonideal.errors import EquilibriumError, InputError, LoopClosureError
+from pin_nonideal.html_tables import numbers, table
 from pin_nonideal.scene.scene import Scene
 from pin_nonideal.states.parsing import named_velocity
 from pin_nonideal.types import Array, Model, State
@@ -57,6 +58,16 @@ class Equilibrium:
     rates: NDArray[np.complex128]
     stable: bool | None
     starts: int
+
+    def _repr_html_(self) -> str:
+        arrays: dict[str, NDArray[np.generic]] = {
+            "q": self.q,
+            "lam": self.lam,
+            "rates [1/s^2]": np.real_if_close(self.rates),
+        }
+        rows: list[tuple[str, object]] = [(key, numbers(x)) for key, x in arrays.items() if x.size]
+        rows += [("largest unbalanced force", f"{self.left:.2g}"), ("stable", self.stable)]
+        return table("Equilibrium", [*rows, ("starts", self.starts)])
 
 
 def equilibrium(

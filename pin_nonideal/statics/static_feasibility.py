@@ -9,6 +9,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from pin_nonideal.errors import InputError
+from pin_nonideal.html_tables import NAMES_MAX, numbers, table
 from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.states.parsing import named_velocity
 from pin_nonideal.types import Array, Model, State, Table
@@ -53,6 +54,15 @@ class Rest:
         actuation.
         """
         return self._holding()
+
+    def _repr_html_(self) -> str:
+        shown = list(self.friction.items())[:NAMES_MAX]
+        rows: list[tuple[str, object]] = [("rests", self.rests), ("margin", f"{self.margin:.6g}")]
+        rows += [("reason", self.reason)] if self.reason else []
+        rows += [(f"friction of {name}", numbers(np.asarray(force))) for name, force in shown]
+        if len(self.friction) > len(shown):
+            rows.append(("friction", f"of {len(self.friction) - len(shown)} more elements"))
+        return table("Rest", [*rows, ("lam", numbers(self.lam))] if self.lam.size else rows)
 
     def __getstate__(self) -> Table:
         return {**vars(self), "holding": self.holding, "_holding": dict}

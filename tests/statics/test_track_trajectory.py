@@ -261,7 +261,7 @@ def test_sampled_torques_add_to_constant_torques_and_to_those_of_the_same_period
         pn.TrackTrajectory(TIMES, {"rod": BY_NAME["rod"]}, **GAINS, period=0.02),
         pn.HoldPosition({"rod": 1.0}, {"rod": 1.0}),
     ):
-        with pytest.raises(pn.InputError, match="torques that change at these samples"):
+        with pytest.raises(pn.InputError, match="add only to torques of tables and to torques that change"):
             pn.Scene(arm(), actuation=[shoulder, other])
 
 

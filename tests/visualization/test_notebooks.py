@@ -1,4 +1,4 @@
-"""A notebook shows figures as pictures, and scenes, runs, solutions and sweeps as small tables."""
+"""A notebook shows figures as pictures, and scenes, runs, solutions, sweeps and states of rest as tables."""
 
 from __future__ import annotations
 
@@ -53,7 +53,14 @@ def shown(tmp_path):
     run = pn.simulate(anchored, 0.01)
     parameters = [{"name": "four_bar"}, {"name": "five_bar"}]
     sweep = pn.sweep(swept, parameters, 0.01, jobs=1, store=tmp_path / "runs")
+    strong, weak = (
+        pn.load("four_bar").replace(laws=[pn.JointFriction("crank_joint", coulomb=limit, name=EVIL)])
+        for limit in (100.0, 1e-3)
+    )
     return {
+        "rest": (pn.rest(strong), ["True", "margin", "friction of", "lam"]),
+        "no rest": (pn.rest(weak, {"crank_joint": 0.5}), ["False", "reason", "times its limits"]),
+        "equilibrium": (pn.equilibrium(weak), ["q", "lam", "stable", "largest unbalanced force"]),
         "scene": (anchored, ["degrees of freedom", "crank_joint"]),
         "trajectory": (run, ["steps", "violation", "wall time"]),
         "solution": (anchored.solve(*anchored.initial_state()), ["rank", "F_ideal"]),
