@@ -15,8 +15,8 @@ from ..support.seeds import seeds
 PAD = (0.1, 0.2, 0.1)  # edges of a pad [m]
 # A gap of rounding turns a body that leaves a pad. This is its largest effect on the position [m].
 POSITION = 1e-7
-# Boxes whose upper corners pass the edges of the pads one after the other by rounding. Capsules whose contacts press
-# each other by rounding shortly before they leave the pads.
+# Boxes whose upper corners pass the edges of the pads one after the other by rounding. Capsules whose
+# contacts press each other by rounding shortly before they leave the pads.
 NARROW = (3, 11, 23)
 KINDS = ("box", "capsule", "ball")
 
