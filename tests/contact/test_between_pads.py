@@ -16,8 +16,9 @@ PAD = (0.1, 0.2, 0.1)  # edges of a pad [m]
 # A gap of rounding turns a body that leaves a pad. This is its largest effect on the position [m].
 POSITION = 1e-7
 # Boxes whose upper corners pass the edges of the pads one after the other by rounding. Capsules whose
-# contacts press each other by rounding shortly before they leave the pads.
-NARROW = (3, 11, 23)
+# contacts press each other by rounding shortly before they leave the pads. A box that slides through a step
+# of time stepping at the edges.
+NARROW = (3, 11, 23, 54)
 KINDS = ("box", "capsule", "ball")
 
 
@@ -35,7 +36,7 @@ def shape(draw: np.random.Generator, kind: str) -> tuple[coal.CollisionGeometry,
 
 @pytest.mark.parametrize("pads", [1, 2])
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("seed", seeds(range(40), always=NARROW, count=4))
+@pytest.mark.parametrize("seed", seeds([*range(40), 54], always=NARROW, count=4))
 def test_bodies_fall_freely_beside_pads_without_friction(seed: int, kind: str, pads: int) -> None:
     """The contacts have no load, so their edges change nothing."""
     draw = np.random.default_rng(seed)
@@ -56,7 +57,7 @@ def test_bodies_fall_freely_beside_pads_without_friction(seed: int, kind: str, p
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("seed", seeds(range(40), always=NARROW, count=4))
+@pytest.mark.parametrize("seed", seeds([*range(40), 54], always=NARROW, count=4))
 def test_bodies_slip_out_of_a_gripper(seed: int, kind: str) -> None:
     """Pads press with a force P; the body falls with g - 2 mu P / m until it reaches their edges."""
     draw, mu = np.random.default_rng(seed), 0.4
