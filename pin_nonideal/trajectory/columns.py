@@ -46,12 +46,29 @@ def columns(run: RunFields) -> dict[str, Array]:
 
 
 def acting_columns(run: RunFields) -> dict[str, Array]:
-    """Return the columns of a run without forces of laws in joints on which the laws do not act, (nt,) each.
+    """Return the columns of a run that may change, (nt,) each.
+
+    Forces of laws in joints on which the laws do not act are left out, and the columns of contacts that are
+    open at all samples: two boxes have 160 contacts.
 
     Args:
         run: trajectory of the run.
     """
-    return {name: values for name, (values, _) in _with_units(_all(run, acting=True)).items()}
+    left_out = open_contacts(run)
+    return {name: values for name, (values, _) in _with_units(_all(run, True, left_out)).items()}
+
+
+def open_contacts(run: RunFields) -> frozenset[str]:
+    """Return the names of the contacts that are open at all samples of a run.
+
+    Args:
+        run: trajectory of the run.
+    """
+    closed, scene = getattr(run, "closed", None), getattr(run, "scene", None)
+    if closed is None or scene is None:
+        return frozenset()
+    met = np.asarray(closed).any(axis=0)
+    return frozenset(name for name, meets in zip(scene.contact_names, met, strict=True) if not meets)
 
 
 def motion_columns(run: RunFields, fields: Collection[str]) -> dict[str, Array]:
@@ -108,16 +125,24 @@ def _with_units(entries: Iterator[tuple[str, Array, str]]) -> dict[str, tuple[Ar
     return table
 
 
-def _all(run: RunFields, acting: bool = False) -> Iterator[tuple[str, Array, str]]:
-    """Each column as its name, its values and its unit; forces of laws only where they act if `acting`."""
+def _all(
+    run: RunFields, acting: bool = False, left_out: Collection[str] = ()
+) -> Iterator[tuple[str, Array, str]]:
+    """Each column as its name, its values and its unit.
+
+    Args:
+        run: trajectory of the run.
+        acting: whether to leave out forces of laws in joints on which they do not act.
+        left_out: contacts without columns.
+    """
     yield "t", run.t, "s"
     yield from _joints(run)
     places = [(p.name, p.v_first, p.nv, [FORCE_OF.get(u, "") for u in _motion(p)[1]]) for p in run.joints]
-    for field, values, dofs in _by_dof(run):
+    for field, values, dofs in _by_dof(run, left_out):
         for joint, first, nv, forces in _among(places, dofs) if acting else places:
             part = _of_dofs(values, dofs, first, nv)
             yield from _numbered(f"{joint}.{field}", part[:, 0] if nv == 1 else part, forces)
-    yield from _others(run)
+    yield from _others(run, left_out)
 
 
 def _of_dofs(values: Array, dofs: Sequence[int], first: int, nv: int) -> Array:
@@ -156,14 +181,18 @@ def _joints(run: RunFields) -> Iterator[tuple[str, Array, str]]:
             yield from _numbered(f"{place.name}.{field}", getattr(record, field), per[field])
 
 
-def _others(run: RunFields) -> Iterator[tuple[str, Array, str]]:
+def _others(run: RunFields, left_out: Collection[str]) -> Iterator[tuple[str, Array, str]]:
     """Yield values of rows, elements, reactions and laws, energies, powers and violations."""
     for name, (first, end, _) in run.rows.items():
+        if name in left_out:
+            continue
         for field in ("lam", "lam_ideal"):
             multipliers = getattr(run, field)
             own = None if multipliers is None else multipliers[:, first:end]
             yield from _numbered(f"{name}.{field}", own, [EITHER_FORCE] * (end - first))
     for k, name in enumerate(run.element_names):
+        if left_out and run.law_names[run.element_laws[k]] in left_out:
+            continue
         for field, of_all, unit in (("mode", run.modes, "1"), ("limit", run.limits, EITHER_FORCE)):
             if of_all is not None:
                 yield f"{name}.{field}", cast("Array", of_all[:, k]), unit
@@ -185,13 +214,15 @@ def _motion(place: JointPlace) -> tuple[tuple[str, ...], tuple[str, ...]]:
     return (), ("",) * place.nv
 
 
-def _by_dof(run: RunFields) -> Iterator[tuple[str, Array, Sequence[int]]]:
+def _by_dof(run: RunFields, left_out: Collection[str]) -> Iterator[tuple[str, Array, Sequence[int]]]:
     """Yield the fields that have a column for each degree of freedom, with the dofs on which they act."""
     for field in ("F_ideal", "F_nonideal"):
         if getattr(run, field) is not None:
             yield field, getattr(run, field), range(run.v.shape[1])
     dofs = dict(zip(run.law_names, run.law_dofs, strict=True)) if run.law_forces else {}
     for name, part in (run.law_forces or {}).items():
+        if name in left_out:
+            continue
         order = np.argsort(dofs[name], kind="stable")
         yield f"C.{name}", part[:, order], np.asarray(dofs[name])[order].tolist()
 

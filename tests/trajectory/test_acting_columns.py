@@ -1,4 +1,4 @@
-"""Columns of forces of laws: all joints in `columns`, the joints on which a law acts in a replay."""
+"""Columns in `columns` and in a replay: joints on which a law acts, and contacts that close."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal.trajectory.columns import acting_columns
+from pin_nonideal.scene.scene import compiled_scene
+from pin_nonideal.states.rows import rows_at
+from pin_nonideal.trajectory.columns import acting_columns, column_name
 from pin_nonideal.visualization.page import mode_timeline
 from pin_nonideal.visualization.page.frames import sample
 from pin_nonideal.visualization.page.signal_list import signals_of
@@ -28,14 +30,14 @@ def pile():
     return pn.simulate(scene, 0.06, method="moreau", dt=2e-3, record="forces", output_dt=6e-3, progress=False)
 
 
-def test_columns_that_are_left_out_are_zero(pile):
+def test_columns_that_are_left_out_are_constant(pile):
     every, acting = pile.columns(), acting_columns(pile)
     assert list(acting) == [name for name in every if name in acting]
     for name, values in acting.items():
         np.testing.assert_array_equal(values, every[name])
     rest = [name for name in every if name not in acting]
     assert len(rest) > 1000
-    assert all(".C." in name and not every[name].any() for name in rest)
+    assert all((every[name] == every[name][0]).all() for name in rest)
     assert sum(".C." in name and values.any() for name, values in every.items()) > 10
 
 
@@ -54,11 +56,30 @@ def test_bodies_that_touch_are_drawn_on_the_cubics_of_the_run(pile):
     assert not motion.held.any()
 
 
+def test_contacts_that_close_keep_their_columns(pile):
+    acting, closed = acting_columns(pile), pile.closed.any(axis=0)
+    names = [column_name(name) for name in pile.scene.contact_names]
+    kept = {name for name in names if f"{name}.lam.0" in acting or f"{name}.lam" in acting}
+    assert kept == {name for name, meets in zip(names, closed, strict=True) if meets}
+    assert 0 < len(kept) < len(names) / 4
+
+
+def test_gaps_are_the_residuals_of_rows(pile):
+    runner = compiled_scene(pile.scene).program.runner()
+    t, gaps = mode_timeline.gaps_of(pile)
+    assert list(gaps) == list(pile.scene.contact_names)
+    for k in (0, len(t) // 2, len(t) - 1):
+        at = int(np.searchsorted(pile.t, t[k]))
+        residuals = rows_at(runner, pile.q[at], pile.v[at], float(t[k]))[2]
+        for name, values in gaps.items():
+            assert values[k] == residuals[pile.scene.constraint_slices[name].stop - 1]
+
+
 def test_gaps_of_many_contacts_have_fewer_samples(pile, monkeypatch):
     long = pn.simulate(pile.scene, 0.5, method="moreau", dt=2e-3, output_dt=2e-3, progress=False)
     t, gaps = mode_timeline.gaps_of(long)
     assert len(t) == len(long.t)
-    monkeypatch.setattr(mode_timeline, "MAX_GAP_NUMBERS", 1.0)
+    monkeypatch.setattr(mode_timeline, "MAX_GAP_VALUES", 1.0)
     fewer, some = mode_timeline.gaps_of(long)
     assert len(fewer) == mode_timeline.MIN_GAP_SAMPLES
     assert (fewer[0], fewer[-1]) == (t[0], t[-1])

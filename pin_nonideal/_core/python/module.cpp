@@ -10,6 +10,7 @@
 #include "python/callbacks.hpp"
 #include "python/cones.hpp"
 #include "python/constraints.hpp"
+#include "python/contact_geometry.hpp"
 #include "python/failures.hpp"
 #include "python/external_run.hpp"
 #include "python/program.hpp"
@@ -35,6 +36,7 @@ NB_MODULE(_core, m) {
     bind_stepped(m);
     bind_program(m);
     bind_cones(m);
+    bind_contact_geometry(m);
 
     // Friction program on arrays, for tests against enumeration.
     m.def("friction_program", [](const Array2& W, const Array& alpha0, const std::vector<int>& dims,

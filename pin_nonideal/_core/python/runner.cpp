@@ -144,16 +144,12 @@ int Runner::constraint_rank() const {
     return rank;
 }
 
-void Runner::place_rows(const Array& q_in, const Array& v_in, double t) {
+std::tuple<Numbers, Numbers, Numbers, Numbers> Runner::rows(const Array& q_in, const Array& v_in, double t) {
     set(q_in, v_in, {});
-    kinematics(p->mechanism, w->now.terms, q, v);
+    const Mechanism& m = p->mechanism;
+    kinematics(m, w->now.terms, q, v);
     evaluate_rows(*p, *w, t, v);
     for (int i = 0; i < static_cast<int>(p->gaps.size()); ++i) evaluate_gap(*p, *w, t, v, i);
-}
-
-std::tuple<Numbers, Numbers, Numbers, Numbers> Runner::rows(const Array& q_in, const Array& v_in, double t) {
-    place_rows(q_in, v_in, t);
-    const Mechanism& m = p->mechanism;
     const int nv = m.nv;
     std::vector<double> A(static_cast<size_t>(p->user_rows) * nv, 0.0), b(p->user_rows), phi = b, rate = b;
     for (int i = 0; i < p->constraints; ++i) {
@@ -212,17 +208,6 @@ Numbers Runner::slip_rows(const Array& q_in, const Array& v_in, double t) {
         }
     }
     return to_numpy(std::move(rows));
-}
-
-Numbers Runner::pressing_lines(const Array& q_in, const Array& v_in, double t) {
-    place_rows(q_in, v_in, t);
-    std::vector<double> lines;
-    for (int block : framed_contacts(*p)) {
-        const Wrench& unit = w->now.values[block].wrench[0];
-        for (const Vec3& part : {unit.point, unit.force})
-            for (int k = 0; k < 3; ++k) lines.push_back(part[k]);
-    }
-    return to_numpy(std::move(lines));
 }
 
 std::pair<Numbers, Numbers> Runner::terms(const Array& q_in, const Array& v_in) {
@@ -339,7 +324,6 @@ nb::class_<Runner> bind_runner(nb::module_& m) {
         .def("rows", &Runner::rows, "q"_a, "v"_a, "t"_a)
         .def("row_lengths", &Runner::row_lengths, "q"_a, "v"_a, "t"_a, "own"_a = false)
         .def("slip_rows", &Runner::slip_rows, "q"_a, "v"_a, "t"_a)
-        .def("pressing_lines", &Runner::pressing_lines, "q"_a, "v"_a, "t"_a)
         .def("terms", &Runner::terms, "q"_a, "v"_a)
         .def("energies", &Runner::energies, "q"_a, "v"_a)
         .def("project", &Runner::project, "q"_a, "v"_a, "t"_a, "far"_a)

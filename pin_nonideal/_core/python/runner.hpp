@@ -60,9 +60,6 @@ struct Runner {
     Numbers row_lengths(const Array& q_in, const Array& v_in, double t, bool own);
     // Return the slip directions of all friction elements as rows, whose rates are slip velocities.
     Numbers slip_rows(const Array& q_in, const Array& v_in, double t);
-    // Return six numbers in world axes for each contact between two frames. They are a point on the line of the normal
-    // force, and the normal along which the row pushes the body of frame 1.
-    Numbers pressing_lines(const Array& q_in, const Array& v_in, double t);
     // Return M (dense, by rows) and the bias forces.
     std::pair<Numbers, Numbers> terms(const Array& q_in, const Array& v_in);
     // Return the kinetic energy, and the potential energy in gravity [J].
@@ -82,8 +79,6 @@ private:
 
     // Set the state and the torques. Throw std::invalid_argument if they do not fit the model, which Python explains.
     void set(const Array& q_in, const Array& v_in, const std::optional<Array>& tau);
-    // Evaluate all rows of all constraints and contacts at one state.
-    void place_rows(const Array& q_in, const Array& v_in, double t);
     // Set the modes: the given ones, else by velocity, and at rest by the complementarity problem.
     void choose_modes(double t, const std::optional<std::vector<Mode>>& modes);
     void choose_contacts(double t, const std::optional<std::vector<Mode>>& modes);

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pin_nonideal.core_loader import core
 from pin_nonideal.scene.scene import compiled_scene
 from pin_nonideal.states.kinematics import frame_on_joint
 from pin_nonideal.types import Array
@@ -85,9 +86,10 @@ def _action_lines(run: Trajectory, motion: Motion, chosen: list[int]) -> Array:
     """Return a point on the line of action of each contact, and its normal, at each frame, (n, k, 6)."""
     if not chosen:
         return np.zeros((len(motion.times), 0, 6))
-    runner, still = compiled_scene(run.scene).program.runner(), np.zeros(run.scene.model.nv)
-    states = zip(motion.q, motion.times, strict=True)
-    return np.array([runner.pressing_lines(q, still, float(t)).reshape(-1, 6)[chosen] for q, t in states])
+    program = compiled_scene(run.scene).program
+    blocks = [program.framed_contacts[k] for k in chosen]
+    lines = core.action_lines(program, motion.q, motion.times, blocks)
+    return lines.reshape(len(motion.times), len(chosen), 6)
 
 
 def _contact_point(run: Trajectory, name: str, line: Array, closed: NDArray[np.bool_]) -> ContactPoint:

@@ -112,6 +112,8 @@ def _round_bodies(scene: Scene) -> list[Visual]:
         for frame, (start, end), radius in zip(
             (item.frame1, item.frame2), segments(item), (item.radius1, item.radius2), strict=True
         ):
+            if radius == 0.0:  # a corner or an edge
+                continue
             joint, place = frame_on_joint(scene.model, frame)
             way = end - start
             turn = (
@@ -125,10 +127,9 @@ def _round_bodies(scene: Scene) -> list[Visual]:
                 else Shape("ellipsoid", (radius,) * 3)
             )
             middle = place * pin.SE3(turn, (start + end) / 2.0)
-            if radius > 0.0:
-                bodies[frame, way.tobytes()] = Visual(
-                    f"{frame} round", joint, middle, shape, LINK_COLORS[joint % len(LINK_COLORS)]
-                )
+            bodies[frame, way.tobytes()] = Visual(
+                f"{frame} round", joint, middle, shape, LINK_COLORS[joint % len(LINK_COLORS)]
+            )
     return list(bodies.values())
 
 

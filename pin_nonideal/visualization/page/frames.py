@@ -61,6 +61,8 @@ class Motion:
 
     def of(self, values: Array) -> Array:
         """Return samples of the run at the frames, by linear interpolation; (nt, ...) gives (n, ...)."""
+        if not values.any():
+            return np.zeros((len(self.before), *values.shape[1:]), np.result_type(values, self.part))
         at_frames = values[self.before].astype(np.result_type(values, self.part), copy=False)
         inner = np.flatnonzero(self.part)
         if len(inner):

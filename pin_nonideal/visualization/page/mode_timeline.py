@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from pin_nonideal.core_loader import core
 from pin_nonideal.scene.scene import compiled_scene
-from pin_nonideal.states.rows import rows_at
 from pin_nonideal.types import Array
 
 from .style import CLOSED, OPEN
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
 # Maximum number of samples at which gaps are computed.
 MAX_GAP_SAMPLES = 5000
-# Maximum of numbers in the matrices A of all samples of the gaps, about half a second of work. Scenes of many
-# contacts have fewer samples, but at least `MIN_GAP_SAMPLES`.
-MAX_GAP_NUMBERS = 1e8
+# Maximum number of gaps at all samples, about half a second of work. Scenes of many contacts have fewer samples,
+# but at least `MIN_GAP_SAMPLES`.
+MAX_GAP_VALUES = 2e6
 MIN_GAP_SAMPLES = 100
 
 Bands = list[tuple[float, float, int]]
@@ -51,10 +51,12 @@ def bands_of(run: Trajectory) -> list[tuple[str, Bands]]:
     """
     named_bands: list[tuple[str, Bands]] = []
     if run.modes is not None:
-        met = np.any(np.asarray(run.modes) != OPEN, axis=0)
+        modes = np.asarray(run.modes)
+        met = np.any(modes != OPEN, axis=0)
         struck = {str(event.element) for event in run.events}
-        named = zip(run.element_names, mode_bands(run.t, run.modes), met, strict=True)
-        named_bands = [(name, bands) for name, bands, meets in named if meets or name in struck]
+        shown = [k for k, name in enumerate(run.element_names) if met[k] or name in struck]
+        bands = mode_bands(run.t, modes[:, shown])
+        named_bands = [(run.element_names[k], band) for k, band in zip(shown, bands, strict=True)]
     closed = getattr(run, "closed", None)
     if closed is None:
         return named_bands
@@ -82,11 +84,10 @@ def gaps_of(run: Trajectory) -> tuple[Array, dict[str, Array]]:
     Args:
         run: run of the replay.
     """
-    t = np.asarray(run.t)
-    each = max(1, compiled_scene(run.scene).program.rows * run.v.shape[1])
-    count = int(np.clip(MAX_GAP_NUMBERS / each, MIN_GAP_SAMPLES, MAX_GAP_SAMPLES))
+    t, names, compiled = np.asarray(run.t, dtype=float), run.scene.contact_names, compiled_scene(run.scene)
+    count = int(np.clip(MAX_GAP_VALUES / max(1, len(names)), MIN_GAP_SAMPLES, MAX_GAP_SAMPLES))
     chosen = np.unique(np.linspace(0, len(t) - 1, min(len(t), count)).astype(int))
-    runner = compiled_scene(run.scene).program.runner()
-    residuals = np.array([rows_at(runner, run.q[k], run.v[k], float(t[k]))[2] for k in chosen])
-    slices = run.scene.constraint_slices
-    return t[chosen], {name: residuals[:, slices[name].stop - 1] for name in run.scene.contact_names}
+    numbers = {name: block for block, name in enumerate(compiled.block_names)}
+    q = np.ascontiguousarray(run.q[chosen], dtype=float)
+    gaps = core.gap_values(compiled.program, q, t[chosen], [numbers[name] for name in names])
+    return t[chosen], dict(zip(names, gaps.T, strict=True))

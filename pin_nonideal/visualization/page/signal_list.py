@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pin_nonideal.trajectory.columns import acting_columns, column_name, motion_columns
+from pin_nonideal.trajectory.columns import acting_columns, column_name, motion_columns, open_contacts
 from pin_nonideal.types import Array
 
 from .coordinates import positions, velocities
@@ -69,7 +69,7 @@ def signals_of(run: Trajectory, finer: Trajectory) -> list[Signal]:
     """Return all scalars of a run that can be plotted, thinned with their extremes.
 
     Every column of `Trajectory.columns` is one of them, or the angle or rate that it holds is. Forces of laws
-    in joints on which they do not act are no signals.
+    in joints on which they do not act and columns of contacts that never close are no signals.
 
     Args:
         run: run of the replay.
@@ -116,11 +116,16 @@ def _labelled(run: Trajectory, finer: Trajectory) -> Iterator[_RecordedSignal]:
 
 def _loads(run: Trajectory) -> Iterator[_RecordedSignal]:
     """Return sizes of forces: multipliers of constraints, forces of contacts, loads of bearings."""
+    left_out = open_contacts(run)
     if run.lam is not None:
         for name, rows in run.scene.constraint_slices.items():
+            if name in left_out:
+                continue
             size = np.linalg.norm(run.lam[:, rows], axis=1)
             yield _RecordedSignal(f"{name}, |lam|", "N, N m", REACTIONS, "reaction load multipliers", size)
     for name, values in (run.contact_forces or {}).items() if has_open_contact(run) else ():
+        if name in left_out:
+            continue
         size = np.linalg.norm(values, axis=1)
         yield _RecordedSignal(f"{name}, force", "N", REACTIONS, "contact reaction load", size)
     for name, wrench in (getattr(run, "reactions", None) or {}).items():

@@ -1,0 +1,78 @@
+#include "python/contact_geometry.hpp"
+
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/vector.h>
+
+#include "dynamics/workspace.hpp"
+#include "python/arrays.hpp"
+
+using namespace nanobind::literals;
+
+namespace pn {
+
+namespace {
+
+// Check that blocks and states belong to the program.
+void check_states(const Program& p, const Array2& q, size_t times, const std::vector<int>& blocks) {
+    if (q.shape(1) != static_cast<size_t>(p.mechanism.nq) || q.shape(0) != times)
+        throw std::invalid_argument("the states do not fit the model");
+    for (const int block : blocks)
+        if (block < 0 || block >= static_cast<int>(p.blocks.size())) throw std::invalid_argument("no such block");
+}
+
+Table to_table(std::vector<double>&& values, size_t rows, size_t columns) {
+    auto* kept = new std::vector<double>(std::move(values));
+    kept->reserve(1);  // an empty array needs an address too
+    const nb::capsule owner(kept, [](void* data) noexcept { delete static_cast<std::vector<double>*>(data); });
+    return Table(kept->data(), {rows, columns}, owner);
+}
+
+// Place the bodies at each state and evaluate a part of each block, with `take(block, values)` after it.
+template <class Take>
+void evaluate_blocks(const Program& p, const Array2& q, const Array& t, const std::vector<int>& blocks, Part part,
+                     const Take& take) {
+    check_states(p, q, t.shape(0), blocks);
+    Workspace w(p);
+    const VecX at_rest = VecX::Zero(p.mechanism.nv);
+    for (size_t k = 0; k < t.shape(0); ++k) {
+        const VecX at = map(q).row(k);
+        kinematics(p.mechanism, w.now.terms, at, at_rest);
+        const State state{p.mechanism, w.now.terms, w.now.row_time(t(k)), w.now.terms.q, at_rest};
+        for (const int block : blocks) {
+            evaluate(p.blocks[block].kind, state, part, w.now.values[block]);
+            take(p.blocks[block], w.now.values[block]);
+        }
+    }
+}
+
+// Residual of the last row of each block at each state, (n, blocks). The last row of a contact is its gap [m, rad].
+Table gap_values(const Program& p, const Array2& q, const Array& t, const std::vector<int>& blocks) {
+    std::vector<double> gaps;
+    gaps.reserve(t.shape(0) * blocks.size());
+    evaluate_blocks(p, q, t, blocks, Part::residual, [&](const Block& block, const RowValues& values) {
+        gaps.push_back(values.residual[block.total - 1]);
+    });
+    return to_table(std::move(gaps), t.shape(0), blocks.size());
+}
+
+// Six numbers in world axes for each block between two frames at each state, (n, 6 blocks): a point on the line of the
+// normal force [m], and the normal along which the row pushes the body of frame 1.
+Table action_lines(const Program& p, const Array2& q, const Array& t, const std::vector<int>& blocks) {
+    std::vector<double> lines;
+    lines.reserve(t.shape(0) * blocks.size() * 6);
+    evaluate_blocks(p, q, t, blocks, Part::place, [&](const Block&, const RowValues& values) {
+        const Wrench& unit = values.wrench[0];
+        for (const Vec3& part : {unit.point, unit.force})
+            for (int k = 0; k < 3; ++k) lines.push_back(part[k]);
+    });
+    return to_table(std::move(lines), t.shape(0), 6 * blocks.size());
+}
+
+}  // namespace
+
+void bind_contact_geometry(nb::module_& m) {
+    m.def("gap_values", &gap_values, "program"_a, "q"_a, "t"_a, "blocks"_a);
+    m.def("action_lines", &action_lines, "program"_a, "q"_a, "t"_a, "blocks"_a);
+}
+
+}  // namespace pn
