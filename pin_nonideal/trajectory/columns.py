@@ -67,8 +67,8 @@ def open_contacts(run: RunFields) -> frozenset[str]:
     closed, scene = getattr(run, "closed", None), getattr(run, "scene", None)
     if closed is None or scene is None:
         return frozenset()
-    met = np.asarray(closed).any(axis=0)
-    return frozenset(name for name, meets in zip(scene.contact_names, met, strict=True) if not meets)
+    met = set(np.nonzero(closed)[1].tolist())
+    return frozenset(name for k, name in enumerate(scene.contact_names) if k not in met)
 
 
 def motion_columns(run: RunFields, fields: Collection[str]) -> dict[str, Array]:

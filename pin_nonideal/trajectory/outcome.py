@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from typing import Any
 
@@ -98,8 +99,9 @@ def _of_laws(scene: Scene, outcome: core.Outcome) -> Table:
     """Return the forces of the laws on the degrees of freedom of each law, and the limits of the elements."""
     program, nt = compiled_scene(scene).program, len(outcome.t)
     supports = program.law_supports
-    ends = np.cumsum([len(dofs) for dofs in supports])
-    parts = np.split(outcome.law_forces.reshape(nt, int(ends[-1]) if len(ends) else 0), ends[:-1], axis=1)
+    ends = np.cumsum([0, *(len(dofs) for dofs in supports)]).tolist()
+    forces = outcome.law_forces.reshape(nt, ends[-1])
+    parts = [forces[:, start:end] for start, end in itertools.pairwise(ends)]
     elements = len(scene.element_names)
     return {
         "law_forces": dict(zip(program.law_names, parts, strict=False)),

@@ -129,7 +129,7 @@ def test_a_run_goes_on_with_the_provider_it_began_with(tmp_path):
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
 def test_workspaces_keep_no_second_derivatives():
-    """A pinocchio::Data has 4 nv^3 numbers of them: 55 MB each here."""
+    """A pinocchio::Data has 4 nv^3 numbers of them: 55 MB each here. The allocator may retain those of one."""
 
     def resident():
         return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
@@ -139,5 +139,5 @@ def test_workspaces_keep_no_second_derivatives():
         assert scene.model.nv == 119
         before = resident()
         kept = [scene._compiled.program.runner() for _ in range(8)]
-        assert resident() - before < 8 * 10.0
+        assert resident() - before < 2.5 * 55.0
         del kept

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pin_nonideal.core_loader import core
 from pin_nonideal.scene.scene import compiled_scene
 from pin_nonideal.states.kinematics import frame_on_joint
+from pin_nonideal.trajectory.columns import open_contacts
 from pin_nonideal.types import Array
 
 from .frames import Motion
@@ -61,25 +62,26 @@ def contact_points(run: Trajectory, motion: Motion) -> list[ContactPoint]:
     compiled = compiled_scene(run.scene)
     names = [compiled.block_names[block] for block in compiled.program.framed_contacts]
     struck = {str(event.element) for event in run.events}
-    closed = {name: _closed(run, name) for name in names}
+    left_out = open_contacts(run)
     chosen = [
         k
         for k, name in enumerate(names)
-        if hasattr(compiled.described[name], "plane") or name in struck or closed[name].any()
+        if hasattr(compiled.described[name], "plane") or name in struck or name not in left_out
     ]
-    lines = _action_lines(run, motion, chosen)
+    lines, closed = _action_lines(run, motion, chosen), _closed(run, [names[k] for k in chosen])
     return [
-        _contact_point(run, names[k], lines[:, column], closed[names[k]][motion.before])
+        _contact_point(run, names[k], lines[:, column], closed[motion.before, column])
         for column, k in enumerate(chosen)
     ]
 
 
-def _closed(run: Trajectory, name: str) -> NDArray[np.bool_]:
-    """Check if a contact is closed at each sample, (nt,)."""
+def _closed(run: Trajectory, names: list[str]) -> NDArray[np.bool_]:
+    """Check if contacts are closed at each sample, (nt, n)."""
     closed = getattr(run, "closed", None)
     if closed is None:
-        return np.ones(len(run.t), dtype=bool)
-    return np.asarray(closed)[:, run.scene.contact_names.index(name)]
+        return np.ones((len(run.t), len(names)), dtype=bool)
+    column = {name: k for k, name in enumerate(run.scene.contact_names)}
+    return np.asarray(closed)[:, [column[name] for name in names]]
 
 
 def _action_lines(run: Trajectory, motion: Motion, chosen: list[int]) -> Array:
@@ -87,8 +89,8 @@ def _action_lines(run: Trajectory, motion: Motion, chosen: list[int]) -> Array:
     if not chosen:
         return np.zeros((len(motion.times), 0, 6))
     program = compiled_scene(run.scene).program
-    blocks = [program.framed_contacts[k] for k in chosen]
-    lines = core.action_lines(program, motion.q, motion.times, blocks)
+    framed = program.framed_contacts
+    lines = core.action_lines(program, motion.q, motion.times, [framed[k] for k in chosen])
     return lines.reshape(len(motion.times), len(chosen), 6)
 
 

@@ -109,28 +109,24 @@ def _round_bodies(scene: Scene) -> list[Visual]:
     for item in scene.contacts:
         if not isinstance(item, SphereContact | CapsuleContact):
             continue
-        for frame, (start, end), radius in zip(
+        for frame, ends, radius in zip(
             (item.frame1, item.frame2), segments(item), (item.radius1, item.radius2), strict=True
         ):
-            if radius == 0.0:  # a corner or an edge
-                continue
-            joint, place = frame_on_joint(scene.model, frame)
-            way = end - start
-            turn = (
-                pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), way).matrix()
-                if way.any()
-                else np.eye(3)
-            )
-            shape = (
-                Shape("capsule", (radius, float(np.linalg.norm(way))))
-                if way.any()
-                else Shape("ellipsoid", (radius,) * 3)
-            )
-            middle = place * pin.SE3(turn, (start + end) / 2.0)
-            bodies[frame, way.tobytes()] = Visual(
-                f"{frame} round", joint, middle, shape, LINK_COLORS[joint % len(LINK_COLORS)]
-            )
+            way = ends[1] - ends[0]
+            if radius > 0.0 and (frame, way.tobytes()) not in bodies:  # corners and edges have radius 0
+                bodies[frame, way.tobytes()] = _round_body(scene.model, frame, ends[0], ends[1], radius)
     return list(bodies.values())
+
+
+def _round_body(model: pin.Model, frame: str, start: Array, end: Array, radius: float) -> Visual:
+    """Return a sphere, or a capsule around the segment between two points."""
+    joint, place = frame_on_joint(model, frame)
+    way, turn, shape = end - start, np.eye(3), Shape("ellipsoid", (radius,) * 3)
+    if way.any():
+        turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), way).matrix()
+        shape = Shape("capsule", (radius, float(np.linalg.norm(way))))
+    middle = place * pin.SE3(turn, (start + end) / 2.0)
+    return Visual(f"{frame} round", joint, middle, shape, LINK_COLORS[joint % len(LINK_COLORS)])
 
 
 def _patch(number: int, plane: Plane, motion: Motion) -> Visual:

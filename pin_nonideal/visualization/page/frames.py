@@ -28,6 +28,8 @@ POSITION_TOLERANCE = 2e-3
 # Tolerance between the end rates and the displacement of an interval [rad, or relative to the size]. If the
 # difference or the projection onto the loops exceeds it, the sampling is too coarse to show the motion.
 MAX_MISMATCH = 0.3
+# Width of tables from which columns of zeros, such as those of open contacts, are not interpolated.
+MIN_WIDTH = 100
 # Rounds of bisection: up to 2^12 frames between two samples.
 ROUNDS = 12
 
@@ -61,8 +63,11 @@ class Motion:
 
     def of(self, values: Array) -> Array:
         """Return samples of the run at the frames, by linear interpolation; (nt, ...) gives (n, ...)."""
-        if not values.any():
-            return np.zeros((len(self.before), *values.shape[1:]), np.result_type(values, self.part))
+        if values.ndim == 2 and values.shape[1] > MIN_WIDTH and not (used := values.any(axis=0)).all():
+            # By columns, so that columns of zeros take no memory.
+            out = np.zeros((len(self.before), values.shape[1]), np.result_type(values, self.part), order="F")
+            out[:, used] = self.of(values[:, used])
+            return out
         at_frames = values[self.before].astype(np.result_type(values, self.part), copy=False)
         inner = np.flatnonzero(self.part)
         if len(inner):

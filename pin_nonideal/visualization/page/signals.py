@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from pin_nonideal.errors import InputError, UnknownNameError, nearest, short_repr
+from pin_nonideal.trajectory.columns import open_contacts
 from pin_nonideal.types import Array
 from pin_nonideal.validation import sequence
 
@@ -172,7 +173,8 @@ def _plot(run: Trajectory, name: str) -> list[Plot]:
     if name == "violation":
         return [Plot("Constraint violation", "m, rad", t, {"largest residual": run.violation}, log=True)]
     if name == "reactions" and run.lam is not None:
-        size = {k: np.linalg.norm(run.lam[:, s], axis=1) for k, s in run.scene.constraint_slices.items()}
+        slices, left_out = run.scene.constraint_slices, open_contacts(run)
+        size = {k: np.linalg.norm(run.lam[:, s], axis=1) for k, s in slices.items() if k not in left_out}
         return [Plot("Reactions, |lam|", "N, N m", t, _largest(size), note=omission_note(len(size)))]
     if name == "power":
         return [Plot("Power", "W", t, _largest(run.power or {}), note=omission_note(len(run.power or {})))]
@@ -255,8 +257,11 @@ def omission_note(count: int) -> str:
 
 def _largest(curves: dict[str, Array]) -> dict[str, Array]:
     """Return the curves with the largest range, in the given order."""
-    rank = sorted(curves, key=lambda label: -float(np.ptp(curves[label])))[:MAX_CURVES]
-    return {label: values for label, values in curves.items() if label in rank}
+    if len(curves) <= MAX_CURVES:
+        return curves
+    ranges = np.ptp(np.array(list(curves.values())), axis=1)
+    chosen = set(np.argsort(-ranges, kind="stable")[:MAX_CURVES].tolist())
+    return {label: values for k, (label, values) in enumerate(curves.items()) if k in chosen}
 
 
 def runs_and_names(run: Any, names: Sequence[str] | None, what: str) -> tuple[list[Trajectory], list[str]]:
