@@ -129,7 +129,7 @@ def test_a_run_goes_on_with_the_provider_it_began_with(tmp_path):
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
 def test_workspaces_keep_no_second_derivatives():
-    """A pinocchio::Data has 4 nv^3 numbers of them: 55 MB each here. The allocator may retain those of one."""
+    """A pinocchio::Data has 4 nv^3 numbers of them, 55 MB each here. The allocator may retain one set."""
 
     def resident():
         return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
