@@ -6,6 +6,29 @@
 
 namespace pn {
 
+struct ProjectionParameters {
+    // Past its first steps an iteration that keeps more than this fraction of the largest residual has converged to
+    // rounding. Newton's method at least halves the residual near the constraints. The first steps may start far away.
+    double stall_ratio = 0.5;
+    int sure_position_steps = 3, sure_velocity_steps = 1;  // first steps, which `stall_ratio` does not judge
+    // Maximum fraction of an earlier step that an iteration step may keep. Steps above it carry no information about
+    // the change of the rows since their factorization.
+    double broyden_limit = 0.3;
+    // A step with an expected residual below this fraction of rounding is not evaluated separately.
+    double trusted_part = 0.5;
+    // The third-order part of a step's move is used if its square is below this fraction of the second-order part's
+    // square.
+    double falling_square = 0.01;
+    // Below this speed [rad/s or m/s] rows change only by rounding over a step of time stepping.
+    double slow_speed = 1e-5;
+    // Factorization at the new position costs less than this many iterations.
+    double iterations_for_factors = 3.0;
+    // Near a singular position the floor is zero. Iteration counts then assume convergence to unit roundoff.
+    double no_floor = 1e-16;
+};
+
+inline constexpr ProjectionParameters projection_parameters{};
+
 // Add the least move that follows the constraints to third order to a step's move h v1, v1 = v0 + h a. Without it the
 // gap is h^2/2 b, because h v0 + h^2/2 a follows the constraints to second order. The multipliers of h^3 come from
 // projections after earlier steps. The workspace must hold (v0, a).

@@ -19,38 +19,6 @@ namespace {
 
 using FoundKind = FoundEvent::Kind;
 
-// Speed below which slip in several directions has come to rest in fixed steps, relative to 1 + the largest velocity.
-// Fixed steps do not locate this rest.
-constexpr double arrived_speed = 1e-7;
-// Slip passes by rest if it keeps more than `rest_part` of its speed at the step's start and exceeds `passing_speed`.
-constexpr double rest_part = 0.05, passing_speed = 1e-6;
-// Length of a fixed step toward a rest: relative to the time to the rest, and minimum relative to the full step.
-constexpr double part_toward_rest = 0.5, least_shortened = 1e-3;
-// A step that misses a rest ends before it, by `part_before_rest` of the time to the rest. If slip begins with fewer
-// than `negligible_slip` tolerances, the step may end at the rest.
-constexpr double part_before_rest = 0.1, negligible_slip = 10.0;
-
-// --- Repeated step
-constexpr int correction_passes = 12;
-// Maximum number of earlier gaps that replace a crossing. The repeated step differs slightly from its interpolant, so
-// gaps that close almost together can change their order.
-constexpr int most_closed_before = 4;
-constexpr double event_time_rounding = 2e-16, event_end_tolerance = 1e-13;
-// Maximum move of the step's end along the rate there, relative to the step. Longer moves repeat the step. A move
-// neglects half of its square times the change of the rate per step. A flight can be a millionth of the tried step, and
-// a move over all of it would neglect the fall.
-constexpr double moved_part = 1e-6;
-// Location of a release. `release_width`: tolerance relative to the step or the time. `least_fall`: maximum ratio of
-// two rates for which their secant is used. `short_of_root`: distance kept from the root of the secant, relative to the
-// distance to it.
-constexpr double release_width = 1e-12, least_fall = 0.7, short_of_root = 1e-2;
-// Extension of a repeated step that does not show the release of its interpolant. The first extension is relative to
-// the step, and each further one is longer by a factor.
-constexpr double least_later = 1e-11, further_part = 10.0;
-
-// Number of parts of a step at rest. Sticking elements are checked at the end of each part.
-constexpr int places_inside = 8;
-
 }  // namespace
 
 EventLocator::EventLocator(System& system, Stepper& stepper, ErrorNorm& norm, const std::vector<double>& slip_at_start,
@@ -59,7 +27,7 @@ EventLocator::EventLocator(System& system, Stepper& stepper, ErrorNorm& norm, co
       search_(system, stepper, pulls, watch) {}
 
 double EventLocator::shorten_toward_rest(const VecX& rate, double size) {
-    const double least = least_shortened * size;
+    const double least = parameters.least_shortened * size;
     for (int e : w.now.slipping) {
         const Friction& f = p.frictions[e];
         if (f.dim == 1) continue;
@@ -73,7 +41,7 @@ double EventLocator::shorten_toward_rest(const VecX& rate, double size) {
             change += along * along;
         }
         if (slip < change * size * size)
-            size = std::min(size, std::max(part_toward_rest * std::sqrt(slip / change), least));
+            size = std::min(size, std::max(parameters.part_toward_rest * std::sqrt(slip / change), least));
     }
     return size;
 }
@@ -87,7 +55,7 @@ bool EventLocator::has_arrived(int e) const {
     if (p.frictions[e].dim == 1 || stepper_.method.adaptive()) return false;
     const double speed = system_.velocity(stepper_.y1).cwiseAbs().maxCoeff();
     const double slip = slip_velocity(w.now, p.frictions[e]).norm();
-    return slip < slip_at_start_[e] && slip <= arrived_speed * (1.0 + speed);
+    return slip < slip_at_start_[e] && slip <= parameters.arrived_speed * (1.0 + speed);
 }
 
 void EventLocator::end_step_at(double size) {
@@ -97,7 +65,7 @@ void EventLocator::end_step_at(double size) {
 
 // Move the step's end to `size`, or repeat the step if the move is too long.
 void EventLocator::correct_end_to(double size) {
-    if (std::abs(size - stepper_.h) > moved_part * stepper_.h) return end_step_at(size);
+    if (std::abs(size - stepper_.h) > parameters.moved_part * stepper_.h) return end_step_at(size);
     stepper_.move_end(size - stepper_.h);
     system_.project_and_evaluate(stepper_.t0 + stepper_.h, stepper_.y1, stepper_.end_rate());
 }
@@ -113,15 +81,16 @@ bool EventLocator::misses_rest(const Watch& watch) const {
     const bool accurate = stepper_.error() <= 1.0;
     norm_.set_tolerances(stepper_.y0, stepper_.y1, stepper_.h);
     const bool rests = norm_.of_speed(slip_velocity(w.now, p.frictions[watch.index]).norm()) <= 1.0;
-    return !(accurate && rests) && norm_.of_speed(system_.slip(stepper_.start_rate(), watch.index)) > negligible_slip;
+    return !(accurate && rests) &&
+           norm_.of_speed(system_.slip(stepper_.start_rate(), watch.index)) > parameters.negligible_slip;
 }
 
 // End the step before the rest. The following steps begin with less slip, and their errors are proportionally smaller.
 void EventLocator::end_before_rest() {
     const double to_rest = stepper_.h;
-    end_step_at((1.0 - part_before_rest) * to_rest);
+    end_step_at((1.0 - parameters.part_before_rest) * to_rest);
     if (!(stepper_.error() <= 1.0)) throw Failure(Failure::Kind::not_converged, stepper_.t0);
-    time_to_rest_ = part_before_rest * to_rest;
+    time_to_rest_ = parameters.part_before_rest * to_rest;
 }
 
 // Repeat the step up to the event, or up to an earlier time if it misses a rest.
@@ -139,14 +108,14 @@ void EventLocator::correct_instant(const Crossing& crossing, double full) {
     const Watch& watch = crossing.watch;
     const bool of_gap = watch.kind == Watch::Kind::gap;
     const bool known_rate = of_gap || (watch.kind == Watch::Kind::slip && p.frictions[watch.index].dim == 1);
-    const double resolution = event_time_rounding * std::max(std::abs(stepper_.t0), full);
+    const double resolution = parameters.time_rounding * std::max(std::abs(stepper_.t0), full);
     double rate = crossing.slope / full;
     // Bracket of the instant. Without a bracket Newton's method could run to the step's end, past other events. Two
     // cases cause this: the motion differs from the interpolant, or other contacts hold the gap, so that its rate is
     // only rounding.
     double size = stepper_.h, here = margin_at_end(watch), low = 0.0, high = full;
     const double still = of_gap ? rest_speed * (1.0 + system_.velocity(stepper_.y1).cwiseAbs().maxCoeff()) : 0.0;
-    for (int it = 0; it < correction_passes; ++it) {
+    for (int it = 0; it < parameters.correction_passes; ++it) {
         if (of_gap) rate = gap_rate(p, w, watch.index);
         else if (known_rate) rate = slip_rate_along_mode(p, w, watch.index);
         if (!(rate < -still)) return;  // the margin grows from here on, and no root lies ahead
@@ -154,7 +123,7 @@ void EventLocator::correct_instant(const Crossing& crossing, double full) {
         double next = size - here / rate;
         if (!(next >= low && next <= high)) next = 0.5 * (low + high);
         const double change = next - size, before = here;
-        if (std::abs(change) <= resolution || (it > 0 && std::abs(change) < event_end_tolerance * full)) return;
+        if (std::abs(change) <= resolution || (it > 0 && std::abs(change) < parameters.end_tolerance * full)) return;
         correct_end_to(next);
         size = next;
         here = margin_at_end(watch);
@@ -168,7 +137,7 @@ bool EventLocator::passes_by_rest(int e) const {
     if (p.frictions[e].dim == 1) return false;
     const double speed = system_.velocity(stepper_.y1).cwiseAbs().maxCoeff();
     const double slip = slip_velocity(w.now, p.frictions[e]).norm();
-    return slip > rest_part * slip_at_start_[e] && slip > passing_speed * (1.0 + speed);
+    return slip > parameters.rest_part * slip_at_start_[e] && slip > parameters.passing_speed * (1.0 + speed);
 }
 
 std::optional<FoundEvent> EventLocator::locate() {
@@ -180,7 +149,7 @@ std::optional<FoundEvent> EventLocator::locate() {
     time_to_rest_.reset();
     std::optional<Crossing> crossing = search_.first();
     if (crossing) step_onto(*crossing);
-    for (int k = 0; k < most_closed_before && crossing; ++k) {
+    for (int k = 0; k < parameters.most_closed_before && crossing; ++k) {
         const std::optional<Crossing> before = search_.deepest_penetration(crossing->watch);
         if (!before) break;
         crossing = before;
@@ -249,7 +218,7 @@ bool EventLocator::all_press() {
 std::optional<FoundEvent> EventLocator::lift_together() {
     if (p.gaps.empty() || !w.now.rows.redundant || all_press()) return std::nullopt;
     double low = 0.0, high = stepper_.h;
-    while (high - low > release_width * std::max(std::abs(stepper_.t0), stepper_.h)) {
+    while (high - low > parameters.release_width * std::max(std::abs(stepper_.t0), stepper_.h)) {
         const double mid = 0.5 * (low + high);
         end_step_at(mid);
         (all_press() ? low : high) = mid;
@@ -266,7 +235,7 @@ std::optional<FoundEvent> EventLocator::lift_together() {
 // at the step's end. The search approaches the instant from later times. It uses secants of the acceleration, which
 // falls to zero toward the instant if limits do not jump, and bisection otherwise.
 double EventLocator::release_part(double rate, const std::vector<Mode>& modes, ModeQuestion& asked) {
-    const double full = stepper_.h, width = release_width * std::max(std::abs(stepper_.t0) / full, 1.0);
+    const double full = stepper_.h, width = parameters.release_width * std::max(std::abs(stepper_.t0) / full, 1.0);
     double low = 0.0, high = 1.0, beyond = 0.0, rate_beyond = 0.0;
     bool falls = false;  // the rate falls toward the instant
     VecX y(system_.ny);
@@ -276,14 +245,14 @@ double EventLocator::release_part(double rate, const std::vector<Mode>& modes, M
         if (falls) {
             const double vanishes = high - rate * (beyond - high) / (rate_beyond - rate);
             if (high - vanishes <= width) break;
-            if (vanishes > low) next = vanishes + short_of_root * (high - vanishes);
+            if (vanishes > low) next = vanishes + parameters.short_of_root * (high - vanishes);
         }
         const double t = stepper_.t0 + next * full;
         stepper_.interpolate(next, y);
         system_.read(y);
         update_kinematics(p, w, t, system_.q, system_.v);
         const std::optional<double> there = release_rate(t, y, modes, asked);
-        falls = there && rate < HUGE_VAL && *there < least_fall * rate;
+        falls = there && rate < HUGE_VAL && *there < parameters.least_fall * rate;
         if (there) {
             beyond = std::exchange(high, next);
             rate_beyond = std::exchange(rate, *there);
@@ -299,8 +268,8 @@ double EventLocator::release_part(double rate, const std::vector<Mode>& modes, M
 std::optional<double> EventLocator::release_rate_inside(const std::vector<Mode>& modes, ModeQuestion& asked) {
     if (!p.asks_functions || (system_.velocity(stepper_.y1).array() != 0.0).any()) return std::nullopt;
     const double whole = stepper_.h;
-    for (int k = 1; k < places_inside; ++k) {
-        const double t = stepper_.t0 + whole * k / places_inside;
+    for (int k = 1; k < parameters.places_inside; ++k) {
+        const double t = stepper_.t0 + whole * k / parameters.places_inside;
         system_.read(stepper_.y1);
         update_kinematics(p, w, t, system_.q, system_.v);
         if (!release_rate(t, stepper_.y1, modes, asked)) continue;
@@ -324,7 +293,7 @@ std::optional<FoundEvent> EventLocator::release_together() {
     if (!rate) return std::nullopt;
     const double full = stepper_.h;
     const double part = release_part(*rate, modes, asked);
-    for (double later = 0.0;; later = std::max(further_part * later, least_later)) {
+    for (double later = 0.0;; later = std::max(parameters.further_part * later, parameters.least_later)) {
         end_step_at(std::min(part + later, 1.0) * full);
         if (release_rate_at_end(modes, asked) || part + later >= 1.0) break;
     }

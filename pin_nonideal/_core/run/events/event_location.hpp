@@ -32,8 +32,45 @@ struct FoundEvent {
     bool of_gap() const { return kind == Kind::lift || kind == Kind::touch; }
 };
 
+struct EventLocationParameters {
+    // Speed below which slip in several directions has come to rest in fixed steps, relative to 1 + the largest
+    // velocity. Fixed steps do not locate this rest.
+    double arrived_speed = 1e-7;
+    // Slip passes by rest if it keeps more than `rest_part` of its speed at the step's start and exceeds
+    // `passing_speed`.
+    double rest_part = 0.05, passing_speed = 1e-6;
+    // Length of a fixed step toward a rest: relative to the time to the rest, and minimum relative to the full step.
+    double part_toward_rest = 0.5, least_shortened = 1e-3;
+    // A step that misses a rest ends before it, by `part_before_rest` of the time to the rest. If slip begins with
+    // fewer than `negligible_slip` tolerances, the step may end at the rest.
+    double part_before_rest = 0.1, negligible_slip = 10.0;
+    // --- Repeated step
+    int correction_passes = 12;  // maximum Newton steps and secants for the instant
+    // Maximum number of earlier gaps that replace a crossing. The repeated step differs slightly from its interpolant,
+    // so gaps that close almost together can change their order.
+    int most_closed_before = 4;
+    // Corrections of the instant that end its location: relative to the time, and relative to the step.
+    double time_rounding = 2e-16, end_tolerance = 1e-13;
+    // Maximum move of the step's end along the rate there, relative to the step. Longer moves repeat the step. A move
+    // neglects half of its square times the change of the rate per step. A flight can be a millionth of the tried step,
+    // and a move over all of it would neglect the fall.
+    double moved_part = 1e-6;
+    // Location of a release. `release_width`: tolerance relative to the step or the time. `least_fall`: maximum ratio
+    // of two rates for which their secant is used. `short_of_root`: distance kept from the root of the secant, relative
+    // to the distance to it.
+    double release_width = 1e-12, least_fall = 0.7, short_of_root = 1e-2;
+    // Extension of a repeated step that does not show the release of its interpolant. The first extension is relative
+    // to the step, and each further one is longer by a factor.
+    double least_later = 1e-11, further_part = 10.0;
+    // Number of parts of a step at rest. Sticking elements are checked at the end of each part.
+    int places_inside = 8;
+};
+
 class EventLocator {
 public:
+    using Parameters = EventLocationParameters;
+    static constexpr Parameters parameters{};
+
     // `slip_at_start`: slip speed at the step's start of each element with several directions. `pulls`: true for each
     // contact in tension at that time.
     EventLocator(System& system, Stepper& stepper, ErrorNorm& norm, const std::vector<double>& slip_at_start,

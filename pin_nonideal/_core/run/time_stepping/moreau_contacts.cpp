@@ -18,13 +18,6 @@
 
 namespace pn {
 
-namespace {
-
-constexpr double most_stopped = 1e-6;  // slip of an element that stops, relative to 1 + the largest velocity
-constexpr double width_rounding = 1e-12;  // uncertainty of a gap at rest, relative to the scene's size
-
-}  // namespace
-
 MoreauContacts::MoreauContacts(System& system, GapWatch& watch)
     : system_(system), p(system.p), w(system.w), mean_(p), drives_(p), flight_(p, drives_), watch_(watch),
       elements_(p), forces_(p, w, elements_), was_closed_(system.ng, 0), closed_(system.ng, 0), open_(system.ng, 0),
@@ -74,7 +67,7 @@ void MoreauContacts::step(double t, double h, VecX& y, double& numerical_energy,
     forces_.clear_miss();
     if (watch_.gaps.current || q_sampled_.size() == 0) {
         q_sampled_ = y.head(system_.nq);
-        watch_.begin_time_steps(width_rounding * scene_size(p, w));
+        watch_.begin_time_steps(parameters.width_rounding * scene_size(p, w));
     }
     t0_ = t;
     q0_ = y.head(system_.nq);
@@ -182,7 +175,7 @@ void MoreauContacts::find_touching(double t) {
         const double width = gap_width(p, w, i);
         const bool touches = was_closed_[i] || (width <= 0.0 && tells_way_out(i, width));
         if (touches) touching_.push_back(i);
-        watch_.gaps.width[i] = touches ? 0.0 : width - width_rounding * scene_size(p, w);  // guaranteed width
+        watch_.gaps.width[i] = touches ? 0.0 : width - parameters.width_rounding * scene_size(p, w);  // guaranteed width
     }
     watch_.leave_far();
     for (int i : touching_) {
@@ -234,20 +227,22 @@ bool MoreauContacts::rest_within_limits(double t) {
     apply();
     forces_.measure_end();
     const auto end = forces_.end_rows.head(static_cast<Eigen::Index>(elements_.rows.size()));
-    const bool stops = h_ * end.cwiseAbs().maxCoeff() <= most_stopped * (1.0 + v0_.cwiseAbs().maxCoeff());
+    const bool stops = h_ * end.cwiseAbs().maxCoeff() <= parameters.most_stopped * (1.0 + v0_.cwiseAbs().maxCoeff());
     return stops && elements_.limits_hold(p, w, t, mean_, forces_.f);
 }
 
 void MoreauContacts::solve(double t) {
     const int n = static_cast<int>(elements_.rows.size());
-    const bool loads = n > 0 && elements_.cones.back().is(ConeElement::Kind::box);  // limits that may depend on the motion
+    const bool loads =
+        n > 0 && elements_.cones.back().is(ConeElement::Kind::box);  // limits that may depend on the motion
     elements_.begin_passes();
     for (int pass = 0; n > 0; ++pass) {
         if (loads || pass > 0) apply();
-        const double allowed = most_miss * forces_.f.head(n).cwiseAbs().maxCoeff();
+        const double allowed = StepForces::parameters.most_miss * forces_.f.head(n).cwiseAbs().maxCoeff();
         if (elements_.limits_settle(p, w, t, mean_, allowed) && pass > 0) break;
-        if (pass == max_load_passes && rest_within_limits(t)) break;
-        if (pass == max_load_passes || !forces_.solve(h_, q0_, v0_)) throw Failure(Failure::Kind::not_converged, t);
+        if (pass == Moreau::parameters.max_load_passes && rest_within_limits(t)) break;
+        if (pass == Moreau::parameters.max_load_passes || !forces_.solve(h_, q0_, v0_))
+            throw Failure(Failure::Kind::not_converged, t);
         ++w.counters.iterations;
     }
     if (n == 0) apply();
@@ -280,7 +275,7 @@ void MoreauContacts::end_velocity() {
     }
     if (n == 0) return;
     const double still = rest_rate(v1_), fastest = 1.0 + v1_.cwiseAbs().maxCoeff();
-    const double clear = cone_force_rounding * f.head(n).cwiseAbs().maxCoeff();
+    const double clear = StepForces::parameters.cone_force_rounding * f.head(n).cwiseAbs().maxCoeff();
     end.head(n) *= h_;
     for (size_t e = 0, at = 0; e < parts.size(); at += cones[e].dim, ++e) {
         const StepElements::Part& part = parts[e];
@@ -290,7 +285,7 @@ void MoreauContacts::end_velocity() {
         const double limit = cones[e].bound * (head ? f[at] : 1.0);
         const double size = dim == 1 ? std::abs(f[at + head] - part.middle) : f.segment(at + head, dim).norm();
         const double slip = end.segment(at + head, dim).norm();
-        const bool stops = slip <= most_stopped * fastest || slip * limit <= (limit - size) * fastest;
+        const bool stops = slip <= parameters.most_stopped * fastest || slip * limit <= (limit - size) * fastest;
         const bool sticks = (limit - size > clear && stops) || slip <= still;
         const bool forward = dim > 1 || (dim > 0 && end[at + head] > 0.0);
         modes_[part.element] = sticks && dim > 0 ? sticking : forward ? slip_plus : slip_minus;
