@@ -2,7 +2,7 @@
 // factors of the step's last evaluation. One solve with the factors of the next step then gives A v + phi_t = 0.
 #pragma once
 
-#include "dynamics/workspace.hpp"
+#include "dynamics/constraint_gaps.hpp"
 
 namespace pn {
 
@@ -55,15 +55,5 @@ bool is_on_constraints(const Program& p, Workspace& w, double t, const VecX& q, 
 // workspace. Nonholonomic rows bind velocities only, so projection of a position ignores them.
 void remove_normal_velocity(const Program& p, Workspace& w, Eigen::Ref<VecX> change);
 void remove_normal_move(const Program& p, Workspace& w, Eigen::Ref<VecX> move);
-
-// Largest residual of a block, as last evaluated, above the allowed one for rows of unit length. Zero if there is none.
-double opening(const Program& p, const Workspace& w, int block, double allowed);
-// Length of the last closing move of the position, in the metric of M.
-double closing_distance(const Program& p, Workspace& w);
-// Throw a failure if the last evaluated residual of a row is open.
-void require_closed(const Program& p, const Workspace& w, double t);
-
-// Size of the scene [m]: largest distance of a constrained body from the world's origin, at least 1 m.
-double scene_size(const Program& p, const Workspace& w);
 
 }  // namespace pn

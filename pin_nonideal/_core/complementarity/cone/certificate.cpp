@@ -9,8 +9,6 @@ namespace pn {
 
 namespace {
 
-using ConeKind = ConeElement::Kind;
-
 // Return the violation of the dual of a contact's cone by its rows u.
 double outside_dual(const ConeElement& e, const Eigen::Ref<const VecX>& u) {
     return std::max(0.0, e.bound * u.tail(e.dim - 1).norm() - u[0]);

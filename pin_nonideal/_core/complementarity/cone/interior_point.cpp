@@ -7,7 +7,6 @@ namespace pn {
 
 namespace {
 
-using ConeKind = ConeElement::Kind;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 

@@ -7,7 +7,6 @@ namespace pn {
 
 namespace {
 
-using ConeKind = ConeElement::Kind;
 using Eigen::Vector3d;
 
 // Data of the projection of one element's tangential rows.

@@ -26,6 +26,7 @@ struct ConeElement {
     bool slides() const { return kind == Kind::contact && dim > 1; }
     bool is(Kind k) const { return kind == k; }
 };
+using ConeKind = ConeElement::Kind;
 
 struct ConeProblemParameters {
     // Part of the largest response below which an element has no response of its own.

@@ -9,20 +9,9 @@
 #include "complementarity/cone/certificate.hpp"
 #include "complementarity/cone/newton.hpp"
 #include "complementarity/cone/minimum_norm.hpp"
+#include "complementarity/cone/residuals.hpp"
 
 namespace pn {
-
-// Largest errors, relative to the velocity scale (the largest |w0|, or |W| |f| if that is larger), to the largest
-// force, and to their product.
-struct ConeResiduals {
-    double signorini = 0.0;    // error of w_n >= 0, f_n >= 0, f_n w_n = 0
-    double coulomb = 0.0;      // error of |f_t| <= mu f_n, |f| <= limit
-    double dissipation = 0.0;  // error of f_t . w_t = -mu f_n |w_t|, f . w = -limit |w|
-};
-
-// Add the errors of an element with forces f and velocities w to `out`. `force` and `speed` are their scales.
-void add_residuals(const ConeElement& element, const double* f, const double* w, double force, double speed,
-                   ConeResiduals& out);
 
 struct ConeComplementarityParameters {
     double tolerance = 1e-11;          // error of a solution
@@ -65,8 +54,6 @@ public:
     // associated law has w = 0 as its only solution exactly if such forces exist.
     bool hold(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const VecX>& w0,
               const std::vector<ConeElement>& elements, Eigen::Ref<VecX> f);
-    static ConeResiduals residuals(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const VecX>& w0,
-                                   const std::vector<ConeElement>& elements, const Eigen::Ref<const VecX>& f);
 
     // Accept a relative residual up to `most` if no forces meet the laws to rounding. The caller then reports the
     // residual. By default no residual is accepted.

@@ -2,15 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
-#include "contact/onset.hpp"
 #include "contact/queries.hpp"
-#include "dynamics/evaluation.hpp"
-#include "dynamics/projection.hpp"
 #include "dynamics/friction_limit.hpp"
-#include "dynamics/step_start.hpp"
-#include "friction/stick_slip.hpp"
 #include "math/tolerances.hpp"
 
 namespace pn {
@@ -24,7 +18,7 @@ using FoundKind = FoundEvent::Kind;
 EventLocator::EventLocator(System& system, Stepper& stepper, ErrorNorm& norm, const std::vector<double>& slip_at_start,
                            const std::vector<char>& pulls, GapWatch& watch)
     : system_(system), stepper_(stepper), norm_(norm), p(system.p), w(system.w), slip_at_start_(slip_at_start),
-      search_(system, stepper, pulls, watch) {}
+      search_(system, stepper, pulls, watch), releases_(system, stepper) {}
 
 double EventLocator::shorten_toward_rest(const VecX& rate, double size) {
     const double least = parameters.least_shortened * size;
@@ -58,14 +52,9 @@ bool EventLocator::has_arrived(int e) const {
     return slip < slip_at_start_[e] && slip <= parameters.arrived_speed * (1.0 + speed);
 }
 
-void EventLocator::end_step_at(double size) {
-    stepper_.take_again(size);
-    system_.project_and_evaluate(stepper_.t0 + size, stepper_.y1, stepper_.end_rate());
-}
-
 // Move the step's end to `size`, or repeat the step if the move is too long.
 void EventLocator::correct_end_to(double size) {
-    if (std::abs(size - stepper_.h) > parameters.moved_part * stepper_.h) return end_step_at(size);
+    if (std::abs(size - stepper_.h) > parameters.moved_part * stepper_.h) return stepper_.end_at(size);
     stepper_.move_end(size - stepper_.h);
     system_.project_and_evaluate(stepper_.t0 + stepper_.h, stepper_.y1, stepper_.end_rate());
 }
@@ -88,7 +77,7 @@ bool EventLocator::misses_rest(const Watch& watch) const {
 // End the step before the rest. The following steps begin with less slip, and their errors are proportionally smaller.
 void EventLocator::end_before_rest() {
     const double to_rest = stepper_.h;
-    end_step_at((1.0 - parameters.part_before_rest) * to_rest);
+    stepper_.end_at((1.0 - parameters.part_before_rest) * to_rest);
     if (!(stepper_.error() <= 1.0)) throw Failure(Failure::Kind::not_converged, stepper_.t0);
     time_to_rest_ = parameters.part_before_rest * to_rest;
 }
@@ -97,7 +86,7 @@ void EventLocator::end_before_rest() {
 void EventLocator::step_onto(const Crossing& crossing) {
     const double full = stepper_.h;
     time_to_rest_.reset();
-    end_step_at(std::clamp(crossing.part, 0.0, 1.0) * full);
+    stepper_.end_at(std::clamp(crossing.part, 0.0, 1.0) * full);
     if (!crossing.leaps) correct_instant(crossing, full);
     if (misses_rest(crossing.watch)) end_before_rest();
 }
@@ -155,149 +144,15 @@ std::optional<FoundEvent> EventLocator::locate() {
         crossing = before;
         step_onto(*crossing);
     }
-    if (const auto lifted = lift_together()) return lifted;  // which may be earlier
-    if (!crossing || time_to_rest_) return release_together();
+    if (const auto lifted = releases_.lift_together()) return lifted;  // which may be earlier
+    if (!crossing || time_to_rest_) return releases_.release_together();
     const Watch& watch = crossing->watch;
     const bool reverses = watch.kind == Watch::Kind::slip && passes_by_rest(watch.index);
-    if (const auto released = release_together()) return released;  // which may be earlier
+    if (const auto released = releases_.release_together()) return released;  // which may be earlier
     if (watch.kind == Watch::Kind::gap) return found(FoundKind::touch, watch.index);
     if (watch.kind == Watch::Kind::load) return found(FoundKind::lift, watch.index);
     if (watch.kind == Watch::Kind::contact) return found(FoundKind::pull, watch.index);
     return found(reverses ? FoundKind::reversal : FoundKind::rest_or_limit, watch.index);
-}
-
-// Return the acceleration with which sticking elements begin to slip at a state of the step. Return nothing if forces
-// within all limits can hold them.
-std::optional<double> EventLocator::release_rate(double t, const VecX& y, const std::vector<Mode>& modes,
-                                                 ModeQuestion& asked) {
-    system_.read(y);
-    // Selecting modes can reverse the slip of an element that has just come to rest. The step keeps its own directions.
-    const std::vector<Vec3> directions = w.state.slip_direction, last_directions = w.state.last_direction;
-    asked = {modes, {}, {}};
-    for (int e = 0; e < system_.ne; ++e)
-        if (!is_open(p, w, e) && at_rest(p, w, e, system_.v)) asked.at_rest.push_back(e);
-    double rate = 0.0;
-    std::optional<Failure> paradox;
-    try {
-        resolve_modes(p, w, t, system_.q, system_.v, asked);
-        for (int e : asked.at_rest)
-            if (modes[e] == sticking && w.state.mode[e] != sticking)
-                rate = std::max(rate, std::abs(slip_rate_along_mode(p, w, e)));
-    } catch (const Failure& failure) {  // sticking fails: unilateral contacts change together with the elements
-        const bool is_paradox = failure.kind == Failure::Kind::paradox;
-        if (p.gaps.empty() || (!is_paradox && failure.kind != Failure::Kind::not_converged)) throw;
-        if (is_paradox) paradox = failure;
-        rate = HUGE_VAL;
-    }
-    const double noise = relative_acceleration_rounding * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
-    set_modes(p, w, modes);
-    w.state.slip_direction = directions;
-    w.state.last_direction = last_directions;
-    // Contacts hold as long as any forces within their cones do, not only those of minimum norm.
-    const bool hold = rate > noise && !p.gaps.empty() && closed_contacts_hold(p, w, t, system_.q, system_.v);
-    if (paradox && !hold) throw *paradox;
-    begin_step(p, w, t, system_.q, system_.v);
-    if (rate <= noise || hold) return std::nullopt;  // an element held by others does not move, whatever its force
-    return rate;
-}
-
-std::optional<double> EventLocator::release_rate_at_end(const std::vector<Mode>& modes, ModeQuestion& asked) {
-    return release_rate(stepper_.t0 + stepper_.h, stepper_.y1, modes, asked);
-}
-
-// Check if nonnegative loads exist for the closed contacts, at the start, at the stages and at the end of the step.
-bool EventLocator::all_press() {
-    for (const Stepper::Look& look : stepper_.looks())
-        for (int i : w.now.touching)
-            if (system_.load(*look.rate, i) < 0.0) return false;
-    return true;
-}
-
-// Locate the lift-off of redundant contacts. They stay closed as long as nonnegative loads exist, even if the
-// minimum-norm loads are not all nonnegative. Bisects the step for the first instant without nonnegative loads.
-std::optional<FoundEvent> EventLocator::lift_together() {
-    if (p.gaps.empty() || !w.now.rows.redundant || all_press()) return std::nullopt;
-    double low = 0.0, high = stepper_.h;
-    while (high - low > parameters.release_width * std::max(std::abs(stepper_.t0), stepper_.h)) {
-        const double mid = 0.5 * (low + high);
-        end_step_at(mid);
-        (all_press() ? low : high) = mid;
-    }
-    if (low > 0.0) {
-        end_step_at(low);
-        if (const auto released = release_together()) return released;  // the release is earlier
-    }
-    end_step_at(high);
-    return FoundEvent{FoundKind::lift, -1, stepper_.t0 + stepper_.h};
-}
-
-// Return the part of the step at which its interpolant releases the sticking elements. `rate`: their slip acceleration
-// at the step's end. The search approaches the instant from later times. It uses secants of the acceleration, which
-// falls to zero toward the instant if limits do not jump, and bisection otherwise.
-double EventLocator::release_part(double rate, const std::vector<Mode>& modes, ModeQuestion& asked) {
-    const double full = stepper_.h, width = parameters.release_width * std::max(std::abs(stepper_.t0) / full, 1.0);
-    double low = 0.0, high = 1.0, beyond = 0.0, rate_beyond = 0.0;
-    bool falls = false;  // the rate falls toward the instant
-    VecX y(system_.ny);
-    stepper_.make_interpolant();
-    while (high - low > width) {
-        double next = 0.5 * (low + high);
-        if (falls) {
-            const double vanishes = high - rate * (beyond - high) / (rate_beyond - rate);
-            if (high - vanishes <= width) break;
-            if (vanishes > low) next = vanishes + parameters.short_of_root * (high - vanishes);
-        }
-        const double t = stepper_.t0 + next * full;
-        stepper_.interpolate(next, y);
-        system_.read(y);
-        update_kinematics(p, w, t, system_.q, system_.v);
-        const std::optional<double> there = release_rate(t, y, modes, asked);
-        falls = there && rate < HUGE_VAL && *there < parameters.least_fall * rate;
-        if (there) {
-            beyond = std::exchange(high, next);
-            rate_beyond = std::exchange(rate, *there);
-        } else {
-            low = next;
-        }
-    }
-    return high;
-}
-
-// Check sticking elements inside a step at rest, and end the step at the first place of release. Return their slip
-// acceleration there. Steps at rest can be long relative to changes of user functions.
-std::optional<double> EventLocator::release_rate_inside(const std::vector<Mode>& modes, ModeQuestion& asked) {
-    if (!p.asks_functions || (system_.velocity(stepper_.y1).array() != 0.0).any()) return std::nullopt;
-    const double whole = stepper_.h;
-    for (int k = 1; k < parameters.places_inside; ++k) {
-        const double t = stepper_.t0 + whole * k / parameters.places_inside;
-        system_.read(stepper_.y1);
-        update_kinematics(p, w, t, system_.q, system_.v);
-        if (!release_rate(t, stepper_.y1, modes, asked)) continue;
-        end_step_at(t - stepper_.t0);
-        return release_rate_at_end(modes, asked);
-    }
-    system_.read(stepper_.y1);
-    begin_step(p, w, stepper_.t0 + whole, system_.q, system_.v);
-    return std::nullopt;
-}
-
-// Locate the release of redundant sticking elements. The multiplier of a single element decides nothing: the elements
-// hold as long as some forces within all limits do. Elements that slip without moving are included. The step is
-// repeated up to the release on its interpolant. It is extended slightly if its own end does not show the release.
-std::optional<FoundEvent> EventLocator::release_together() {
-    if (!w.state.indeterminate) return std::nullopt;
-    const std::vector<Mode> modes = w.state.mode;
-    ModeQuestion asked;
-    std::optional<double> rate = release_rate_at_end(modes, asked);
-    if (!rate) rate = release_rate_inside(modes, asked);
-    if (!rate) return std::nullopt;
-    const double full = stepper_.h;
-    const double part = release_part(*rate, modes, asked);
-    for (double later = 0.0;; later = std::max(parameters.further_part * later, parameters.least_later)) {
-        end_step_at(std::min(part + later, 1.0) * full);
-        if (release_rate_at_end(modes, asked) || part + later >= 1.0) break;
-    }
-    return FoundEvent{FoundKind::released_together, asked.at_rest.front(), stepper_.t0 + stepper_.h};
 }
 
 }  // namespace pn

@@ -8,29 +8,10 @@
 #include <optional>
 #include <vector>
 
-#include "friction/stick_slip.hpp"
 #include "run/events/event_search.hpp"
+#include "run/events/release_location.hpp"
 
 namespace pn {
-
-struct FoundEvent {
-    enum class Kind {
-        rest_or_limit,      // a friction element comes to rest, or a sticking element reaches its limit
-        released_together,  // redundant sticking elements begin to slip, including this one
-        reversal,           // the slip of an element reverses without coming to rest
-        pull,               // a bilateral contact begins to carry tension
-        lift,               // a unilateral contact loses its load, or several together have no nonnegative loads
-        touch,              // a gap closes
-        user,               // a user function crosses zero
-    } kind;
-    int index;  // index of the friction element, the contact in tension or the gap, -1 for several gaps
-    double time;
-    bool in_vain = false;  // touch of a gap that had no load when its contact was let go
-    bool of_hand_over = false;  // lift at which closed contacts pass to other features
-
-    bool changes_modes() const { return kind != Kind::reversal && kind != Kind::pull && kind != Kind::user; }
-    bool of_gap() const { return kind == Kind::lift || kind == Kind::touch; }
-};
 
 struct EventLocationParameters {
     // Speed below which slip in several directions has come to rest in fixed steps, relative to 1 + the largest
@@ -55,15 +36,6 @@ struct EventLocationParameters {
     // neglects half of its square times the change of the rate per step. A flight can be a millionth of the tried step,
     // and a move over all of it would neglect the fall.
     double moved_part = 1e-6;
-    // Location of a release. `release_width`: tolerance relative to the step or the time. `least_fall`: maximum ratio
-    // of two rates for which their secant is used. `short_of_root`: distance kept from the root of the secant, relative
-    // to the distance to it.
-    double release_width = 1e-12, least_fall = 0.7, short_of_root = 1e-2;
-    // Extension of a repeated step that does not show the release of its interpolant. The first extension is relative
-    // to the step, and each further one is longer by a factor.
-    double least_later = 1e-11, further_part = 10.0;
-    // Number of parts of a step at rest. Sticking elements are checked at the end of each part.
-    int places_inside = 8;
 };
 
 class EventLocator {
@@ -91,19 +63,10 @@ private:
     bool misses_rest(const Watch& watch) const;
 
     double margin_at_end(const Watch& watch);
-    void end_step_at(double size);
     void correct_end_to(double size);
     void step_onto(const Crossing& crossing);
     void correct_instant(const Crossing& crossing, double full);
     void end_before_rest();
-
-    std::optional<double> release_rate(double t, const VecX& y, const std::vector<Mode>& modes, ModeQuestion& asked);
-    std::optional<double> release_rate_at_end(const std::vector<Mode>& modes, ModeQuestion& asked);
-    double release_part(double rate, const std::vector<Mode>& modes, ModeQuestion& asked);
-    std::optional<double> release_rate_inside(const std::vector<Mode>& modes, ModeQuestion& asked);
-    std::optional<FoundEvent> release_together();
-    bool all_press();
-    std::optional<FoundEvent> lift_together();
 
     System& system_;
     Stepper& stepper_;
@@ -112,6 +75,7 @@ private:
     Workspace& w;
     const std::vector<double>& slip_at_start_;
     EventSearch search_;
+    ReleaseLocator releases_;
     std::optional<double> time_to_rest_;
 };
 

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <numeric>
 
-#include "contact/impact.hpp"
 #include "dynamics/evaluation.hpp"
 #include "dynamics/power.hpp"
 #include "dynamics/friction_limit.hpp"
@@ -12,6 +11,7 @@
 #include "dynamics/step_start.hpp"
 #include "complementarity/socp_mode_newton.hpp"
 #include "friction/stick_slip.hpp"
+#include "run/time_stepping/end_modes.hpp"
 #include "tree/lie_group.hpp"
 
 namespace pn {
@@ -162,27 +162,24 @@ void Moreau::solve_friction(double t) {
     }
 }
 
-// Compute the velocity and the modes at the step's end. Elements below their limit
-// stick, and those whose slip is zero.
+// Compute the velocity and the modes at the step's end. A force below its limit holds its element.
 void Moreau::end_velocity() {
     alpha_ = problem_.alpha0;
     alpha_.noalias() += problem_.W * force_;
     problem_.acceleration(p, w, force_, a_friction_);
     a_friction_ += a_free_;
     mean_.end(a_friction_, v1_);
-    const double still = rest_rate(v1_),
-                 rounding = parameters.slip_rest_rounding * problem_.alpha0.lpNorm<Eigen::Infinity>();
+    const EndModes end(v1_);
+    const double rounding = parameters.slip_rest_rounding * problem_.alpha0.lpNorm<Eigen::Infinity>();
     for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e) {
         const int dim = problem_.dims[e];
         w.state.percussion.segment(p.blocks[p.frictions[e].block].row, dim) = force_.segment(at, dim);
         shifted_ = force_.segment(at, dim);
         if (dim == 1) shifted_[0] -= force_limit_.middle[at];
         const double slip = alpha_.segment(at, dim).norm();
-        const bool rests = h_ * slip <= still && slip <= rounding;
-        const bool sticks = shifted_.norm() < force_limit_[e] * (1.0 - parameters.box_force_rounding) || rests;
-        modes_[e] = sticks ? sticking : dim > 1 || alpha_[at] > 0.0 ? slip_plus : slip_minus;
-        const Block& block = p.blocks[p.frictions[e].block];
-        if (sticks && block.dof >= 0) v1_.segment(block.dof, block.total).setZero();
+        const bool rests = end.is_rest(h_ * slip) && slip <= rounding;
+        const bool holds = shifted_.norm() < force_limit_[e] * (1.0 - parameters.box_force_rounding);
+        modes_[e] = EndModes::settle(holds || rests, dim > 1 || alpha_[at] > 0.0, p.blocks[p.frictions[e].block], v1_);
     }
 }
 

@@ -3,18 +3,15 @@
 #include <algorithm>
 #include <cmath>
 
-#include "contact/queries.hpp"
-#include "contact/impact.hpp"
 #include "dynamics/evaluation.hpp"
 #include "dynamics/power.hpp"
 #include "dynamics/projection.hpp"
 #include "dynamics/acceleration.hpp"
 #include "dynamics/step_start.hpp"
 #include "friction/stick_slip.hpp"
+#include "run/time_stepping/end_modes.hpp"
 #include "run/time_stepping/moreau.hpp"
 #include "tree/lie_group.hpp"
-#include "tree/terms.hpp"
-#include "math/tolerances.hpp"
 
 namespace pn {
 
@@ -29,26 +26,6 @@ MoreauContacts::MoreauContacts(System& system, GapWatch& watch)
     rounded_ = std::any_of(rounded_by_.begin(), rounded_by_.end(), [](double r) { return r < HUGE_VAL; });
     lam_free_ = VecX::Zero(p.layout.rows);
     touching_.reserve(system.ng);
-}
-
-double MoreauContacts::allowed(double t, double h, const VecX& y) {
-    if (!rounded_) return h;
-    bool placed = false;
-    double shortest = h;
-    for (int i : watch_.gaps.near_gaps) {
-        if (!(rounded_by_[i] < HUGE_VAL) || w.state.closed[i] || watch_.stays_open_in_step(i)) continue;
-        if (!placed) {
-            system_.read(y);
-            kinematics(p.mechanism, w.now.terms, system_.q, system_.v);
-            placed = true;
-        }
-        follow_gap(p, w, t, system_.v, i);
-        const double width = gap_width(p, w, i), rate = gap_rate(p, w, i);
-        if (!(rate < 0.0) || !tells_way_out(i, width)) continue;
-        const double reach = std::max(width, 0.0) + (width > 0.0 ? 0.5 : 1.0) * depth_left(p, w, i, width);
-        shortest = std::min(shortest, reach / -rate);
-    }
-    return shortest;
 }
 
 void MoreauContacts::step(double t, double h, VecX& y, double& numerical_energy, double& impact_energy) {
@@ -156,45 +133,6 @@ void MoreauContacts::solve_free(double t) {
     solve_motion(p, w, p.has_laws(), b_, a_free_, lam_free_);
 }
 
-// Return the travel of each dof since the last sample of the gaps, including projections. It is at least that of the
-// velocity, because angles wrap around.
-const VecX& MoreauContacts::way_since_last() {
-    q_sampled_ -= q_mid_;
-    ambient_to_tangent(p.mechanism, q_mid_.data(), q_sampled_.data(), v1_.data());
-    force_ = v1_.cwiseAbs().cwiseMax(h_ * v0_.cwiseAbs());
-    q_sampled_ = q_mid_;
-    return force_;
-}
-
-// Find the contacts whose gap is closed at the step's middle, and contacts that were closed before. Their loads decide
-// if they stay closed.
-void MoreauContacts::find_touching(double t) {
-    touching_.clear();
-    for (int i : watch_.come(way_since_last())) {
-        measure_gap(p, w, t, mean_.value(), i);
-        const double width = gap_width(p, w, i);
-        const bool touches = was_closed_[i] || (width <= 0.0 && tells_way_out(i, width));
-        if (touches) touching_.push_back(i);
-        watch_.gaps.width[i] = touches ? 0.0 : width - parameters.width_rounding * scene_size(p, w);  // guaranteed width
-    }
-    watch_.leave_far();
-    for (int i : touching_) {
-        evaluate_block(p, w, t, mean_.value(), p.gaps[i].block);
-        for (int e : p.gaps[i].elements) evaluate_block(p, w, t, mean_.value(), p.frictions[e].block);
-    }
-    if (touching_.size() > 1)
-        leave_one_of_each_place(p, w, touching_, [&](int i, int other) { return was_closed_[i] && !was_closed_[other]; });
-}
-
-// Evaluate the contacts that take part at a new mean velocity.
-void MoreauContacts::move_touching(double t) {
-    for (int i : touching_) {
-        move_block(p, w, t, mean_.value(), p.gaps[i].block);
-        for (int e : p.gaps[i].elements) move_block(p, w, t, mean_.value(), p.frictions[e].block);
-    }
-    elements_.move(p, w);
-}
-
 // Compute the motion under the forces f.
 void MoreauContacts::apply() {
     const auto& parts = elements_.parts;
@@ -227,8 +165,8 @@ bool MoreauContacts::rest_within_limits(double t) {
     apply();
     forces_.measure_end();
     const auto end = forces_.end_rows.head(static_cast<Eigen::Index>(elements_.rows.size()));
-    const bool stops = h_ * end.cwiseAbs().maxCoeff() <= parameters.most_stopped * (1.0 + v0_.cwiseAbs().maxCoeff());
-    return stops && elements_.limits_hold(p, w, t, mean_, forces_.f);
+    return EndModes(v0_).is_stopped(h_ * end.cwiseAbs().maxCoeff()) &&
+           elements_.limits_hold(p, w, t, mean_, forces_.f);
 }
 
 void MoreauContacts::solve(double t) {
@@ -259,8 +197,9 @@ void MoreauContacts::solve(double t) {
     w.counters.dissipation = std::max(w.counters.dissipation, r.dissipation);
 }
 
-// Compute the velocity, the closed contacts and the modes at the step's end. An element sticks if its force stays below
-// its limit, or if its slip is zero. If a solution meets neither condition, the one with the smaller miss holds.
+// Compute the velocity, the closed contacts and the modes at the step's end. A force below
+// its limit holds an element whose slip stops. If a solution meets neither condition, the one with the smaller miss
+// decides.
 void MoreauContacts::end_velocity() {
     const auto& parts = elements_.parts;
     const auto& cones = elements_.cones;
@@ -274,23 +213,23 @@ void MoreauContacts::end_velocity() {
         std::fill(modes_.begin(), modes_.end(), unloaded);
     }
     if (n == 0) return;
-    const double still = rest_rate(v1_), fastest = 1.0 + v1_.cwiseAbs().maxCoeff();
+    const EndModes rule(v1_);
     const double clear = StepForces::parameters.cone_force_rounding * f.head(n).cwiseAbs().maxCoeff();
     end.head(n) *= h_;
     for (size_t e = 0, at = 0; e < parts.size(); at += cones[e].dim, ++e) {
         const StepElements::Part& part = parts[e];
         const int head = part.gap >= 0, dim = cones[e].dim - head;
-        if (head) closed_[part.gap] = end[at] - part.approach <= still;
+        if (head) closed_[part.gap] = rule.is_rest(end[at] - part.approach);
         if (part.element < 0 || (head && !closed_[part.gap])) continue;
         const double limit = cones[e].bound * (head ? f[at] : 1.0);
         const double size = dim == 1 ? std::abs(f[at + head] - part.middle) : f.segment(at + head, dim).norm();
         const double slip = end.segment(at + head, dim).norm();
-        const bool stops = slip <= parameters.most_stopped * fastest || slip * limit <= (limit - size) * fastest;
-        const bool sticks = (limit - size > clear && stops) || slip <= still;
+        const bool holds =
+            limit - size > clear && (rule.is_stopped(slip) || rule.is_nearer_to_rest(slip, size, limit));
         const bool forward = dim > 1 || (dim > 0 && end[at + head] > 0.0);
-        modes_[part.element] = sticks && dim > 0 ? sticking : forward ? slip_plus : slip_minus;
         const Block& block = p.blocks[p.frictions[part.element].block];
-        if (sticks && block.dof >= 0) v1_.segment(block.dof, block.total).setZero();
+        const Mode mode = EndModes::settle(holds || rule.is_rest(slip), forward, block, v1_);
+        modes_[part.element] = dim > 0 ? mode : slip_minus;
     }
     forces_.stop_resting_trees(h_, v0_, v1_);
     const auto rest = [&](int e) {  // elements held by the constraints stick

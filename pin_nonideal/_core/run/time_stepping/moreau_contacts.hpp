@@ -16,7 +16,6 @@
 namespace pn {
 
 struct MoreauContactsParameters {
-    double most_stopped = 1e-6;     // slip of an element that stops, relative to 1 + the largest velocity
     double width_rounding = 1e-12;  // uncertainty of a gap at rest, relative to the scene's size
     // Maximum penetration of edges and rims with a defined normal, relative to their rounding.
     double nearly_all = 0.999;

@@ -134,7 +134,7 @@ ConeResiduals StepForces::residuals() {
     const auto W = responses_.matrix(n);
     end_rows.head(n) = free_rows_.head(n);
     end_rows.head(n).noalias() += W * middle_.head(n);
-    return ConeComplementarity::residuals(W, end_rows.head(n), elements_.cones, f.head(n) - middle_.head(n));
+    return cone_residuals(W, end_rows.head(n), elements_.cones, f.head(n) - middle_.head(n));
 }
 
 }  // namespace pn
