@@ -111,6 +111,27 @@ def test_shared_tolerances_are_in_one_header() -> None:
     assert shared == []
 
 
+def test_no_room_reads_real_parameters_of_another_room() -> None:
+    sources = {path: code(path) for path in sorted(CORE.rglob("*.[ch]pp"))}
+    holders: dict[str, tuple[str, list[str]]] = {}
+    for path, text in sources.items():
+        for name, members in PARAMETERS.findall(text):
+            reals = re.findall(r"(\w+) =", "".join(re.findall(r"^ +double .*$", members, re.M)))
+            owner = re.findall(rf"class (\w+)[^;{{]*\{{\n(?:public:\n)? +using Parameters = {name};", text)
+            for holder in [*re.findall(rf"constexpr {name} (\w+)\{{", text), *owner]:
+                holders[holder] = room(path), reals
+    assert len(holders) > 70
+    reads = [
+        f"{path.relative_to(CORE)}: {holder}.{member}"
+        for path, text in sources.items()
+        for holder, member in re.findall(r"(\w+)(?:::parameters)?\.(\w+)", text)
+        if holder in holders
+        and holders[holder][0] not in ("math", room(path))
+        and member in holders[holder][1]
+    ]
+    assert reads == []
+
+
 def test_shared_tolerances_are_few_and_explained() -> None:
     text = (CORE / "math" / "tolerances.hpp").read_text(encoding="utf-8")
     names = constants(text)
