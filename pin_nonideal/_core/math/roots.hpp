@@ -8,7 +8,7 @@ namespace pn {
 
 struct RootSearchParameters {
     int dip_passes = 40;              // golden sections, which find a dip of 1e-16 of the margin's change
-    int root_passes = 60;             // maximum secants and bisections, of which 43 bisections reach `root_width`
+    int root_passes = 60;             // maximum secants and bisections, of which 44 bisections reach `root_width`
     int start_halvings = 30;          // halvings toward the start, near which a slip from rest may stop again
     double root_width = 1e-13, root_margin = 1e-13;  // the root is a guess for the repeated step
     double margin_slope_step = 1e-4;  // step of the difference for the rate of a margin, relative to the step

@@ -8,8 +8,7 @@
 namespace pn {
 
 struct EndModeParameters {
-    // Slip of an element that stops, relative to 1 + the largest velocity. The cone problem is solved to this accuracy.
-    double most_stopped = 1e-6;
+    double most_stopped = 1e-6;  // slip of an element that stops, relative to 1 + the largest velocity
 };
 
 class EndModes {
@@ -22,7 +21,7 @@ public:
 
     // Check if a slip is zero up to rounding.
     bool is_rest(double slip) const { return slip <= still_; }
-    // Check if a slip is zero up to the accuracy of a cone problem.
+    // Check if a slip is so slow that an element stops if its force can hold it.
     bool is_stopped(double slip) const { return slip <= parameters.most_stopped * fastest_; }
     // Check if a slip misses rest by less than the force misses its limit, each relative to its scale. A solution that
     // meets neither condition then sticks.
