@@ -1,4 +1,5 @@
-// Outcome of a run: its records as arrays, its events and its counters.
+#include "python/outcome.hpp"
+
 #include <algorithm>
 #include <cmath>
 
@@ -8,7 +9,6 @@
 #include <nanobind/stl/vector.h>
 
 #include "python/failures.hpp"
-#include "python/runs.hpp"
 
 namespace pn {
 

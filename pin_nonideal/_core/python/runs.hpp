@@ -5,8 +5,6 @@
 
 namespace pn {
 
-// Register the outcome of a run and its events.
-void bind_outcome(nb::module_& m);
 void bind_runs(nb::module_& m, nb::class_<Runner>& runner);
 
 }  // namespace pn

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynamics/evaluation.hpp"
 #include "dynamics/friction_limit.hpp"
 #include "math/decompositions.hpp"
 #include "math/radau.hpp"
+#include "run/integrators/slip_tangents.hpp"
 #include "run/integrators/step_control.hpp"
 #include "tree/lie_group.hpp"
 
@@ -105,6 +107,76 @@ void Collocation::evaluate_stages(bool first) {
     }
 }
 
+// Compute the derivatives of the acceleration by each direction, including the loads that follow it. The workspace is
+// at the step's end, after the last stage.
+void Collocation::find_response() {
+    Workspace& w = system_.w;
+    const double end = step_.t0 + step_.h;
+    const VecX here = w.now.a, v = w.now.v;
+    for (const Element& e : elements_) {
+        for (int k = 0; k < e.dim; ++k) {
+            double& component = w.state.last_direction[e.index][k];
+            const double before = component;
+            component += parameters.perturbation;
+            solve_dynamics(system_.p, w, end, v);
+            component = before;
+            G_.col(e.row + k) = (w.now.a - here) / parameters.perturbation;
+        }
+    }
+}
+
+void Collocation::add_tangents(int i) {
+    T_[i].setZero();
+    for (const Element& e : elements_) set_tangents(n_[i], e.row, e.dim, T_[i], e.tangent);
+    P_[i].noalias() = T_[i].transpose() * A_[i];
+    Q_[i].noalias() = G_ * T_[i];
+}
+
+// Solve for the turns of all directions together. Across n the slip velocity u_i from the rates must vanish,
+//     T^T (u_i + A_i h sum_j a_ij G T_j turn_j) - sigma_i turn_i = 0.
+void Collocation::solve_turns() {
+    const int m = tangents_, nv = system_.nv, nq = system_.nq;
+    K_.resize(stages * m, stages * m);
+    residual_.resize(stages * m);
+    const VecX fastest = sigma_.cwiseAbs().rowwise().maxCoeff();
+    bool at_rest = false;
+    for (int i = 0; i < stages; ++i) {
+        VecX moved = step_.y0.segment(nq, nv) - Y_[i].segment(nq, nv);
+        for (int j = 0; j < stages; ++j) {
+            moved += (step_.h * table.a[i][j]) * F_[j].segment(nq, nv);
+            K_.block(i * m, j * m, m, m).noalias() = (step_.h * table.a[i][j]) * P_[i] * Q_[j];
+        }
+        u_[i] += A_[i] * moved;
+        residual_.segment(i * m, m) = T_[i].transpose() * u_[i];
+        for (size_t at = 0; at < elements_.size(); ++at) {
+            at_rest |= std::abs(sigma_(at, i)) <= parameters.rank_threshold * fastest[at];
+            for (int k = 0; k < elements_[at].dim - 1; ++k) {
+                const int row = i * m + elements_[at].tangent + k;
+                K_(row, row) -= sigma_(at, i);
+            }
+        }
+    }
+    if (!at_rest) {
+        LU factor;
+        factor.compute(K_);
+        factor.solve(residual_, turn_);
+        turn_ = -turn_;
+        return;
+    }
+    turn_ = -least_squares(K_, residual_, parameters.rank_threshold);
+}
+
+// Turn the directions, and update the accelerations.
+void Collocation::turn_directions() {
+    for (int i = 0; i < stages; ++i) {
+        turned_[i] = n_[i];
+        n_[i] += T_[i] * turn_.segment(i * tangents_, tangents_);
+        for (const Element& e : elements_) n_[i].segment(e.row, e.dim).normalize();
+        turned_[i] = G_ * (n_[i] - turned_[i]);
+        F_[i].segment(system_.nq, system_.nv) += turned_[i];
+    }
+}
+
 // Update the states of the stages under the turned directions.
 void Collocation::move_stages() {
     const int nq = system_.nq;
@@ -145,6 +217,15 @@ double Collocation::change() {
     }
     Y_.swap(next_);
     return most;
+}
+
+void Collocation::measure_stiffness() {
+    const MatX across = P_[stages - 1] * Q_[stages - 1];
+    stiffness_ = 0.0;
+    for (size_t at = 0; at < elements_.size(); ++at)
+        for (int k = 0; k < elements_[at].dim - 1; ++k)
+            stiffness_ = std::max(stiffness_, step_.h * across.row(elements_[at].tangent + k).cwiseAbs().sum() /
+                                                  std::abs(sigma_(at, stages - 1)));
 }
 
 void Collocation::advance() {
@@ -204,8 +285,6 @@ double Collocation::error() {
     norm_.set_tolerances(step_.y0, step_.y1, step_.h);
     return norm_(error_, step_.y0);
 }
-
-// --- Interpolant
 
 void Collocation::interpolate(double part, VecX& y) const {
     auto state = y.head(step_.states);
