@@ -57,7 +57,8 @@ from .version import __version__ as __version__
 
 if TYPE_CHECKING:
     from .cone_problems import ConeResiduals, ConeSolution, cone_complementarity
-    from .loading.load import load, robots
+    from .loading.load import load
+    from .loading.robot_files import robots
     from .simulation.resume import resume
     from .simulation.rollout import rollout
     from .simulation.rollout_arrays import RunArrays
@@ -79,7 +80,7 @@ _LATER = {
     "RunArrays": "simulation.rollout_arrays",
     "resume": "simulation.resume",
     "load": "loading.load",
-    "robots": "loading.load",
+    "robots": "loading.robot_files",
     "ConeResiduals": "cone_problems",
     "ConeSolution": "cone_problems",
     "cone_complementarity": "cone_problems",

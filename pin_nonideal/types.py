@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array: TypeAlias = NDArray[np.float64]
+Mask: TypeAlias = NDArray[np.bool_]
 Table: TypeAlias = dict[str, Any]  # names to values of files and options
 State: TypeAlias = ArrayLike | Mapping[str, Any]  # a configuration or velocity, as numbers or by name
 

@@ -17,7 +17,7 @@ from pathlib import Path
 import pin_nonideal as pn
 from pin_nonideal.errors import InputError, PinNonidealError, RunInterrupted
 from pin_nonideal.loading.library.example_robots import example_robots
-from pin_nonideal.loading.load import robots
+from pin_nonideal.loading.robot_files import robots
 from pin_nonideal.scene.evaluation import SEVERAL
 from pin_nonideal.trajectory.trajectory import Trajectory
 from pin_nonideal.types import Table

@@ -5,22 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pin_nonideal.core_loader import core
-from pin_nonideal.description.actuation import (
-    EffortLimits,
-    HoldPosition,
-    SampledControl,
-    Table,
-    drives_of,
-    held_tables,
-    requesting_drives,
-    sampled_drives,
-)
+from pin_nonideal.description.actuation import HoldPosition, SampledControl, Table
+from pin_nonideal.description.drive_kinds import requesting_drives
 from pin_nonideal.description.scene_drive import SceneDrive
 from pin_nonideal.description.scene_spec import SceneSpec
-from pin_nonideal.errors import InputError, UserFunctionError
+from pin_nonideal.errors import InputError
 from pin_nonideal.states.joint_layout import joint_places
 from pin_nonideal.states.parsing import (
     joint_named,
@@ -28,14 +19,15 @@ from pin_nonideal.states.parsing import (
     named_joint_samples,
     named_joint_values,
 )
-from pin_nonideal.types import Array, Model
+from pin_nonideal.types import Array, Mask, Model
 from pin_nonideal.validation import by_name
 
 from .callbacks import checked
 from .delay import DelayedTorque
+from .effort_limits import effort_limits
 from .resolver import Resolver, words
+from .sampled_control import commanded_by_control, initial_torque, named_torques, sampled_torque
 from .torques import (
-    SAMPLE_ROUNDING,
     Called,
     Constant,
     Part,
@@ -44,11 +36,6 @@ from .torques import (
     kind_of_drive,
     sum_of_torques,
 )
-
-Mask = NDArray[np.bool_]
-
-# Efforts from here on are unlimited: Pinocchio stores the largest float for no limit.
-UNBOUNDED = 1e300
 
 
 def lower_actuation(u: object, out: core.Builder, resolver: Resolver, spec: SceneSpec) -> None:
@@ -72,7 +59,7 @@ def lower_actuation(u: object, out: core.Builder, resolver: Resolver, spec: Scen
         _require_separate(model, drives, [acts for _, acts in lowered])
         _require_one_delay(drives)
     _write(_sum([part for part, _ in lowered], drives, model), out)
-    limits = _limits(u, model, [acts for _, acts in lowered])
+    limits = effort_limits(u, model, [acts for _, acts in lowered])
     if limits is not None:
         out.limit_effort(least=limits[0], most=limits[1])
 
@@ -113,11 +100,11 @@ def _lowered(u: object, resolver: Resolver, spec: SceneSpec, who: str) -> tuple[
     """Return the torques of one drive, and the mask of the degrees of freedom that it commands, (nv,)."""
     model, everything = resolver.model, np.ones(resolver.model.nv, dtype=bool)
     if isinstance(u, SampledControl):
-        acts = _commanded_by_control(u, model)
+        acts = commanded_by_control(u, model)
         if u.delay_in_samples:  # runs have their own delayed torques, see `delayed_torque`
             initial = initial_torque(u, model)
             return Called(lambda t, q, v: initial, u.period), acts
-        return Called(_sampled_torque(u, model), u.period), acts
+        return Called(sampled_torque(u, model), u.period), acts
     if isinstance(u, SceneDrive):
         function, acts, breaks = u.bound(model, resolver.q0, spec)
         return Called(_Identified(checked(function, words(u), (model.nv,)), u), u.period, breaks), acts
@@ -133,7 +120,7 @@ def _lowered(u: object, resolver: Resolver, spec: SceneSpec, who: str) -> tuple[
         timed = Timed(times, values) if u.interpolation == "linear" else _held(times, values)
         return timed, commanded(model, u.values)
     if callable(u):
-        return Called(checked(_torques_of(u, model, who), who, (model.nv,)), None), everything
+        return Called(checked(named_torques(u, model, who), who, (model.nv,)), None), everything
     return Constant(named_joint_values(model, u, who)), commanded(model, u)
 
 
@@ -150,7 +137,7 @@ def delayed_torque(
         by_thread: whether several threads run at once, each with runs of its own.
     """
     model, drives = resolver.model, requesting_drives(spec.actuation)
-    function, initial = _sampled_torque(u, model), initial_torque(u, model)
+    function, initial = sampled_torque(u, model), initial_torque(u, model)
     delayed = DelayedTorque(function, u.delay_in_samples, initial, t0, by_thread)
     if len(drives) == 1:
         return delayed, Called(delayed, u.period)
@@ -159,82 +146,6 @@ def delayed_torque(
     total = _sum(parts, drives, model)
     assert isinstance(total, Called)
     return delayed, total
-
-
-def require_samples(u: object, t0: float) -> None:
-    """Check that held tables beside a sampled control change at samples of the control.
-
-    Args:
-        u: the actuation of a scene.
-        t0: start time of a run [s], the first sample.
-
-    Raises:
-        InputError: see above.
-    """
-    sampled, tables = sampled_drives(u), held_tables(u)
-    for table in tables if sampled else ():
-        period = sampled[0].period
-        times = np.asarray(table.times)[1:]
-        times = times[times > t0]
-        off = np.abs((times - t0) / period - np.round((times - t0) / period))
-        late = np.flatnonzero(off > SAMPLE_ROUNDING + np.spacing(np.abs(times) + abs(t0)) / period)
-        if late.size:
-            raise InputError(
-                f"{words(table)}: times must be samples t0 + k period of {words(sampled[0])} in the list "
-                f"(t0 = {t0:g} s, period = {period:g} s); got {times[late[0]]:.12g} s; move the time to a "
-                "sample, or read the table in the function of the control"
-            )
-
-
-def _sampled_torque(u: SampledControl, model: Model) -> Callable[..., object]:
-    who = f"{words(u)}: function"
-    function = checked(_torques_of(u.function, model, who), who, (model.nv,))
-    if u.joints is None:
-        return function
-    others = ~_commanded_by_control(u, model)
-
-    def torques(*arguments: object) -> Array:
-        tau: Array = function(*arguments)
-        if tau[others].any():
-            raise UserFunctionError(f"{who} must return {_other_torque(tau, others, model)}")
-        return tau
-
-    return torques
-
-
-def _other_torque(tau: Array, others: Mask, model: Model) -> str:
-    """Return words on the first torque of a joint that a control does not command."""
-    dof = int(np.flatnonzero(others & (tau != 0.0))[0])
-    name = next(p.name for p in joint_places(model) if p.v_first <= dof < p.v_first + p.nv)
-    return f'no torque for joints that are not in joints; got {tau[dof]:g} for "{name}"; add it to joints'
-
-
-def _commanded_by_control(u: SampledControl, model: Model) -> Mask:
-    """Return the mask of the degrees of freedom that a sampled control commands, (nv,)."""
-    acts = np.full(model.nv, u.joints is None)
-    for name in u.joints or ():
-        j = joint_named(model, name, f"{words(u)}: joints")
-        acts[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]] = True
-    return acts
-
-
-def initial_torque(u: SampledControl, model: Model) -> Array:
-    """Return the torque before the first delayed one arrives, (nv,).
-
-    Args:
-        u: a sampled control.
-        model: pinocchio.Model.
-
-    Raises:
-        InputError: the torque does not fit, or acts on a joint that the control does not command.
-    """
-    if u.initial is None:
-        return np.zeros(model.nv)
-    tau = np.ascontiguousarray(named_joint_values(model, u.initial, f"{words(u)}: initial"))
-    others = ~_commanded_by_control(u, model)
-    if tau[others].any():
-        raise InputError(f"{words(u)}: initial must hold {_other_torque(tau, others, model)}")
-    return tau
 
 
 class _Identified:
@@ -250,18 +161,6 @@ class _Identified:
 
     def __call__(self, t: float, q: Array, v: Array) -> object:
         return self.function(t, q, v)
-
-
-def _torques_of(function: Callable[..., object], model: Model, who: str) -> Callable[..., object]:
-    """A function of torques that may return them by joint name."""
-
-    def torques(*arguments: object) -> object:
-        tau = function(*arguments)
-        if type(tau) is np.ndarray or by_name(tau) is None:
-            return tau
-        return named_joint_values(model, tau, who)
-
-    return torques
 
 
 def _held(times: Array, values: Array) -> Timed:
@@ -326,43 +225,6 @@ def _require_vectors(model: Model, kp: Array, who: str) -> None:
                 f'{who} must be zero on joint "{place.name}", whose configuration is no vector; '
                 "drive it by a function or by a TrackTrajectory"
             )
-
-
-def _limits(u: object, model: Model, acts: Sequence[Mask]) -> tuple[Array, Array] | None:
-    """Return the lower and upper effort limits, (nv,), or None without limits.
-
-    Limits of one drive of a list apply to the degrees of freedom that it commands.
-    """
-    outer = drives_of(u)
-    if not any(isinstance(drive, EffortLimits) for drive in outer):
-        return None
-    if len(outer) == 1:
-        return _efforts(outer[0], model)
-    least, most = np.full(model.nv, -np.inf), np.full(model.nv, np.inf)
-    first = 0
-    for drive in outer:
-        count = len(requesting_drives(drive))
-        if isinstance(drive, EffortLimits):
-            own = np.logical_or.reduce(acts[first : first + count])
-            for all_limits, limits in zip((least, most), _efforts(drive, model), strict=True):
-                all_limits[own] = limits[own]
-        first += count
-    return least, most
-
-
-def _efforts(u: EffortLimits, model: Model) -> tuple[Array, Array]:
-    """Return the lower and upper effort limit of each degree of freedom; no limit is infinite."""
-    if u.effort is not None:
-        if isinstance(u.effort, float):
-            most = np.full(model.nv, u.effort)
-        else:
-            most = named_joint_values(model, u.effort, f"{words(u)}: effort", others=np.inf)
-        return -most, most
-    least, most = model.lowerEffortLimit.copy(), model.upperEffortLimit.copy()
-    unstated = least >= most
-    least[unstated | (least <= -UNBOUNDED)] = -np.inf
-    most[unstated | (most >= UNBOUNDED)] = np.inf
-    return np.ascontiguousarray(least), np.ascontiguousarray(most)
 
 
 # --- several drives -----------------------------------------------------------------------------------------

@@ -6,8 +6,9 @@ import threading
 from collections.abc import Sequence
 
 from pin_nonideal.core_loader import core
-from pin_nonideal.description.actuation import SampledControl, delayed_control, switching_drives
+from pin_nonideal.description.actuation import SampledControl
 from pin_nonideal.description.constraints import UserConstraint
+from pin_nonideal.description.drive_kinds import delayed_control, switching_drives
 from pin_nonideal.description.scene_spec import SceneSpec
 from pin_nonideal.errors import InputError, RunError
 from pin_nonideal.states.held import NOTHING_HELD, Held
@@ -17,13 +18,14 @@ from pin_nonideal.states.report import ProjectionReport
 from pin_nonideal.states.rows import block_names, row_slices
 from pin_nonideal.types import Array, Model
 
-from .actuation import delayed_torque, require_samples
+from .actuation import delayed_torque
 from .analysis import check_user_functions, has_rates, without_functions, zero_rows
 from .constraints import anchor_frames
 from .delay import DelayedTorque
 from .error_context import Circumstances, named_failure
 from .lowering import lower
 from .resolver import Resolver, unique_names
+from .sampled_control import require_samples
 
 MAX_QUOTED = 4  # names in a message
 

@@ -15,9 +15,10 @@ from pin_nonideal.states.rows import row_slices
 from .actuation import lower_actuation
 from .callbacks import ReactionNames
 from .constraints import lower_constraint
+from .contact_friction import lower_contact_friction
 from .contacts import lower_contacts, lower_gaps
 from .forces import lower_force
-from .friction import LoweringContext, lower_contact_friction
+from .friction import LoweringContext
 from .laws import lower_law
 from .resolver import Resolver, unique_names
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pin_nonideal.description.actuation import drives_of
 from pin_nonideal.description.contacts import JointLimit
+from pin_nonideal.description.drive_lists import drives_of
 from pin_nonideal.description.laws import JointFriction
 from pin_nonideal.types import Model
 

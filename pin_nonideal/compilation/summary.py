@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pin_nonideal.description.actuation import drives_of
+from pin_nonideal.description.drive_lists import drives_of
 from pin_nonideal.states.joint_order import file_order
 from pin_nonideal.types import Model, Table
 

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, is_dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,6 +30,7 @@ from pin_nonideal.validation import (
     text,
 )
 
+from .drive_lists import drives_of, given_actuation
 from .scene_drive import SceneDrive
 
 __all__ = [
@@ -286,94 +286,3 @@ def checked_samples(what: str, values: object, count: int) -> Array | dict[str, 
         name: array(f'{what} of "{name}"', x, (count,) if np.ndim(x) < 2 else (count, None))
         for name, x in samples.items()
     }
-
-
-def given_actuation(actuation: object) -> Any:
-    """Return an actuation, with a list of drives as a tuple.
-
-    A list or tuple is a list of drives if an entry is a description, a function, a table by joint name or an
-    array. Otherwise it holds the numbers of constant torques.
-
-    Args:
-        actuation: the argument of a scene.
-
-    Raises:
-        InputError: an entry of a list of drives is None or another list of drives.
-    """
-    if not isinstance(actuation, (list, tuple)) or not any(map(_is_drive, actuation)):
-        return actuation
-    for k, drive in enumerate(actuation):
-        if drive is None or given_actuation(drive) is not drive:
-            kind = "None" if drive is None else "another list"
-            raise InputError(
-                f"actuation: each entry of a list of drives must be a drive; entry {k} is {kind}"
-            )
-    return tuple(actuation)
-
-
-def _is_drive(entry: object) -> bool:
-    """Check if an entry of a list is a drive and not a number of constant torques."""
-    arrays = isinstance(entry, (list, tuple)) or (isinstance(entry, np.ndarray) and entry.ndim > 0)
-    return arrays or callable(entry) or is_dataclass(entry) or by_name(entry) is not None
-
-
-def drives_of(actuation: Any) -> tuple[Any, ...]:
-    """Return the drives of an actuation: none, one, or those of a list.
-
-    Args:
-        actuation: the actuation of a scene, as returned by `given_actuation`.
-    """
-    if actuation is None:
-        return ()
-    is_list = isinstance(actuation, tuple) and any(map(_is_drive, actuation))
-    return actuation if is_list else (actuation,)
-
-
-def requesting_drives(actuation: object) -> list[object]:
-    """Return the drives that request torques, those within effort limits included.
-
-    Args:
-        actuation: the actuation of a scene, as returned by `given_actuation`.
-    """
-    requesting: list[object] = []
-    for drive in drives_of(actuation):
-        requesting += drives_of(drive.actuation) if isinstance(drive, EffortLimits) else [drive]
-    return requesting
-
-
-def sampled_drives(actuation: object) -> list[Any]:
-    """Return the drives that hold their torque between samples of a period.
-
-    Args:
-        actuation: the actuation of a scene, as returned by `given_actuation`.
-    """
-    kinds = (SampledControl, SceneDrive)
-    return [d for d in requesting_drives(actuation) if isinstance(d, kinds) and d.period is not None]
-
-
-def delayed_control(actuation: object) -> SampledControl | None:
-    """Return the sampled control with a delay, or None; `lower_actuation` refuses a second one.
-
-    Args:
-        actuation: the actuation of a scene, as returned by `given_actuation`.
-    """
-    controls = (d for d in requesting_drives(actuation) if isinstance(d, SampledControl))
-    return next((d for d in controls if d.delay_in_samples), None)
-
-
-def held_tables(actuation: object) -> list[Table]:
-    """Return the tables that hold each torque until the next time.
-
-    Args:
-        actuation: the actuation of a scene, as returned by `given_actuation`.
-    """
-    return [d for d in requesting_drives(actuation) if isinstance(d, Table) and d.interpolation == "hold"]
-
-
-def switching_drives(actuation: object) -> list[object]:
-    """Return the drives whose torques jump at times that end steps.
-
-    Args:
-        actuation: the actuation of a scene, as returned by `given_actuation`.
-    """
-    return sampled_drives(actuation) + held_tables(actuation)

@@ -18,7 +18,7 @@ from typing import Any
 import pinocchio as pin
 
 from pin_nonideal.atomic_files import file_path
-from pin_nonideal.description.laws import static_ratio as ratio_of_static
+from pin_nonideal.description.joint_friction import static_ratio as ratio_of_static
 from pin_nonideal.errors import InputError, LoadingError, UnknownNameError, nearest, short_repr
 from pin_nonideal.types import GeometryModel, GeometryObject, Model
 from pin_nonideal.validation import (

@@ -11,9 +11,10 @@ import pinocchio as pin
 from pin_nonideal.compilation.analysis import check_model
 from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.core_loader import core
-from pin_nonideal.description.actuation import Actuation, given_actuation
+from pin_nonideal.description.actuation import Actuation
 from pin_nonideal.description.constraints import Constraint
 from pin_nonideal.description.contacts import Contact
+from pin_nonideal.description.drive_lists import given_actuation
 from pin_nonideal.description.forces import Force
 from pin_nonideal.description.laws import Law
 from pin_nonideal.description.scene_spec import SceneSpec

@@ -20,12 +20,12 @@ from typing import Any
 import numpy as np
 
 from pin_nonideal.atomic_files import file_path, whole_file
-from pin_nonideal.compilation.actuation import initial_torque
 from pin_nonideal.compilation.delay import DelayedTorque
 from pin_nonideal.compilation.lowering import lower
 from pin_nonideal.compilation.resolver import Resolver
+from pin_nonideal.compilation.sampled_control import initial_torque
 from pin_nonideal.core_loader import core
-from pin_nonideal.description.actuation import delayed_control
+from pin_nonideal.description.drive_kinds import delayed_control
 from pin_nonideal.errors import InputError, LoadingError, OutputError
 from pin_nonideal.scene.scene import Scene, compiled_scene, scene_origin
 from pin_nonideal.trajectory.file import UNREADABLE, reason_of

@@ -18,7 +18,8 @@ from pin_nonideal.types import Array
 
 from .components import Component, components
 from .merge import merge_outcomes
-from .options import METHODS, SCIPY, RunOptions
+from .methods import METHODS, SCIPY
+from .options import RunOptions
 
 
 def decoupled_components(scene: Scene, options: RunOptions) -> list[Component]:

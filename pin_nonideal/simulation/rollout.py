@@ -19,7 +19,8 @@ from pin_nonideal.types import Array
 from pin_nonideal.validation import array, choice, count
 
 from .decoupled import decoupled_components, rollout_decoupled
-from .options import SCIPY, RunOptions, run_options
+from .methods import SCIPY
+from .options import RunOptions, run_options
 from .results import finish
 from .rollout_arrays import RunArrays, run_arrays
 

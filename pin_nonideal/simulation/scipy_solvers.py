@@ -16,13 +16,14 @@ from typing import Any
 import numpy as np
 
 from pin_nonideal.core_loader import core
-from pin_nonideal.description.actuation import switching_drives
+from pin_nonideal.description.drive_kinds import switching_drives
 from pin_nonideal.errors import InputError, RunError, StepSizeError
 from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.types import Array
 
 from .events import Watched
-from .options import ONE_STEP, RunOptions
+from .methods import ONE_STEP
+from .options import RunOptions
 
 Tick = Callable[[float], None]  # function of the time [s]
 

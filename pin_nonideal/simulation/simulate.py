@@ -19,7 +19,8 @@ from pin_nonideal.validation import choice, nonnegative
 
 from .decoupled import decoupled_components, run_decoupled, run_together
 from .events import RunRequests, parse_callback, parse_events
-from .options import SCIPY, cached_options
+from .methods import SCIPY
+from .options import cached_options
 from .progress import progress_bar
 from .results import finish
 

@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 from pin_nonideal.core_loader import core
-from pin_nonideal.simulation.options import METHODS, SCIPY
+from pin_nonideal.simulation.methods import METHODS, SCIPY
 
 CORE = Path(__file__).parents[2] / "pin_nonideal" / "_core"
 EIGEN = Path(pin.__file__).parents[4] / "include" / "eigen3"

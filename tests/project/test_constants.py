@@ -1,7 +1,8 @@
-"""Each named constant of the compiled core is defined once, in the file of its subject."""
+"""Constants of the compiled core: members of the parameters of a solver, or defined once in their file."""
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections import defaultdict
 from pathlib import Path
@@ -19,6 +20,19 @@ def constants(text: str) -> list[str]:
         values = re.sub(r"\{[^{}]*\}|\([^()]*\)", "", declaration)
         names += re.findall(r"(\w+)\s*(?:\[[^\]]*\])*\s*=(?!=)", values)
     return names
+
+
+PARAMETERS = re.compile(r"^struct (\w+Parameters) \{\n(.*?)^\};", re.M | re.S)
+
+
+def undocumented(members: str) -> list[str]:
+    """Return the lines of members without a comment beside or above them."""
+    lines = ["", *members.splitlines()]
+    return [
+        line.strip()
+        for before, line in itertools.pairwise(lines)
+        if line and "//" not in line and not before.lstrip().startswith("//")
+    ]
 
 
 def code(path: Path) -> str:
@@ -48,8 +62,37 @@ def test_no_constant_is_defined_twice() -> None:
     for path in sorted(CORE.rglob("*.[ch]pp")):
         for name in constants(path.read_text(encoding="utf-8")):
             files[name].append(path.relative_to(CORE).as_posix())
-    assert len(files) > 400
+    assert 50 < len(files) <= 100  # others are members of the parameters of a solver
     assert {name: paths for name, paths in files.items() if len(paths) > 1} == {}
+
+
+def test_undocumented_members_are_found() -> None:
+    text = """struct SomeParameters {
+    double first = 1e-3;  // unit
+    int second = 2;
+    // Unit.
+    double third = 3.0;
+    double fourth = 4.0;
+};
+"""
+    ((name, members),) = PARAMETERS.findall(text)
+    assert name == "SomeParameters"
+    assert undocumented(members) == ["int second = 2;", "double fourth = 4.0;"]
+
+
+def test_parameters_of_solvers_are_documented_and_constant() -> None:
+    """Each has a constexpr object, so that reading a member costs nothing."""
+    owners: dict[str, str] = {}
+    for path in sorted(CORE.rglob("*.[ch]pp")):
+        text = path.read_text(encoding="utf-8")
+        for name, members in PARAMETERS.findall(text):
+            assert name not in owners, f"{name} is defined twice"
+            owners[name] = path.relative_to(CORE).as_posix()
+            assert undocumented(members) == [], name
+            own = rf"(using Parameters = {name};\n +static constexpr Parameters|constexpr {name}) \w+\{{\}};"
+            used = "\n".join(p.read_text(encoding="utf-8") for p in path.parent.glob(f"{path.stem}.*"))
+            assert re.search(own, used), f"{name} has no constexpr object"
+    assert len(owners) > 70
 
 
 def test_shared_tolerances_are_in_one_header() -> None:
@@ -66,6 +109,27 @@ def test_shared_tolerances_are_in_one_header() -> None:
         if room(other) != room(path) and re.search(rf"(?<![.>\w]){name}\b", users)
     ]
     assert shared == []
+
+
+def test_no_room_reads_real_parameters_of_another_room() -> None:
+    sources = {path: code(path) for path in sorted(CORE.rglob("*.[ch]pp"))}
+    holders: dict[str, tuple[str, list[str]]] = {}
+    for path, text in sources.items():
+        for name, members in PARAMETERS.findall(text):
+            reals = re.findall(r"(\w+) =", "".join(re.findall(r"^ +double .*$", members, re.M)))
+            owner = re.findall(rf"class (\w+)[^;{{]*\{{\n(?:public:\n)? +using Parameters = {name};", text)
+            for holder in [*re.findall(rf"constexpr {name} (\w+)\{{", text), *owner]:
+                holders[holder] = room(path), reals
+    assert len(holders) > 70
+    reads = [
+        f"{path.relative_to(CORE)}: {holder}.{member}"
+        for path, text in sources.items()
+        for holder, member in re.findall(r"(\w+)(?:::parameters)?\.(\w+)", text)
+        if holder in holders
+        and holders[holder][0] not in ("math", room(path))
+        and member in holders[holder][1]
+    ]
+    assert reads == []
 
 
 def test_shared_tolerances_are_few_and_explained() -> None:

@@ -13,7 +13,8 @@ from typing import NamedTuple
 
 import pytest
 
-from pin_nonideal.loading.load import load, robots
+from pin_nonideal.loading.load import load
+from pin_nonideal.loading.robot_files import robots
 
 from .test_stopped_runs import EXAMPLE
 

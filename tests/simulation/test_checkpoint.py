@@ -18,7 +18,7 @@ import pytest
 
 import pin_nonideal as pn
 from pin_nonideal.errors import InputError, LoadingError, OutputError, RunInterrupted
-from pin_nonideal.loading.load import robot_folders
+from pin_nonideal.loading.robot_files import robot_folders
 from pin_nonideal.simulation import checkpoint
 from pin_nonideal.simulation.options import run_options
 

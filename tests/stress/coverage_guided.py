@@ -22,7 +22,7 @@ import atheris
 
 with atheris.instrument_imports(include=["pin_nonideal", "yaml"]):
     import pin_nonideal as pn
-    from pin_nonideal.loading.load import robot_folders
+    from pin_nonideal.loading.robot_files import robot_folders
 
 SMALL = ("four_bar", "slider_crank", "five_bar", "belt_oscillator", "loaded_joint")
 

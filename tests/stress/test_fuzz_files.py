@@ -14,7 +14,7 @@ import yaml
 from hypothesis import strategies as st
 
 import pin_nonideal as pn
-from pin_nonideal.loading.load import robot_folders
+from pin_nonideal.loading.robot_files import robot_folders
 
 from .fuzzing import NAMES, NUMBERS, few_and_many, for_all, result_or_named_error
 from .measure import finite

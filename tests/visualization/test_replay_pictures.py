@@ -15,7 +15,7 @@ import pytest
 
 import pin_nonideal as pn
 from pin_nonideal.core_loader import core
-from pin_nonideal.loading.load import robots
+from pin_nonideal.loading.robot_files import robots
 from pin_nonideal.visualization.page.style import EVENTS, FORCES, MARKS, MODES
 
 from ..support.paper_examples import example

@@ -9,14 +9,6 @@ namespace pn {
 
 namespace {
 
-constexpr double met = 1e-9;                   // part of the acceleration scale that counts as zero
-constexpr double box_limit_tolerance = 1e-12;  // relative distance to the limit at which a force is at it
-constexpr double box_rounding = 1e-13;         // rounding, relative to a limit or to the acceleration scale
-constexpr double noise_of_others = 1e-14;      // rounding of other elements, relative to the largest acceleration
-// Smallest root of a pivot of W, scaled to a unit diagonal, for which the Cholesky factor is as good as an orthogonal one.
-constexpr double min_box_pivot = 1e-3;
-constexpr int most_patience = 10;  // rounds of block pivoting without progress
-
 // Compute the Cholesky factor of A, scaled to a unit diagonal, by rows, with the inverse pivots. Returns false if A is
 // nearly singular.
 PN_WIDE bool factor_scaled(int n, const double* A, const double* scale, double* L, double* inverse) {
@@ -26,7 +18,7 @@ PN_WIDE bool factor_scaled(int n, const double* A, const double* scale, double* 
             const double* Lj = L + j * n;
             const double sum = A[i + j * n] * scale[i] * scale[j] - dot(Li, Lj, j);
             if (j < i) Li[j] = sum * inverse[j];
-            else if (!(sum > min_box_pivot * min_box_pivot)) return false;
+            else if (!(sum > BoxProgram::parameters.min_pivot * BoxProgram::parameters.min_pivot)) return false;
             else inverse[i] = 1.0 / std::sqrt(sum);
         }
     }
@@ -87,7 +79,7 @@ void BoxProgram::solve_free(const MatX& W) {
 void BoxProgram::measure(const MatX& W, const VecX& alpha0, const VecX& forces) {
     size_ = alpha0.cwiseAbs();
     for (int j = 0; j < forces.size(); ++j) size_ += std::abs(forces[j]) * W.col(j).cwiseAbs();
-    noise_ = noise_of_others * size_.maxCoeff();
+    noise_ = parameters.noise_of_others * size_.maxCoeff();
 }
 
 // Set start forces within the limits, close to `initial`: each at its limit or free.
@@ -96,7 +88,7 @@ void BoxProgram::start(const VecX& s, const VecX* initial) {
     f_.setZero(n);
     is_free_.assign(n, 1);
     for (int i = 0; i < n; ++i) {
-        is_free_[i] = s[i] > 0.0 && (!initial || std::abs((*initial)[i]) < s[i] * (1.0 - box_limit_tolerance));
+        is_free_[i] = s[i] > 0.0 && (!initial || std::abs((*initial)[i]) < s[i] * (1.0 - parameters.limit_tolerance));
         if (initial && s[i] > 0.0) f_[i] = is_free_[i] ? (*initial)[i] : (*initial)[i] > 0.0 ? s[i] : -s[i];
     }
 }
@@ -117,7 +109,7 @@ void BoxProgram::descend(const MatX& W, const VecX& alpha0, const VecX& s) {
         bool endless = false;
         for (int i = 0; i < n; ++i) {
             if (!is_free_[i]) left_[i] = 0.0;
-            endless |= std::abs(left_[i]) > met * size_[i] + noise_;
+            endless |= std::abs(left_[i]) > parameters.met * size_[i] + noise_;
         }
         if (endless) x_ = -left_;
         double length = endless ? HUGE_VAL : 1.0;
@@ -136,7 +128,7 @@ void BoxProgram::descend(const MatX& W, const VecX& alpha0, const VecX& s) {
         alpha_ = alpha0;
         alpha_.noalias() += W * f_;
         int worst = -1;  // element that accelerates most along its force: it becomes free
-        double most = box_rounding;
+        double most = parameters.rounding;
         for (int i = 0; i < n; ++i) {
             const double back = alpha_[i] * (f_[i] > 0.0 ? 1.0 : -1.0) - noise_;
             if (is_free_[i] || !(s[i] > 0.0) || !(back > most * size_[i])) continue;
@@ -152,7 +144,7 @@ void BoxProgram::descend(const MatX& W, const VecX& alpha0, const VecX& s) {
 // elements cannot all stick, or if pivoting does not end.
 bool BoxProgram::pivot_blocks(const MatX& W, const VecX& alpha0, const VecX& s) {
     const int n = static_cast<int>(s.size());
-    int fewest = n + 1, patience = most_patience;
+    int fewest = n + 1, patience = parameters.most_patience;
     for (int it = 0; it < 200 + 50 * n; ++it) {
         for (int i = 0; i < n; ++i)
             if (is_free_[i]) f_[i] = 0.0;
@@ -165,15 +157,16 @@ bool BoxProgram::pivot_blocks(const MatX& W, const VecX& alpha0, const VecX& s) 
         measure(W, alpha0, f_);
         wrong_.clear();
         for (int i = 0; i < n; ++i) {
-            if (is_free_[i] && std::abs(alpha_[i]) > met * size_[i] + noise_) return false;
-            const bool outside = is_free_[i] && std::abs(f_[i]) > s[i] * (1.0 + box_rounding);
-            const bool drives = !is_free_[i] && alpha_[i] * f_[i] > (box_rounding * size_[i] + noise_) * std::abs(f_[i]);
+            if (is_free_[i] && std::abs(alpha_[i]) > parameters.met * size_[i] + noise_) return false;
+            const bool outside = is_free_[i] && std::abs(f_[i]) > s[i] * (1.0 + parameters.rounding);
+            const bool drives =
+                !is_free_[i] && alpha_[i] * f_[i] > (parameters.rounding * size_[i] + noise_) * std::abs(f_[i]);
             if (outside || drives) wrong_.push_back(i);
         }
         if (wrong_.empty()) return true;
         if (static_cast<int>(wrong_.size()) < fewest) {
             fewest = static_cast<int>(wrong_.size());
-            patience = most_patience;
+            patience = parameters.most_patience;
         } else if (--patience < 0) {
             wrong_.assign(1, wrong_.back());
         }
@@ -194,7 +187,7 @@ void BoxProgram::solve(const MatX& W, const VecX& alpha0, const VecX& s, const V
     f_.setZero(n);
     is_free_.assign(n, 1);
     for (int i = 0; initial && i < n; ++i) {
-        is_free_[i] = std::abs(initial_[i]) < s[i] * (1.0 - box_limit_tolerance);
+        is_free_[i] = std::abs(initial_[i]) < s[i] * (1.0 - parameters.limit_tolerance);
         if (!is_free_[i]) f_[i] = initial_[i] > 0.0 ? s[i] : -s[i];
     }
     if (!pivot_blocks(W, alpha0, s)) {

@@ -19,11 +19,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr int max_socp_steps = 60, max_mode_newton = 12;
-// Largest z . y of a solution, relative to the acceleration scale. Rounding may end the iteration before.
-constexpr double socp_gap_tolerance = 1e-17;
-constexpr double mode_newton_tolerance = 4e-16, condition = 1e-12;
-
 struct ConeProgram {
     const MatX& W;
     const VecX& alpha0;
@@ -123,7 +118,7 @@ struct ConeProgram {
         }
         VecX dx(n);
         std::vector<Cone> dy(elements), second(elements);
-        for (int it = 0; it < max_socp_steps && gap() > socp_gap_tolerance; ++it) {
+        for (int it = 0; it < socp_parameters.max_steps && gap() > socp_parameters.gap_tolerance; ++it) {
             if (!factorize()) return;
             std::fill(second.begin(), second.end(), Cone());
             direction(0.0, second, dx, dy);
@@ -149,7 +144,7 @@ struct ConeProgram {
         for (int e = 0; e < elements; ++e)
             if (slides[e]) m[e] = y[e].tail.norm();
         double last = HUGE_VAL;
-        for (int it = 0; it < max_mode_newton; ++it) {
+        for (int it = 0; it < socp_parameters.max_mode_newton; ++it) {
             MatX J = MatX::Zero(n + elements, n + elements);
             VecX residual = VecX::Zero(n + elements);
             J.topLeftCorner(n, n) = V;
@@ -164,14 +159,15 @@ struct ConeProgram {
                 residual[n + e] = 0.5 * (xe.squaredNorm() - 1.0);
             }
             const double error = residual.cwiseAbs().maxCoeff();
-            const bool done = error <= mode_newton_tolerance || (error < condition && error >= last);
+            const bool done =
+                error <= socp_parameters.mode_newton_tolerance || (error < socp_parameters.condition && error >= last);
             last = error;
             if (done) break;
             const VecX step = least_squares(J, residual, response_rank_threshold);
             there -= step.head(n);
             m -= step.tail(elements);
         }
-        return last < condition;
+        return last < socp_parameters.condition;
     }
 
     // Find the modes from the end of the path. An element slips if its acceleration exceeds the distance of its force
@@ -185,7 +181,8 @@ struct ConeProgram {
             int changed = 0, nearest = -1;
             if (solve_modes(slides, there, m)) {
                 for (int e = 0; e < elements; ++e) {
-                    const bool wrong = slides[e] ? m[e] < -condition : tail(there, e).norm() > 1.0 + condition;
+                    const bool wrong = slides[e] ? m[e] < -socp_parameters.condition
+                                                 : tail(there, e).norm() > 1.0 + socp_parameters.condition;
                     if (!wrong) continue;
                     slides[e] = !slides[e];
                     ++changed;
@@ -209,7 +206,8 @@ struct ConeProgram {
         const bool found = find_modes();
         for (int e = 0; e < elements; ++e) {  // slipping forces are exactly at their limits
             const double length = tail(x, e).norm();
-            if (found ? length > 1.0 - condition : y[e].head > 1.0 - length) x.segment(at[e], dims[e]) /= length;
+            if (found ? length > 1.0 - socp_parameters.condition : y[e].head > 1.0 - length)
+                x.segment(at[e], dims[e]) /= length;
         }
         return scale.cwiseProduct(x);
     }

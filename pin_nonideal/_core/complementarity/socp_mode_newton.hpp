@@ -10,6 +10,17 @@
 
 namespace pn {
 
+struct SocpParameters {
+    int max_steps = 60;        // maximum steps of the interior-point method
+    int max_mode_newton = 12;  // maximum Newton steps for fixed modes
+    // Largest z . y of a solution, relative to the acceleration scale. Rounding may end the iteration before.
+    double gap_tolerance = 1e-17;
+    double mode_newton_tolerance = 4e-16;  // relative error of the forces: two units of roundoff
+    double condition = 1e-12;              // violation of a mode's condition that is rounding, relative to a limit
+};
+
+inline constexpr SocpParameters socp_parameters{};
+
 VecX ball_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& s);
 // Solve the same program, as a box program if every element has one direction.
 VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& s,

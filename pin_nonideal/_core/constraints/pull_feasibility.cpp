@@ -10,9 +10,6 @@ namespace pn {
 
 namespace {
 
-constexpr double binding = 1e-6;                // part of the largest weight below which a row does not bind
-constexpr double pull_margin_rounding = 1e-12;  // rounding of a margin, relative to the loads
-
 // Return a basis of the multipliers of all described rows that together exert no force. The rows of Z follow the
 // described rows, and its columns are orthonormal. The other rows depend on the first described row of each row in use:
 // A_others = C A_first. Then y_first = -C^T z and y_others = z.
@@ -89,9 +86,10 @@ Press press(const std::vector<Block>& blocks, const std::vector<double>& B,
     }
     const LargestLeast least = largest_least(Z, N);
     found.margin = least.value;
-    found.must_pull = least.value < -pull_margin_rounding * N.cwiseAbs().maxCoeff();
+    found.must_pull = least.value < -pull_feasibility_parameters.margin_rounding * N.cwiseAbs().maxCoeff();
     for (int k = 0; k < least.weight.size(); ++k)
-        if (least.weight[k] > binding * least.weight.maxCoeff()) found.pulling.push_back(found.sharing[k]);
+        if (least.weight[k] > pull_feasibility_parameters.binding * least.weight.maxCoeff())
+            found.pulling.push_back(found.sharing[k]);
     return found;
 }
 

@@ -6,6 +6,13 @@
 
 namespace pn {
 
+struct PullFeasibilityParameters {
+    double binding = 1e-6;           // part of the largest weight below which a row does not bind
+    double margin_rounding = 1e-12;  // rounding of a margin, relative to the loads
+};
+
+inline constexpr PullFeasibilityParameters pull_feasibility_parameters{};
+
 struct Press {
     double margin;             // largest s with all multipliers >= s in some distribution (negative: some row must pull)
     std::vector<int> sharing;  // rows that share a load with the given row, as indices of `pressing`

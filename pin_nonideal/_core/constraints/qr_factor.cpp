@@ -2,13 +2,11 @@
 
 #include <algorithm>
 
+#include "constraints/rank_parameters.hpp"
+
 namespace pn {
 
 namespace {
-
-// Relative difference of squared lengths below which two columns tie. The earlier column then goes first, so that
-// rounding does not choose among equal rows.
-constexpr double tie = 1e-12;
 
 // Copy the rows in use, scaled to unit length, to the columns of Q.
 void dense_columns(const std::vector<Block>& blocks, const std::vector<double>& B,
@@ -40,7 +38,7 @@ int householder(RowSystem& s, int n, bool pivot, double tolerance) {
             double best_norm = -1.0;
             for (int c = k; c < n; ++c) {
                 const double norm = s.Q.col(c).tail(m - k).squaredNorm();
-                if (norm > best_norm * (1.0 + tie)) { best_norm = norm; best = c; }
+                if (norm > best_norm * (1.0 + rank_parameters.tie)) { best_norm = norm; best = c; }
             }
             if (best != k) {
                 s.Q.col(k).swap(s.Q.col(best));

@@ -4,16 +4,16 @@
 #include <cmath>
 
 #include "constraints/qr_factor.hpp"
+#include "constraints/rank_parameters.hpp"
 #include "constraints/row_length.hpp"
 
 namespace pn {
 
-// Part of a largest squared length, or of a largest pivot, below which a new choice of rows is due.
-static constexpr double faded_part = 0.1;
-
 // Check if a block is a permanent constraint. Contacts and friction count by their own length, as in the programs that
 // decide which elements stick.
-static bool is_lasting(const Block& block) { return role(block.kind) == Role::constraint && pressing_row(block.kind) < 0; }
+static bool is_lasting(const Block& block) {
+    return role(block.kind) == Role::constraint && pressing_row(block.kind) < 0;
+}
 
 // Check if the rows of a block hold a position by coordinates. Such rows keep their greatest length at any pose so far.
 static bool keeps_length(const Block& block, const RowValues& values) {
@@ -49,7 +49,7 @@ void decide_rows(const Mechanism& m, Terms& terms, const std::vector<Block>& blo
 
 bool is_choice_due(RowSystem& s) {
     if (!s.redundant) return false;
-    bool due = s.min_pivot < faded_part * s.chosen_pivot;
+    bool due = s.min_pivot < rank_parameters.faded_part * s.chosen_pivot;
     s.chosen_pivot = std::max(s.chosen_pivot, s.min_pivot);
     const Envelope& at = s.envelope;
     for (int i = 0; i < at.size(); ++i) {
@@ -58,7 +58,7 @@ bool is_choice_due(RowSystem& s) {
         const double square = s.G[at.start[i] + i];
         s.longest[row] = std::max(s.longest[row], square);
         if (!s.active[row]) continue;
-        due |= square < faded_part * s.longest_chosen[row];
+        due |= square < rank_parameters.faded_part * s.longest_chosen[row];
         s.longest_chosen[row] = std::max(s.longest_chosen[row], square);
     }
     return due;

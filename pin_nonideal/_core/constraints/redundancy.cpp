@@ -4,12 +4,6 @@
 
 namespace pn {
 
-// Weights of rows are solved from products of rows, which square the condition number. A second pass therefore solves
-// for the rest of the dependent row, unless this rest is rounding. [Bjorck: Stability analysis of the method of
-// seminormal equations, 1987.]
-static constexpr double dependent_row_rounding = 1e-14;
-static constexpr int most_passes = 2;
-
 std::vector<int> dependent_rows(const RowSystem& s) {
     std::vector<int> dependent;
     if (!s.redundant) return dependent;
@@ -39,10 +33,10 @@ MatX dependence(const std::vector<Block>& blocks, const std::vector<double>& B, 
     const std::vector<int>& rows = s.envelope.row_at;
     const MatX used = columns_of(blocks, B, s, rows);
     MatX rest = columns_of(blocks, B, s, dependent);
-    const VecX least = dependent_row_rounding * rest.colwise().norm().transpose();
+    const VecX least = redundancy_parameters.rounding * rest.colwise().norm().transpose();
     MatX W = MatX::Zero(rest.cols(), used.cols()), weights(used.cols(), rest.cols());
     VecX product = VecX::Zero(s.scale.size()), weight = product;
-    for (int pass = 0; pass < most_passes; ++pass) {
+    for (int pass = 0; pass < redundancy_parameters.most_passes; ++pass) {
         if ((rest.colwise().norm().transpose().array() <= least.array()).all()) break;
         weights.noalias() = used.transpose() * rest;
         for (Eigen::Index k = 0; k < rest.cols(); ++k) {

@@ -6,6 +6,16 @@
 
 namespace pn {
 
+struct RedundancyParameters {
+    // Weights of rows are solved from products of rows, which square the condition number. A second pass therefore
+    // solves for the rest of the dependent row, unless this rest is rounding. [Bjorck: Stability analysis of the method
+    // of seminormal equations, 1987.]
+    double rounding = 1e-14;  // rest of a row that is rounding, relative to the row
+    int most_passes = 2;      // passes, of which the second solves for the rest
+};
+
+inline constexpr RedundancyParameters redundancy_parameters{};
+
 // Rows of all descriptions and the kept rows that represent them. Duplicate rows are removed but carry their share of
 // the load.
 struct DescribedRows {
@@ -21,7 +31,9 @@ struct DescribedRows {
     // Compute parts and weights once all rows are known.
     void finish(int kept);
     // Return the multiplier of one described row from the multipliers of the kept rows.
-    double share(int row, const VecX& lam) const { return rows[row].kept < 0 ? 0.0 : rows[row].part * lam[rows[row].kept]; }
+    double share(int row, const VecX& lam) const {
+        return rows[row].kept < 0 ? 0.0 : rows[row].part * lam[rows[row].kept];
+    }
 };
 
 // Required rows that depend on the active rows, and their coefficients: A_dependent = W A_active. The columns of W are

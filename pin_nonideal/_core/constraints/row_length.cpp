@@ -3,18 +3,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "constraints/rank_parameters.hpp"
 #include "tree/mass_factor.hpp"
 
 namespace pn {
 
 namespace {
-
-// Part of the length of a force that moves all mass, below which the length of a row may be rounding. For example, a
-// force through the only pin of a body moves nothing at any position of the pin.
-constexpr double min_length_part = 1e-4;
-// Lower bound on the length of a row of a user's function, as a part of the longest row. Rounding of a direction
-// without freedom is far shorter, and rows in other units are longer.
-constexpr double least_of_function = 1e-4;
 
 class Lengths {
 public:
@@ -22,7 +16,7 @@ public:
         if (block.deep) body_.resize(m.joints.size());
         double mass = 0.0;
         for (const Joint& joint : m.joints) mass += joint.mass;
-        if (mass > 0.0) least_ = min_length_part * min_length_part / mass;
+        if (mass > 0.0) least_ = rank_parameters.min_length_part * rank_parameters.min_length_part / mass;
     }
 
     // Return the squared length of the row of one unit wrench.
@@ -88,7 +82,7 @@ void greatest_lengths(const Mechanism& m, Terms& terms, const Block& block, cons
         length[k] = std::sqrt((force > 0.0 ? force * forces : 0.0) + (couple > 0.0 ? couple * couples : 0.0));
     }
     if (values.geometric || rows.empty()) return;
-    const double least = least_of_function * *std::max_element(length, length + rows.size());
+    const double least = rank_parameters.min_function_length_part * *std::max_element(length, length + rows.size());
     std::transform(length, length + rows.size(), length, [&](double own) { return std::max(own, least); });
 }
 
@@ -97,7 +91,8 @@ void own_lengths(const Mechanism& m, Terms& terms, const Block& block, const std
     Lengths lengths(m, terms, block);
     for (size_t k = 0; k < rows.size(); ++k) {
         const int row = rows[k];
-        length[k] = std::sqrt(values.geometric ? lengths.square(values.wrench[row]) : lengths.of_coordinates(values, row));
+        length[k] =
+            std::sqrt(values.geometric ? lengths.square(values.wrench[row]) : lengths.of_coordinates(values, row));
     }
 }
 

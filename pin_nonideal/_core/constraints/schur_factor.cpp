@@ -4,16 +4,11 @@
 #include <cmath>
 
 #include "constraints/qr_factor.hpp"
+#include "constraints/rank_parameters.hpp"
 #include "math/lanes.hpp"
 #include "math/unrolled.hpp"
 
 namespace pn {
-
-// Smallest trusted pivot of the Cholesky factor of the unit-diagonal B B^T. The relative error of the factor stays
-// below the machine precision divided by this value. Below it the orthogonal factorization of B^T is used.
-constexpr double min_schur_pivot = 1e-5;
-// Part of the squared length of the longest row of a block below which a row is rounding.
-constexpr double vanishing_square = 1e-28;
 
 // Compute the entries of G = B B^T below the diagonal for n1 rows of one block, from position p1, and n2 rows of
 // another, from p2. The sum runs over their common dofs.
@@ -80,7 +75,7 @@ static PN_INLINE double shortest_row(const std::vector<Block>& blocks, const Row
             least = std::min(least, square);
             most = std::max(most, square);
         }
-        vanishes |= least < vanishing_square * most;
+        vanishes |= least < rank_parameters.vanishing_square * most;
         if (block.comparable_rows && least < shortest * most) shortest = least / most;
     }
     return shortest;
@@ -121,7 +116,7 @@ static PN_INLINE bool factor_cholesky(RowSystem& s) {
             pivot -= Li[j] * Li[j];
         }
         s.min_pivot = std::min(s.min_pivot, pivot);
-        if (!(pivot >= min_schur_pivot)) return false;
+        if (!(pivot >= rank_parameters.min_schur_pivot)) return false;
         Li[i] = 1.0 / std::sqrt(pivot);
     }
     return true;

@@ -18,34 +18,19 @@ namespace {
 
 using Choice = std::vector<char>;  // closed flag by gap
 
-// Time [s] within which a closing gap touches.
-constexpr double touching_time = 1e-12;
-// At the start of a run, gaps up to this fraction of the scene's size touch.
-constexpr double starting_width = 1e-10;
-// Enumerate all active sets up to this many contacts if pivoting fails.
-constexpr int most_enumerated = 12;
-// Limit of the enumeration if slip directions must be consistent too. Without consistency a motion to integrate exists.
-constexpr int most_aligned = 8;
-// No body closes a wider gap [m or rad] within `touching_time`: its speed would exceed the speed of light.
-constexpr double sure_gap = 1e-3;
-// Minimum number of contacts that can share a load in several ways.
-constexpr int may_share = 2;
-
-// Minimum slip acceleration that defines a direction, relative to the scale of accelerations, and allowed deviation of
-// the direction (1 - cosine).
-constexpr double min_direction_acceleration = 1e-4, astray = 1e-6;
-
 }  // namespace
 
 bool goes_its_way(const Program& p, Workspace& w, const VecX& v) {
-    const double least = min_direction_acceleration * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
+    const double least =
+        active_set_parameters.min_direction_acceleration * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
     for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
         if (!slips(w.state.mode[e])) continue;
         const Friction& f = p.frictions[e];
         if (f.dim == 1 || f.gap < 0 || is_open(p, w, e) || !at_rest(p, w, e, v)) continue;
         const Vec3 begins = slip_acceleration(p, w, f);
         const double size = begins.norm();
-        if (size > least && begins.dot(w.state.slip_direction[e]) < (1.0 - astray) * size) return false;
+        if (size > least && begins.dot(w.state.slip_direction[e]) < (1.0 - active_set_parameters.astray) * size)
+            return false;
     }
     return true;
 }
@@ -142,7 +127,9 @@ struct Search {
         std::vector<int> list;
         for (int i = 0; i < static_cast<int>(rest.size()); ++i)
             if (rest[i]) list.push_back(i);
-        if (static_cast<int>(list.size()) > (aligned ? most_aligned : most_enumerated)) return false;
+        if (static_cast<int>(list.size()) >
+            (aligned ? active_set_parameters.most_aligned : active_set_parameters.most_enumerated))
+            return false;
         std::vector<unsigned> order(1u << list.size());
         for (unsigned k = 0; k < order.size(); ++k) order[k] = k;
         const auto count = [](unsigned bits) { return __builtin_popcount(bits); };
@@ -161,16 +148,17 @@ struct Search {
 Touching touching_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, bool starts) {
     Touching out{Choice(p.gaps.size(), 0), Choice(p.gaps.size(), 0)};
     update_kinematics(p, w, t, q, v);
-    const double width = starts ? starting_width * scene_size(p, w) : touching_width;
+    const double width = starts ? active_set_parameters.starting_width * scene_size(p, w) : touching_width;
     std::vector<int> list;
     for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
         if (is_bare(p, i)) continue;
         if (!w.state.closed[i] && !p.is_users(i)) {
             measure_gap(p, w, t, v, i);
-            if (gap_width(p, w, i) > sure_gap) continue;
+            if (gap_width(p, w, i) > active_set_parameters.sure_gap) continue;
         }
         evaluate_gap(p, w, t, v, i);
-        const bool touches = gap_width(p, w, i) <= std::max(width, -gap_rate(p, w, i) * touching_time);
+        const bool touches =
+            gap_width(p, w, i) <= std::max(width, -gap_rate(p, w, i) * active_set_parameters.touching_time);
         if (w.state.closed[i] || touches) list.push_back(i);
     }
     if (list.size() > 1) {
@@ -249,7 +237,7 @@ void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, con
         restart();
         return false;
     };
-    const bool many = std::count(question.rest.begin(), question.rest.end(), char(1)) >= may_share;
+    const bool many = std::count(question.rest.begin(), question.rest.end(), char(1)) >= active_set_parameters.may_share;
     std::optional<RestingMotion> answer;
     if (many && question.breaking.empty()) {
         answer = together();
@@ -261,7 +249,8 @@ void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, con
         close(question.rest, nullptr);
         // Multipliers of redundant rows do not show if friction at rest is within its cones. Sliding friction follows the
         // loads of minimum norm, and the solution of the cones need not.
-        if (question.prescribed || !w.now.rows.redundant || !w.state.sticks_anywhere() || slides_anywhere(p, w, v)) return;
+        if (question.prescribed || !w.now.rows.redundant || !w.state.sticks_anywhere() || slides_anywhere(p, w, v))
+            return;
         if (!answer) answer = together();
         if (answer) return close(answer->closed, &*answer);
         return close(question.rest, nullptr);

@@ -8,6 +8,27 @@
 
 namespace pn {
 
+struct ActiveSetParameters {
+    // Time [s] within which a closing gap touches.
+    double touching_time = 1e-12;
+    // At the start of a run, gaps up to this fraction of the scene's size touch.
+    double starting_width = 1e-10;
+    // Enumerate all active sets up to this many contacts if pivoting fails.
+    int most_enumerated = 12;
+    // Limit of the enumeration if slip directions must be consistent too. Without consistency a motion to integrate
+    // exists.
+    int most_aligned = 8;
+    // No body closes a wider gap [m or rad] within `touching_time`: its speed would exceed the speed of light.
+    double sure_gap = 1e-3;
+    // Minimum number of contacts that can share a load in several ways.
+    int may_share = 2;
+    // Minimum slip acceleration that defines a direction, relative to the scale of accelerations, and allowed deviation
+    // of the direction (1 - cosine).
+    double min_direction_acceleration = 1e-4, astray = 1e-6;
+};
+
+inline constexpr ActiveSetParameters active_set_parameters{};
+
 // Contact state: touching contacts, resting contacts, and impacts.
 struct Touching {
     std::vector<char> touch, rest;

@@ -17,10 +17,6 @@ namespace pn {
 
 namespace {
 
-// Moves longer than this many times the longest single-contact move do not resolve all penetrations.
-constexpr double max_joint_move_ratio = 10.0;
-constexpr int max_depenetration_steps = 20;  // Newton-like steps, each much shorter than the last one
-
 VecX widths(const Program& p, Workspace& w, double t, const VecX& v, const std::vector<int>& gaps) {
     VecX out(gaps.size());
     for (size_t k = 0; k < gaps.size(); ++k) {
@@ -48,7 +44,8 @@ bool strays_from_planes(const Program& p, Workspace& w, double longest_single) {
         if (opening(p, w, p.gaps[i].block, allowed) != 0.0) return true;
         widest = std::max(widest, longest_single / w.now.rows.scale[p.blocks[p.gaps[i].block].row]);
     }
-    return widest > allowed && !(closing_distance(p, w) <= max_joint_move_ratio * longest_single);
+    return widest > allowed &&
+           !(closing_distance(p, w) <= depenetration_parameters.max_joint_move_ratio * longest_single);
 }
 
 bool move_out(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
@@ -63,7 +60,7 @@ bool move_out(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) 
     VecX move = VecX::Zero(p.mechanism.nv), press = VecX::Zero(gaps.size()), width = press, step;
     ConeComplementarity solver;
     bool outside = false;
-    for (int k = 0; k < max_depenetration_steps; ++k) {
+    for (int k = 0; k < depenetration_parameters.max_steps; ++k) {
         begin_rows(p, w, t, q, v);
         project_position(p, w, t, q, v, true);
         width = widths(p, w, t, v, gaps);

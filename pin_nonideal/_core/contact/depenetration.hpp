@@ -6,6 +6,14 @@
 
 namespace pn {
 
+struct DepenetrationParameters {
+    // Moves longer than this many times the longest single-contact move do not resolve all penetrations.
+    double max_joint_move_ratio = 10.0;
+    int max_steps = 20;  // Newton-like steps, each much shorter than the last one
+};
+
+inline constexpr DepenetrationParameters depenetration_parameters{};
+
 // Length of the longest move, in the metric of M, that brings a single closed contact onto its plane.
 double longest_single_move(const Program& p, const Workspace& w);
 // Check if projection left closed contacts off their planes, or moved much farther than `longest_single` because planes

@@ -15,9 +15,6 @@ namespace pn {
 
 namespace {
 
-// Rounding of responses relative to the largest response to an impulse, and of velocities relative to the speed.
-constexpr double min_impulse_response = 1e-12, impact_velocity_rounding = 1e-14;
-
 // Throw a failure: constraints drive bodies into each other, or the impulse solver failed.
 [[noreturn]] void refuse(const Program& p, double t, const std::vector<int>& gaps, ConeStatus status) {
     if (status == ConeStatus::failed) throw Failure(Failure::Kind::not_converged, t);
@@ -84,9 +81,9 @@ VecX poisson(const ContactRows& rows, double t, const VecX& velocity) {
 void clean(const ContactRows& rows, double speed, VecX& w0) {
     const Spectrum modes = symmetric_spectrum(rows.W);
     const VecX& response = modes.values;
-    for (int i = 0; i < w0.size() && response[i] <= min_impulse_response * response[w0.size() - 1]; ++i) {
+    for (int i = 0; i < w0.size() && response[i] <= impact_parameters.min_response * response[w0.size() - 1]; ++i) {
         const double held = modes.vectors.col(i).dot(w0);
-        if (std::abs(held) <= impact_velocity_rounding * (1.0 + speed)) w0 -= held * modes.vectors.col(i);
+        if (std::abs(held) <= impact_parameters.velocity_rounding * (1.0 + speed)) w0 -= held * modes.vectors.col(i);
     }
 }
 

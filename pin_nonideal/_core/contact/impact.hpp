@@ -10,6 +10,13 @@
 
 namespace pn {
 
+struct ImpactParameters {
+    // Rounding of responses relative to the largest response to an impulse, and of velocities relative to the speed.
+    double min_response = 1e-12, velocity_rounding = 1e-14;
+};
+
+inline constexpr ImpactParameters impact_parameters{};
+
 struct Impact {
     std::vector<int> gaps;        // touching gaps
     std::vector<Vec3> impulse;    // impulse of each gap: along the normal, then along the slip directions

@@ -9,11 +9,6 @@
 
 namespace pn {
 
-// Rounding of a sum, relative to the sum of the magnitudes of its terms.
-constexpr double gap_sum_rounding = 1e-12;
-// Tolerance of coincident lines and points: relative distance from the origin, or sine of an angle.
-constexpr double one_place = 1e-12;
-
 // Gap acceleration, and the sum of the magnitudes of its terms.
 static std::pair<double, double> rate_of_rate(const Program& p, const Workspace& w, int gap) {
     const Block& block = p.blocks[p.gaps[gap].block];
@@ -31,7 +26,7 @@ static std::pair<double, double> rate_of_rate(const Program& p, const Workspace&
 double gap_acceleration(const Program& p, const Workspace& w, int gap) { return rate_of_rate(p, w, gap).first; }
 
 double acceleration_rounding(const Program& p, const Workspace& w, int gap) {
-    return gap_sum_rounding * (rate_of_rate(p, w, gap).second + p.mechanism.gravity.norm());
+    return contact_query_parameters.sum_rounding * (rate_of_rate(p, w, gap).second + p.mechanism.gravity.norm());
 }
 
 namespace {
@@ -78,12 +73,12 @@ bool coincide(const Program& p, const Workspace& w, int gap, int other) {
     if (bodies(p.blocks[a.block]) != bodies(p.blocks[b.block]) || !rub_and_bounce_the_same(p, a, b)) return false;
     const Line one = line_of(p, w, a.block, 0), two = line_of(p, w, b.block, 0);
     const double size = 1.0 + one.point.norm();
-    if ((one.along - two.along).norm() > one_place) return false;
-    if ((one.point - two.point).cross(one.along).norm() > one_place * size) return false;
+    if ((one.along - two.along).norm() > contact_query_parameters.one_place) return false;
+    if ((one.point - two.point).cross(one.along).norm() > contact_query_parameters.one_place * size) return false;
     if (a.sliding < 0) return true;
     const Friction &rubs = p.frictions[a.sliding], &rubs_too = p.frictions[b.sliding];
     const Vec3 apart = w.now.values[rubs.block].wrench[0].point - w.now.values[rubs_too.block].wrench[0].point;
-    return apart.norm() <= one_place * size;
+    return apart.norm() <= contact_query_parameters.one_place * size;
 }
 
 void leave_one_of_each_place(const Program& p, const Workspace& w, std::vector<int>& list, const Precedence& precedes) {
@@ -110,7 +105,8 @@ double load(const Program& p, Workspace& w, int gap) {
 
 double load_rounding(const Program& p, const Workspace& w, int gap) {
     const double scale = w.now.rows.scale[p.blocks[p.gaps[gap].block].row];  // squared: mass that the row moves
-    return gap_sum_rounding * scale * scale * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
+    return contact_query_parameters.sum_rounding * scale * scale *
+           (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
 }
 
 int pulling_contact(const Program& p, Workspace& w) {

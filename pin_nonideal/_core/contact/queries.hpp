@@ -8,6 +8,15 @@
 
 namespace pn {
 
+struct ContactQueryParameters {
+    // Rounding of a sum, relative to the sum of the magnitudes of its terms.
+    double sum_rounding = 1e-12;
+    // Tolerance of coincident lines and points: relative distance from the origin, or sine of an angle.
+    double one_place = 1e-12;
+};
+
+inline constexpr ContactQueryParameters contact_query_parameters{};
+
 // Check if a contact has no mobility along its normal. Such a contact never closes.
 inline bool is_bare(const Program& p, int gap) { return p.blocks[p.gaps[gap].block].kept.empty(); }
 

@@ -8,11 +8,6 @@
 
 namespace pn {
 
-// Error of the forces that counts as rounding.
-constexpr double tree_rest_tolerance = 1e-10;
-// Largest force, relative to the load of all trees. Larger forces only squeeze, and their rounding holds the load.
-constexpr double max_force_ratio = 1e4;
-
 bool rest_on_trees(const Program& p, Workspace& w, const std::vector<int>& gaps, const std::vector<int>& others,
                    const std::vector<ConeElement>& cones) {
     TreeBlocks blocks(p);
@@ -32,7 +27,7 @@ bool rest_on_trees(const Program& p, Workspace& w, const std::vector<int>& gaps,
     solver.problem.offset = VecX::Zero(solver.problem.rows);
     if (!solver.pose()) return false;
     VecX f = solver.problem.offset;
-    if (!(solver.solve(f) <= tree_rest_tolerance)) return false;
+    if (!(solver.solve(f) <= rest_of_trees_parameters.tolerance)) return false;
     double rest = 0.0, moves = 0.0, weight = 0.0;
     for (const BlockNode& node : solver.problem.nodes) {
         const auto a = w.now.a.segment(node.first, node.size);
@@ -45,7 +40,8 @@ bool rest_on_trees(const Program& p, Workspace& w, const std::vector<int>& gaps,
             weight += std::abs(sum);
         }
     }
-    return moves <= tree_acceleration_rounding * rest && f.cwiseAbs().maxCoeff() <= max_force_ratio * weight;
+    return moves <= tree_acceleration_rounding * rest &&
+           f.cwiseAbs().maxCoeff() <= rest_of_trees_parameters.max_force_ratio * weight;
 }
 
 }  // namespace pn

@@ -8,6 +8,15 @@
 
 namespace pn {
 
+struct RestOfTreesParameters {
+    // Error of the forces that counts as rounding.
+    double tolerance = 1e-10;
+    // Largest force, relative to the load of all trees. Larger forces only squeeze, and their rounding holds the load.
+    double max_force_ratio = 1e4;
+};
+
+inline constexpr RestOfTreesParameters rest_of_trees_parameters{};
+
 // Check if contacts and friction elements at rest hold a scene at rest. The workspace is evaluated without their forces,
 // with v = 0. `cones`: laws of the contacts, then of the other elements. Returns false if the laws allow a motion, if no
 // solution was found, or if constraints join the trees: other solvers then decide.

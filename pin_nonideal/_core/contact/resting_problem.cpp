@@ -10,15 +10,6 @@ namespace pn {
 
 namespace {
 
-constexpr double none = 1e-12;  // rounding relative to the scale of accelerations
-constexpr double common_slip_rounding = 1e-14;  // rounding of a slip without own terms, relative to all accelerations
-constexpr double min_other_motion = 1e-6;  // motion that differs from rest, relative to the scale of accelerations
-constexpr double contact_limit_rounding = 1e-9;  // rounding relative to the limit of a force
-constexpr double breaking_by = 1e-6;  // relative reduction of the limit of elements that just reached it
-constexpr int most_releases = 4;  // rounds that set kinetic limits of slipping contacts
-constexpr int max_load_iterations = 100;  // maximum iterations of loads and their friction
-constexpr double settled = 1e-13;  // rounding of the loads' change, relative to the largest acceleration
-
 // Coefficient of a contact, or limit of another element.
 double strength(const Friction& f) { return f.gap >= 0 ? f.mu : f.constant; }
 
@@ -42,7 +33,8 @@ void RestingMotion::answer(const Program& p, Workspace& w, ModeQuestion& questio
     }
     for (int e : question.at_rest) {
         question.modes[e] = modes[e];
-        if (p.frictions[e].dim > 1 && slips(modes[e])) w.state.slip_direction[e] = w.state.last_direction[e] = direction[e];
+        if (p.frictions[e].dim > 1 && slips(modes[e]))
+            w.state.slip_direction[e] = w.state.last_direction[e] = direction[e];
     }
     question.answered = true;
     question.several = several;
@@ -100,7 +92,7 @@ MatX RestingProblem::chosen(const MatX& of_all) const {
 double RestingProblem::limit(int e) const {
     const std::vector<int>& list = question.breaking;
     const bool breaks = std::find(list.begin(), list.end(), e) != list.end();
-    return p.frictions[e].holding_limit(strength(p.frictions[e])) * (breaks ? 1.0 - breaking_by : 1.0);
+    return p.frictions[e].holding_limit(strength(p.frictions[e])) * (breaks ? 1.0 - parameters.breaking_by : 1.0);
 }
 
 // Accelerations of the rows without contact forces.
@@ -122,13 +114,14 @@ double RestingProblem::in_play(int row, int count) const {
 }
 
 double RestingProblem::rounding(int row, int count) const {
-    return none * in_play(row, count) + common_slip_rounding * in_play();
+    return parameters.none * in_play(row, count) + parameters.common_slip_rounding * in_play();
 }
 
 // Check if friction is at its limit. A contact that shares a load may have a load of rounding only.
 bool RestingProblem::at_its_limit(size_t i) const {
-    const double most = cones[i].bound * (head(i) ? f[first[i]] : 1.0), rounding = none * f.cwiseAbs().maxCoeff();
-    return tail_of(f, i).norm() >= most * (1.0 - contact_limit_rounding) - rounding;
+    const double most = cones[i].bound * (head(i) ? f[first[i]] : 1.0),
+                 rounding = parameters.none * f.cwiseAbs().maxCoeff();
+    return tail_of(f, i).norm() >= most * (1.0 - parameters.limit_rounding) - rounding;
 }
 
 // Set the kinetic limit of contacts that slip from rest. Return true if any limit changed.
@@ -181,10 +174,10 @@ bool RestingProblem::hold(ConeComplementarity& solver) {
 
 bool RestingProblem::solve_cones(bool warm, bool& shared) {
     ConeComplementarity solver;
-    for (int round = 0; round < most_releases; ++round) {
+    for (int round = 0; round < parameters.most_releases; ++round) {
         const bool solved = solver.solve(W, w0, cones, warm || round > 0, f) == ConeStatus::solved;
         if (round == 0 && !warm && (!solved || moves())) {
-            const bool another = solved && (w0 + W * f).cwiseAbs().maxCoeff() > min_other_motion * in_play();
+            const bool another = solved && (w0 + W * f).cwiseAbs().maxCoeff() > parameters.min_other_motion * in_play();
             if (hold(solver)) {
                 several = another;
                 break;
@@ -201,11 +194,11 @@ bool RestingProblem::solve_cones(bool warm, bool& shared) {
 // convergence.
 bool RestingProblem::take_turns(const VecX& free) {
     bool shared = false;
-    for (int turn = 0; turn < max_load_iterations; ++turn) {
+    for (int turn = 0; turn < parameters.max_load_iterations; ++turn) {
         const VecX before = f;
         w0 = free + dragging * before;
         if (!solve_cones(true, shared)) return false;
-        if ((dragging * (f - before)).cwiseAbs().maxCoeff() <= settled * in_play()) return true;
+        if ((dragging * (f - before)).cwiseAbs().maxCoeff() <= parameters.settled * in_play()) return true;
     }
     return false;
 }
@@ -216,8 +209,8 @@ void RestingProblem::read(RestingMotion& out) const {
         const int e = rows.element(i);
         if (i < rows.gaps.size()) {
             const int gap = rows.gaps[i];
-            out.closed[gap] = a[first[i]] <= none * in_play();
-            out.loaded[gap] = out.closed[gap] && f[first[i]] > none * f.cwiseAbs().maxCoeff();
+            out.closed[gap] = a[first[i]] <= parameters.none * in_play();
+            out.loaded[gap] = out.closed[gap] && f[first[i]] > parameters.none * f.cwiseAbs().maxCoeff();
             if (e < 0 || !out.closed[gap]) continue;
             if (slides[i]) {
                 const Vec3 u = slip_velocity(w.now, p.frictions[e]);
@@ -231,7 +224,7 @@ void RestingProblem::read(RestingMotion& out) const {
         for (int k = 0; k < tail(i); ++k) out.friction[e][k] = friction[k];
         if (tail(i) == 0 || !at_its_limit(i) || !(slip.norm() > slip_rounding(i))) continue;
         // At a slow slip onset the force defines the direction more accurately than the acceleration.
-        const bool tells = friction.norm() > none * f.cwiseAbs().maxCoeff();
+        const bool tells = friction.norm() > parameters.none * f.cwiseAbs().maxCoeff();
         const VecX way = tells ? VecX(-friction.normalized()) : VecX(slip.normalized());
         for (int k = 0; k < slip.size(); ++k) out.direction[e][k] = way[k];
         out.modes[e] = p.frictions[e].dim > 1 || way[0] > 0.0 ? slip_plus : slip_minus;

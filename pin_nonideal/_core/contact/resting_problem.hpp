@@ -38,8 +38,22 @@ struct ClosingQuestion {
 bool is_at_rest(const Program& p, const Workspace& w, const VecX& v, const ClosingQuestion& question,
                 const RunState& before, int element);
 
+struct RestingProblemParameters {
+    double none = 1e-12;                  // rounding relative to the scale of accelerations
+    double common_slip_rounding = 1e-14;  // rounding of a slip without own terms, relative to all accelerations
+    double min_other_motion = 1e-6;       // motion that differs from rest, relative to the scale of accelerations
+    double limit_rounding = 1e-9;         // rounding relative to the limit of a force
+    double breaking_by = 1e-6;            // relative reduction of the limit of elements that just reached it
+    int most_releases = 4;                // rounds that set kinetic limits of slipping contacts
+    int max_load_iterations = 100;        // maximum iterations of loads and their friction
+    double settled = 1e-13;               // rounding of the loads' change, relative to the largest acceleration
+};
+
 class RestingProblem {
 public:
+    using Parameters = RestingProblemParameters;
+    static constexpr Parameters parameters{};
+
     bool several = false;  // rest holds, though a motion was found too
 
     // Set up the problem of the closed contacts `gaps` and of other friction elements at rest. The workspace must hold

@@ -10,26 +10,12 @@
 
 namespace pn {
 
-// Pivots of M that differ by more than this factor reduce the accuracy of the row equations by the same factor. Causes
-// are bodies of very unequal mass or without mass. Refinement restores the accuracy.
-constexpr double refined_pivot_ratio = 1e6;
-// A configuration with a larger inertia [kg m^2] has diverged.
-constexpr double runaway_inertia = 1e30;
-
-// Rounding of balanced forces, relative to the acceleration of gravity.
-constexpr double balance_rounding = 1e-14;
-// Rounding of a sum, relative to the sum of the magnitudes of its terms.
-constexpr double residual_sum_rounding = 1e-13;
-
-// Evaluations between two looks at signals and wall time. Those of large scenes take milliseconds.
-constexpr long evaluations_a_watch = 16;
-
 static void factor_mass(const Program& p, Workspace& w, double t) {
     const int dof = factorize(p.mechanism, w.now.terms);
     if (dof < 0) return;
     const Mechanism& m = p.mechanism;
     const double inertia = m.is_deep[dof] ? w.now.terms.D[dof] : w.now.terms.M[m.row_offset[dof]];
-    if (!w.now.terms.q.allFinite() || !(inertia < runaway_inertia))
+    if (!w.now.terms.q.allFinite() || !(inertia < evaluation_parameters.runaway_inertia))
         throw Failure(Failure::Kind::not_finite, t);
     throw Failure(Failure::Kind::singular_mass, t, {dof});
 }
@@ -84,7 +70,7 @@ static void factor_placed_rows(const Program& p, Workspace& w, double t, const V
     scale_rows(p, w);
     factor_rows(p.layout, p.blocks, w.now.B, w.now.rows);
     ++w.counters.factorizations;
-    w.now.rows.refine = w.now.terms.D.maxCoeff() > refined_pivot_ratio * w.now.terms.D.minCoeff();
+    w.now.rows.refine = w.now.terms.D.maxCoeff() > evaluation_parameters.refined_pivot_ratio * w.now.terms.D.minCoeff();
 }
 
 void configure(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
@@ -120,7 +106,7 @@ static void place_wrenches(const Program& p, Workspace& w) {
 }
 
 void assemble_forces(const Program& p, Workspace& w, double t, const VecX& v) {
-    if (++w.counters.evaluations % evaluations_a_watch == 0 && w.watch) w.watch(t);
+    if (++w.counters.evaluations % evaluation_parameters.evaluations_a_watch == 0 && w.watch) w.watch(t);
     move_bodies(p.mechanism, w.now.terms, v);
     bias_forces(p.mechanism, w.now.terms);
     w.now.F = -w.now.terms.nle;
@@ -137,7 +123,7 @@ void assemble_forces(const Program& p, Workspace& w, double t, const VecX& v) {
 // summed forces.
 static bool is_balanced(const Program& p, Workspace& w) {
     if (w.now.touching.empty() || p.moves_in_time) return false;
-    if (w.now.a.cwiseAbs().maxCoeff() <= balance_rounding * p.mechanism.gravity.norm()) return true;
+    if (w.now.a.cwiseAbs().maxCoeff() <= evaluation_parameters.balance_rounding * p.mechanism.gravity.norm()) return true;
     VecX &left = w.scratch.work, &size = w.scratch.trial;
     multiply_M(p.mechanism, w.now.terms, w.now.a, left);
     size = w.now.F.cwiseAbs();
@@ -147,7 +133,7 @@ static bool is_balanced(const Program& p, Workspace& w) {
         for (int dof : block.support)
             for (size_t k = 0; k < block.kept.size(); ++k) size[dof] += std::abs(*entry++ * w.now.lam[block.row + k]);
     }
-    return (left.cwiseAbs().array() <= residual_sum_rounding * size.array()).all();
+    return (left.cwiseAbs().array() <= evaluation_parameters.residual_sum_rounding * size.array()).all();
 }
 
 // Set the results of the laws if no law acts.

@@ -5,6 +5,22 @@
 
 namespace pn {
 
+struct EvaluationParameters {
+    // Pivots of M that differ by more than this factor reduce the accuracy of the row equations by the same factor.
+    // Causes are bodies of very unequal mass or without mass. Refinement restores the accuracy.
+    double refined_pivot_ratio = 1e6;
+    // A configuration with a larger inertia [kg m^2] has diverged.
+    double runaway_inertia = 1e30;
+    // Rounding of balanced forces, relative to the acceleration of gravity.
+    double balance_rounding = 1e-14;
+    // Rounding of a sum, relative to the sum of the magnitudes of its terms.
+    double residual_sum_rounding = 1e-13;
+    // Evaluations between two looks at signals and wall time. Those of large scenes take milliseconds.
+    long evaluations_a_watch = 16;
+};
+
+inline constexpr EvaluationParameters evaluation_parameters{};
+
 // Acceleration a and multipliers lam at (t, q, v) for the modes and active rows in the workspace.
 void evaluate(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 

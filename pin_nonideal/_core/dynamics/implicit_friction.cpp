@@ -13,19 +13,6 @@ namespace pn {
 
 namespace {
 
-constexpr double reaction_tolerance = 4e-15;           // relative change of y that counts as rounding
-constexpr double reaction_newton_tolerance = 3.2e-14;  // the same after a linear solve
-constexpr double reaction_stall_tolerance = 1e-12;     // Newton error below this that no longer falls is rounding
-constexpr double slow_change = 1e-13;                  // slowly contracting changes above this are iterated further
-constexpr double max_reaction_contraction = 0.25;      // slower fixed-point iterations switch to Newton's method
-constexpr int fixed_point_limit = 30;
-// Growth of the equation below which a uniqueness proof stays valid for max(n, kept_steps) steps. The proof then costs
-// about one motion per step. The growth does not rise from this value to one in so short a time.
-constexpr double safe_growth = 0.5;
-constexpr int kept_steps = 4;
-constexpr double min_zero_load_step = 0x1p-10;  // smallest fraction of the step to a solution of another zero-load set
-constexpr double min_error_gain = 0.1;  // required relative decrease of the error, per fraction of that step
-
 struct Implicit : Unknowns {
     using Unknowns::Unknowns;
 
@@ -33,7 +20,9 @@ struct Implicit : Unknowns {
         const RunState& state = w.state;
         // the proof has already failed
         if (state.unique == Uniqueness::not_shown) return state.steps_since == never_decided;
-        return state.steps_since >= (state.growth < safe_growth ? std::max(n, kept_steps) : 1);
+        return state.steps_since >= (state.growth < implicit_friction_parameters.safe_growth
+                                         ? std::max(n, implicit_friction_parameters.kept_steps)
+                                         : 1);
     }
 
     // Check if the equation contracts near its solution y. If so, restore the motion of y.
@@ -44,7 +33,7 @@ struct Implicit : Unknowns {
         if (!arrays.finite()) throw Failure(Failure::Kind::not_finite, t);
         arrays.steepest(w.scratch.jacobian);
         const double bound = growth(w.scratch.jacobian);
-        if (!(bound < 1.0 - least_determinant_told)) return false;
+        if (!(bound < 1.0 - uniqueness_parameters.least_determinant)) return false;
         w.state.growth = bound;
         w.state.steps_since = 0;
         w.state.unique = shares_pressing(p, w) ? Uniqueness::not_shown : Uniqueness::shown;
@@ -61,7 +50,7 @@ struct Implicit : Unknowns {
         try {
             image(y, g);
             double error = (g - y).norm();
-            for (int turn = 0; turn < max_zero_load_sets; ++turn) {
+            for (int turn = 0; turn < implicit_friction_parameters.max_zero_load_sets; ++turn) {
                 const VecX from = y;
                 {
                     const HeldPiece piece(p, w);
@@ -84,11 +73,11 @@ struct Implicit : Unknowns {
     // error.
     bool approach(const VecX& from, double& error, VecX& y, VecX& g) {
         const VecX way = y - from;
-        for (double part = 1.0; part >= min_zero_load_step; part *= 0.5) {
+        for (double part = 1.0; part >= implicit_friction_parameters.min_zero_load_step; part *= 0.5) {
             y = from + part * way;
             image(y, g);
             const double there = (g - y).norm();
-            if (!(there < (1.0 - min_error_gain * part) * error)) continue;
+            if (!(there < (1.0 - implicit_friction_parameters.min_error_gain * part) * error)) continue;
             error = there;
             return true;
         }
@@ -104,15 +93,15 @@ struct Implicit : Unknowns {
         VecX& before = w.scratch.before;
         before = y;
         const bool solved = newton.solve(arrays, y);
-        const bool regular = solved && newton.factorize(arrays, y) > least_determinant_told;
+        const bool regular = solved && newton.factorize(arrays, y) > uniqueness_parameters.least_determinant;
         if (!regular || is_due()) decide(*this, arrays, before, y, solved);
         w.now.determinant = newton.factorize(arrays, y);
         double last = std::numeric_limits<double>::infinity();
-        for (int it = 0; it < max_reaction_newton; ++it) {  // removes the rounding of the arrays
+        for (int it = 0; it < Unknowns::parameters.max_newton; ++it) {  // removes the rounding of the arrays
             image(y, newton.image);
             newton.residual = newton.image - y;
             const double error = newton.residual.cwiseAbs().maxCoeff();
-            if (error <= reaction_tolerance * y.cwiseAbs().maxCoeff() || error >= last) return;
+            if (error <= implicit_friction_parameters.tolerance * y.cwiseAbs().maxCoeff() || error >= last) return;
             last = error;
             newton.factor.solve(newton.residual, newton.step);
             y += newton.step;
@@ -124,15 +113,15 @@ struct Implicit : Unknowns {
         VecX g(n);
         double size = 0.0, last = std::numeric_limits<double>::infinity();
         MatX& J = w.scratch.jacobian;
-        for (int it = 0; it < max_reaction_newton; ++it) {
+        for (int it = 0; it < Unknowns::parameters.max_newton; ++it) {
             image(y, g);
             const VecX residual = g - y;
             size = std::max({size, y.cwiseAbs().maxCoeff(), g.cwiseAbs().maxCoeff()});
             const double error = residual.cwiseAbs().maxCoeff();
             if (!g.allFinite()) throw Failure(Failure::Kind::not_finite, t);
             differentiate(*this, y, g, size, J);
-            const bool stalls = it > 3 && error <= reaction_stall_tolerance * size && error >= last;
-            if (error <= reaction_newton_tolerance * size || stalls) {
+            const bool stalls = it > 3 && error <= implicit_friction_parameters.stall_tolerance * size && error >= last;
+            if (error <= implicit_friction_parameters.newton_tolerance * size || stalls) {
                 look_for_others(*this, y, J, size);
                 image(y, g);
                 return;
@@ -152,7 +141,7 @@ struct Implicit : Unknowns {
         VecX &y = w.scratch.unknown, &g = w.scratch.image;
         auto yn = y.head(n);
         double last = 0.0;
-        for (int it = 0; it < fixed_point_limit; ++it) {
+        for (int it = 0; it < implicit_friction_parameters.fixed_point_limit; ++it) {
             image(y, g);
             double size = 0.0, change = 0.0;
             for (int k = 0; k < n; ++k) {
@@ -161,11 +150,13 @@ struct Implicit : Unknowns {
             }
             if (!g.head(n).allFinite()) throw Failure(Failure::Kind::not_finite, t);
             yn = g.head(n);
-            if (change <= reaction_tolerance * size) return true;
-            if (it > 1 && change > max_reaction_contraction * last && change > slow_change * size + rounding()) return false;
+            if (change <= implicit_friction_parameters.tolerance * size) return true;
+            if (it > 1 && change > implicit_friction_parameters.max_contraction * last &&
+                change > implicit_friction_parameters.slow_change * size + rounding())
+                return false;
             if (it > 1 && change >= last) return true;  // rounding
             // The next change would be below rounding: compute the motion once more without a check.
-            if (it > 0 && change * (change / last) <= reaction_tolerance * size) {
+            if (it > 0 && change * (change / last) <= implicit_friction_parameters.tolerance * size) {
                 set(g);
                 motion();
                 return true;
@@ -187,7 +178,8 @@ struct Implicit : Unknowns {
     void solve() {
         VecX &kept = w.state.unknown, &y = w.scratch.unknown;
         y.setZero();
-        if (w.state.warm) exchange([&](int k, int place, int count) { y.segment(k, count) = kept.segment(place, count); });
+        if (w.state.warm)
+            exchange([&](int k, int place, int count) { y.segment(k, count) = kept.segment(place, count); });
         w.state.warm = false;  // the state after a failure is no initial guess
         if (!iterate() || (bearings && is_due() && !contracts(y))) {
             VecX& solution = w.scratch.solution;

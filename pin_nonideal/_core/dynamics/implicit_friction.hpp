@@ -9,8 +9,24 @@
 
 namespace pn {
 
-// Maximum number of zero-load sets to try, one solution each.
-constexpr int max_zero_load_sets = 30;
+struct ImplicitFrictionParameters {
+    double tolerance = 4e-15;           // relative change of y that counts as rounding
+    double newton_tolerance = 3.2e-14;  // the same after a linear solve
+    double stall_tolerance = 1e-12;     // Newton error below this that no longer falls is rounding
+    double slow_change = 1e-13;         // slowly contracting changes above this are iterated further
+    double max_contraction = 0.25;      // slower fixed-point iterations switch to Newton's method
+    int fixed_point_limit = 30;         // maximum fixed-point iterations: 27 contract by 0.25 to rounding
+    // Growth of the equation below which a uniqueness proof stays valid for max(n, kept_steps) steps. The proof then
+    // costs about one motion per step. The growth does not rise from this value to one in so short a time.
+    double safe_growth = 0.5;
+    int kept_steps = 4;                   // minimum number of steps for which a uniqueness proof stays valid
+    double min_zero_load_step = 0x1p-10;  // smallest fraction of the step to a solution of another zero-load set
+    double min_error_gain = 0.1;          // required relative decrease of the error, per fraction of that step
+    // Maximum number of zero-load sets to try, one solution each.
+    int max_zero_load_sets = 30;
+};
+
+inline constexpr ImplicitFrictionParameters implicit_friction_parameters{};
 
 // Check if any law acts. Friction of contacts does not act if all contacts are open.
 inline bool laws_act(const Program& p, const Workspace& w) {

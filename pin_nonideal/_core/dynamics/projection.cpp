@@ -13,24 +13,6 @@ namespace pn {
 
 namespace {
 
-// Past its first steps an iteration that keeps more than this fraction of the largest residual has converged to
-// rounding. Newton's method at least halves the residual near the constraints. The first steps may start far away.
-constexpr double projection_stall_ratio = 0.5;
-constexpr int sure_position_steps = 3, sure_velocity_steps = 1;
-// Maximum fraction of an earlier step that an iteration step may keep. Steps above it carry no information about the
-// change of the rows since their factorization.
-constexpr double broyden_limit = 0.3;
-// A step with an expected residual below this fraction of rounding is not evaluated separately.
-constexpr double trusted_part = 0.5;
-// The third-order part of a step's move is used if its square is below this fraction of the second-order part's square.
-constexpr double falling_square = 0.01;
-// Below this speed [rad/s or m/s] rows change only by rounding over a step of time stepping.
-constexpr double slow_speed = 1e-5;
-// Factorization at the new position costs less than this many iterations.
-constexpr double iterations_for_factors = 3.0;
-// Near a singular position the floor is zero. Iteration counts then assume convergence to unit roundoff.
-constexpr double no_floor = 1e-16;
-
 // Compute x := R^-T B^T (B B^T)^-1 r, the least move in the metric of M that changes A x by r.
 void least_move(const Program& p, Workspace& w, VecX& x) {
     solve_rows(w.now.rows, w.scratch.r, w.scratch.lam_step);
@@ -84,7 +66,8 @@ double gather_rates(const Program& p, Workspace& w, double t, const VecX& v) {
 // Check if a new factorization pays off, assuming that each iteration reduces the residual as much as the last one.
 bool needs_new_factors(double before, double now, double floor) {
     if (!(now < before)) return true;
-    return std::log(now / std::max(floor, no_floor)) / std::log(before / now) > iterations_for_factors;
+    return std::log(now / std::max(floor, projection_parameters.no_floor)) / std::log(before / now) >
+           projection_parameters.iterations_for_factors;
 }
 
 // Inner product of multipliers of rows of unit length.
@@ -104,7 +87,8 @@ void broyden_step(Workspace& w, int count) {
     for (int j = 0; j < count; ++j) {
         const VecX& known = w.scratch.position_lam_steps[j];
         const double part = product(w, known, step) / product(w, known, known);
-        if (!(std::abs(part) < broyden_limit)) return;  // rounding, or too far from the factorization
+        if (!(std::abs(part) < projection_parameters.broyden_limit))
+            return;  // rounding, or too far from the factorization
         if (j + 1 < count) step += part * w.scratch.position_lam_steps[j + 1];
         else step /= 1.0 - part;
     }
@@ -124,56 +108,6 @@ double rounding_part(const Workspace& w) { return w.now.rows.distance < near_sin
 
 }  // namespace
 
-double scene_size(const Program& p, const Workspace& w) {
-    double square = 1.0;
-    for (int i : p.constrained_joints) {
-        const Body& body = w.now.terms.body[i];
-        square = std::max(square, (body.ref + body.p).squaredNorm());
-    }
-    return std::sqrt(square);
-}
-
-// Largest entry of a row of A, at least 1. Scaling a row up scales its gap by the same factor.
-static double row_size(const Workspace& w, const Block& block, int row) {
-    double size = 1.0;
-    const size_t n = block.kept.size();
-    for (size_t k = 0; k < n; ++k) {
-        if (block.kept[k] != row) continue;
-        for (size_t l = 0; l < block.support.size(); ++l)
-            size = std::max(size, std::abs(w.now.A[block.offset + l * n + k]));
-    }
-    return size;
-}
-
-double opening(const Program& p, const Workspace& w, int block, double allowed) {
-    double largest = 0.0;
-    for (int k = 0; k < w.now.values[block].rows; ++k) {
-        const double gap = std::abs(w.now.values[block].residual[k]);
-        if (gap <= allowed || gap <= allowed * row_size(w, p.blocks[block], k) || gap < largest) continue;
-        largest = gap;
-    }
-    return largest;
-}
-
-void require_closed(const Program& p, const Workspace& w, double t) {
-    const double allowed = max_projected_gap * scene_size(p, w);
-    double largest = 0.0;
-    int worst = -1;
-    for (int i : w.now.awake) {
-        const double gap = i < p.constraints ? opening(p, w, i, allowed) : 0.0;
-        if (gap == 0.0 || gap < largest) continue;
-        largest = gap;
-        worst = i;
-    }
-    if (worst >= 0) throw Failure(Failure::Kind::closure, t, {worst}, largest);
-}
-
-double closing_distance(const Program& p, Workspace& w) {
-    w.scratch.scaled.setZero();
-    for (int i : w.now.rows.blocks) add_transpose(p.blocks[i], w.now.B, w.now.closing_lam, w.scratch.scaled);
-    return w.scratch.scaled.norm();
-}
-
 void follow_constraints(const Program& p, Workspace& w, double h, VecX& move) {
     if (w.now.rows.blocks.empty()) return;
     w.scratch.r.setZero();
@@ -186,7 +120,8 @@ void follow_constraints(const Program& p, Workspace& w, double h, VecX& move) {
     // The terms of the series do not decrease close to a singular position or at high speed. Drop the third order then.
     const double cube = h * h * h, second = product(w, w.scratch.position_lam, w.scratch.position_lam);
     const double third = product(w, w.state.third_order_lam, w.state.third_order_lam);
-    if (cube * cube * third < falling_square * second) w.scratch.position_lam += cube * w.state.third_order_lam;
+    if (cube * cube * third < projection_parameters.falling_square * second)
+        w.scratch.position_lam += cube * w.state.third_order_lam;
     else w.state.third_order_lam.setZero();
     w.scratch.scaled.setZero();
     for (int i : w.now.rows.blocks) add_transpose(p.blocks[i], w.now.B, w.scratch.position_lam, w.scratch.scaled);
@@ -228,7 +163,7 @@ bool project_position(const Program& p, Workspace& w, double t, VecX& q, const V
         if (!configured) evaluate_residuals(p, w, t, q, v);
         largest = gather_residuals(p, w);
         floor = position_floor(p, w);
-        w.now.projected_gap = std::max(w.now.projected_gap, largest / std::max(floor, no_floor));
+        w.now.projected_gap = std::max(w.now.projected_gap, largest / std::max(floor, projection_parameters.no_floor));
     }
     const bool moves = largest > floor;
     configured &= !moves;
@@ -244,7 +179,7 @@ bool project_position(const Program& p, Workspace& w, double t, VecX& q, const V
         w.now.closing_lam += w.scratch.position_lam_steps[count++];
         w.now.has_closing = true;
         // A step expected to end below rounding is evaluated when the end of the step is configured.
-        configured = count > 1 && largest * rate < trusted_part * floor;
+        configured = count > 1 && largest * rate < projection_parameters.trusted_part * floor;
         double now = largest;
         if (!configured) {
             move_position(p, w, q, p.constrained_dofs);  // the other dofs move no row
@@ -258,7 +193,8 @@ bool project_position(const Program& p, Workspace& w, double t, VecX& q, const V
             now = gather_residuals(p, w);
             count = 0;
         }
-        if (it > sure_position_steps && now > projection_stall_ratio * largest) break;  // converged to rounding
+        if (it > projection_parameters.sure_position_steps && now > projection_parameters.stall_ratio * largest)
+            break;  // converged to rounding
         rate = now / largest;
         largest = now;
     }
@@ -296,7 +232,7 @@ bool keeps_to_rows(const Program& p, Workspace& w, double t, const VecX& q, VecX
     if (w.now.rows.blocks.empty()) return true;
     forget_closing(w);
     const double fastest = v.cwiseAbs().maxCoeff();
-    if (!p.affine_rates || fastest > slow_speed) return false;
+    if (!p.affine_rates || fastest > projection_parameters.slow_speed) return false;
     // The check for immobility needs the independent rows, so projection decides it.
     if (fastest <= immobile_speed && (fastest > 0.0 || p.gaps.empty()) && is_immobile(p, w)) return false;
     place_bodies(p.mechanism, w.now.terms, q);
@@ -312,7 +248,7 @@ bool project_velocity(const Program& p, Workspace& w, double t, VecX& v) {
     if (w.now.rows.blocks.empty()) return false;
     const double floor = velocity_floor(w, v);
     double last = gather_rates(p, w, t, v);
-    w.now.projected_rate = std::max(w.now.projected_rate, last / std::max(floor, no_floor));
+    w.now.projected_rate = std::max(w.now.projected_rate, last / std::max(floor, projection_parameters.no_floor));
     bool moved = false;
     for (int it = 0; it < projection_limit && last > floor; ++it) {
         least_move(p, w, w.scratch.scaled);
@@ -320,7 +256,7 @@ bool project_velocity(const Program& p, Workspace& w, double t, VecX& v) {
         moved = true;
         configure_velocity(p, w, t, v);
         const double now = gather_rates(p, w, t, v);
-        if (it > sure_velocity_steps && now > projection_stall_ratio * last) break;
+        if (it > projection_parameters.sure_velocity_steps && now > projection_parameters.stall_ratio * last) break;
         last = now;
     }
     rest_alone(p, w, v);

@@ -2,9 +2,32 @@
 // factors of the step's last evaluation. One solve with the factors of the next step then gives A v + phi_t = 0.
 #pragma once
 
-#include "dynamics/workspace.hpp"
+#include "dynamics/constraint_gaps.hpp"
 
 namespace pn {
+
+struct ProjectionParameters {
+    // Past its first steps an iteration that keeps more than this fraction of the largest residual has converged to
+    // rounding. Newton's method at least halves the residual near the constraints. The first steps may start far away.
+    double stall_ratio = 0.5;
+    int sure_position_steps = 3, sure_velocity_steps = 1;  // first steps, which `stall_ratio` does not judge
+    // Maximum fraction of an earlier step that an iteration step may keep. Steps above it carry no information about
+    // the change of the rows since their factorization.
+    double broyden_limit = 0.3;
+    // A step with an expected residual below this fraction of rounding is not evaluated separately.
+    double trusted_part = 0.5;
+    // The third-order part of a step's move is used if its square is below this fraction of the second-order part's
+    // square.
+    double falling_square = 0.01;
+    // Below this speed [rad/s or m/s] rows change only by rounding over a step of time stepping.
+    double slow_speed = 1e-5;
+    // Factorization at the new position costs less than this many iterations.
+    double iterations_for_factors = 3.0;
+    // Near a singular position the floor is zero. Iteration counts then assume convergence to unit roundoff.
+    double no_floor = 1e-16;
+};
+
+inline constexpr ProjectionParameters projection_parameters{};
 
 // Add the least move that follows the constraints to third order to a step's move h v1, v1 = v0 + h a. Without it the
 // gap is h^2/2 b, because h v0 + h^2/2 a follows the constraints to second order. The multipliers of h^3 come from
@@ -32,15 +55,5 @@ bool is_on_constraints(const Program& p, Workspace& w, double t, const VecX& q, 
 // workspace. Nonholonomic rows bind velocities only, so projection of a position ignores them.
 void remove_normal_velocity(const Program& p, Workspace& w, Eigen::Ref<VecX> change);
 void remove_normal_move(const Program& p, Workspace& w, Eigen::Ref<VecX> move);
-
-// Largest residual of a block, as last evaluated, above the allowed one for rows of unit length. Zero if there is none.
-double opening(const Program& p, const Workspace& w, int block, double allowed);
-// Length of the last closing move of the position, in the metric of M.
-double closing_distance(const Program& p, Workspace& w);
-// Throw a failure if the last evaluated residual of a row is open.
-void require_closed(const Program& p, const Workspace& w, double t);
-
-// Size of the scene [m]: largest distance of a constrained body from the world's origin, at least 1 m.
-double scene_size(const Program& p, const Workspace& w);
 
 }  // namespace pn

@@ -10,11 +10,6 @@ namespace pn {
 
 namespace {
 
-// Part of a unit vector of multipliers that exert no force below which a row takes no part in it.
-constexpr double min_part = 1e-9;
-// Part of its limit by which friction may leave its cone by rounding.
-constexpr double cone_rounding = 1e-9;
-
 // Rows of the contacts that stick, as a cone problem whose w is zero for all multipliers with the force of those at hand.
 struct Shares {
     std::vector<int> rows;
@@ -30,7 +25,7 @@ struct Shares {
             add_contact(p, w, lam, p.gaps[i], taken);
         }
         for (int row = 0; row < p.layout.rows; ++row) {
-            if (taken[row] || !(free.row(row).norm() > min_part)) continue;
+            if (taken[row] || !(free.row(row).norm() > reported_loads_parameters.min_part)) continue;
             known &= row < p.constraint_rows();
             rows.push_back(row);
             cones.push_back({ConeElement::Kind::equality, 1, 0.0});
@@ -49,7 +44,7 @@ struct Shares {
         double friction = 0.0;
         for (int k = 0; k < dim; ++k) friction = std::hypot(friction, lam[rows[rows.size() - 1 - k]]);
         const double load = lam[p.blocks[gap.block].row];
-        outside |= load < 0.0 || friction > mu * load * (1.0 + cone_rounding);
+        outside |= load < 0.0 || friction > mu * load * (1.0 + reported_loads_parameters.cone_rounding);
     }
 };
 

@@ -5,6 +5,15 @@
 
 namespace pn {
 
+struct ReportedLoadsParameters {
+    // Part of a unit vector of multipliers that exert no force below which a row takes no part in it.
+    double min_part = 1e-9;
+    // Part of its limit by which friction may leave its cone by rounding.
+    double cone_rounding = 1e-9;
+};
+
+inline constexpr ReportedLoadsParameters reported_loads_parameters{};
+
 // While it exists, the multipliers of redundant contacts that all stick are the shortest ones within Coulomb's cones that
 // exert the same force. Multipliers of least norm alone may leave a cone, although others hold the contacts at rest. The
 // multipliers stay if a contact slides, since its friction follows the load of least norm, or if no others are found.

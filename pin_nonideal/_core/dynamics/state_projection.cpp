@@ -11,15 +11,6 @@ namespace pn {
 
 namespace {
 
-// Rank tolerances tried in this order at a state off the constraints, where dependent rows have pivots above
-// rank_tolerance. The first choice (fewest rows) whose projection closes all other rows is taken.
-constexpr double tolerances_near[] = {1e-3, 1e-5, 1e-7, 1e-9};
-// Gaps above this fraction of the scene's size in dependent rows are closed by projection, which may move sticking
-// elements.
-constexpr double creeping_gap = 1e-11;
-// Maximum choices of rows to project one position. Each choice reduces the gaps of the other rows quadratically.
-constexpr int max_row_choices = 3;
-
 // Largest residual of the rows that count as dependent.
 double dependent_residual(const Program& p, const Workspace& w) {
     double largest = 0.0;
@@ -60,8 +51,12 @@ bool project_onto_dependent(const Program& p, Workspace& w, double t, VecX& q, c
     if (!w.now.rows.redundant || !p.gaps.empty() || w.state.sticks_anywhere()) return false;
     const int rank = static_cast<int>(std::count(w.now.rows.active.begin(), w.now.rows.active.end(), char(1)));
     bool moved = false;
-    const auto is_open = [&] { return dependent_residual(p, w) > creeping_gap * scene_size(p, w); };
-    for (int k = 0; k < max_row_choices && (is_open() || (k == 0 && w.now.rows.distance < near_singular_pivot)); ++k) {
+    const auto is_open = [&] {
+        return dependent_residual(p, w) > state_projection_parameters.creeping_gap * scene_size(p, w);
+    };
+    for (int k = 0; k < state_projection_parameters.max_row_choices &&
+                    (is_open() || (k == 0 && w.now.rows.distance < near_singular_pivot));
+         ++k) {
         configure(p, w, t, q, v);
         choose_rows(p, w, rank_tolerance, rank);
         moved |= project_position(p, w, t, q, v);
@@ -71,7 +66,7 @@ bool project_onto_dependent(const Program& p, Workspace& w, double t, VecX& q, c
 
 bool project_past_sticking(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
     if (!w.now.rows.redundant || !w.state.sticks_anywhere()) return false;
-    if (dependent_residual(p, w) <= creeping_gap * scene_size(p, w)) return false;
+    if (dependent_residual(p, w) <= state_projection_parameters.creeping_gap * scene_size(p, w)) return false;
     const std::vector<Mode> modes = w.state.mode;
     std::vector<Mode> released = modes;
     std::replace(released.begin(), released.end(), sticking, unloaded);
@@ -100,10 +95,10 @@ void choose_rows_near(const Program& p, Workspace& w, double t, VecX& q, const V
     if (w.now.rows.blocks.empty() || !w.now.rows.orthogonal) return;
     if (!p.gaps.empty() || w.state.sticks_anywhere()) return choose_rows(p, w);
     const VecX start = q;
-    for (double tolerance : tolerances_near) {
+    for (double tolerance : state_projection_parameters.tolerances_near) {
         choose_rows(p, w, tolerance);
         project_position(p, w, t, q, v);
-        if (dependent_residual(p, w) <= creeping_gap * scene_size(p, w)) break;
+        if (dependent_residual(p, w) <= state_projection_parameters.creeping_gap * scene_size(p, w)) break;
         q = start;
         configure(p, w, t, q, v);
     }

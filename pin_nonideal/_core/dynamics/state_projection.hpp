@@ -6,6 +6,19 @@
 
 namespace pn {
 
+struct StateProjectionParameters {
+    // Rank tolerances tried in this order at a state off the constraints, where dependent rows have pivots above
+    // rank_tolerance. The first choice (fewest rows) whose projection closes all other rows is taken.
+    double tolerances_near[4] = {1e-3, 1e-5, 1e-7, 1e-9};
+    // Gaps above this fraction of the scene's size in dependent rows are closed by projection, which may move sticking
+    // elements.
+    double creeping_gap = 1e-11;
+    // Maximum choices of rows to project one position. Each choice reduces the gaps of the other rows quadratically.
+    int max_row_choices = 3;
+};
+
+inline constexpr StateProjectionParameters state_projection_parameters{};
+
 // Project q and v. The workspace is configured there on return.
 bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
 // Project q and v and evaluate the result.

@@ -12,15 +12,6 @@
 
 namespace pn {
 
-// Tolerance of the residual of dependent rows, relative to the magnitudes of their terms. The scale of accelerations
-// counts with the factor `background`, and is at least `background` m/s^2.
-constexpr double consistency_tolerance = 1e-6, background = 1e-3;
-// Factor by which biases of a dependent row's basis rows may enter its own bias.
-constexpr double dependence_growth = 10.0;
-// A change of modes may take at most this fraction of the kinetic energy. If rows held by elements would take more,
-// rows held with at most `most_unheld` of their forces count as dependent. `unheld_growth` is the step of that search.
-constexpr double stopped_part = 1e-9, most_unheld = 1e-3, unheld_growth = 3.0;
-
 // Length of x in the metric of M, restricted to the constrained dofs.
 static double scaled_length(const Program& p, Workspace& w, const VecX& x) {
     VecX& scaled = w.scratch.scaled;
@@ -45,9 +36,10 @@ static double fastest_turn(const Workspace& w) {
 // effect of the motion on the row's independent component, which is below the rank tolerance.
 static double unseen(const Program& p, Workspace& w, const VecX& v) {
     const double speed = scaled_length(p, w, v);
-    const double turning = consistency_tolerance * background * speed * fastest_turn(w);
+    const double turning =
+        step_start_parameters.consistency_tolerance * step_start_parameters.background * speed * fastest_turn(w);
     if (!w.state.sticks_anywhere()) return turning;
-    return turning + dependence_growth * w.state.rank_tolerance *
+    return turning + step_start_parameters.dependence_growth * w.state.rank_tolerance *
                          (scaled_length(p, w, w.now.a) + speed * v.cwiseAbs().maxCoeff());
 }
 
@@ -56,7 +48,8 @@ static int contradicting_block(const Program& p, Workspace& w, const VecX& v, do
     int found = -1;
     double excess = 1.0;
     std::optional<double> lacking;  // for a row of unit length
-    const double reach = w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm() + background;  // scale of accelerations
+    const double reach = w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm() +
+                         step_start_parameters.background;  // scale of accelerations
     for (int i : w.now.rows.blocks) {
         const Block& block = p.blocks[i];
         const int n = static_cast<int>(block.kept.size());
@@ -70,7 +63,8 @@ static int contradicting_block(const Program& p, Workspace& w, const VecX& v, do
                 sum += term;
                 size += std::abs(term);
             }
-            double allowed = consistency_tolerance * (size + background * reach);
+            double allowed =
+                step_start_parameters.consistency_tolerance * (size + step_start_parameters.background * reach);
             if (std::abs(sum) <= allowed * excess) continue;
             if (!lacking) lacking = unseen(p, w, v);
             allowed += *lacking / w.now.rows.scale[row];
@@ -153,8 +147,10 @@ void keep_moving(const Program& p, Workspace& w, double t, const VecX& v) {
         continue_step(p, w, t, v, true);
     };
     double tolerance = w.state.rank_tolerance;
-    while (tolerance < most_unheld && part_stopped(p, w, t, v) > stopped_part) choose(tolerance *= unheld_growth);
-    if (tolerance >= most_unheld) choose(rank_tolerance_sticking);
+    while (tolerance < step_start_parameters.most_unheld &&
+           part_stopped(p, w, t, v) > step_start_parameters.stopped_part)
+        choose(tolerance *= step_start_parameters.unheld_growth);
+    if (tolerance >= step_start_parameters.most_unheld) choose(rank_tolerance_sticking);
 }
 
 bool begin_rows(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
@@ -162,7 +158,8 @@ bool begin_rows(const Program& p, Workspace& w, double t, const VecX& q, const V
     return configure_step(p, w);
 }
 
-void begin_rows_inside(const Program& p, Workspace& w, double t0, const VecX& q0, double t, const VecX& q, const VecX& v) {
+void begin_rows_inside(const Program& p, Workspace& w, double t0, const VecX& q0, double t, const VecX& q,
+                       const VecX& v) {
     configure(p, w, t, q, v);
     if (!w.now.rows.orthogonal) return;
     begin_rows(p, w, t0, q0, v);

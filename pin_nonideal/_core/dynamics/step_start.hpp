@@ -5,6 +5,20 @@
 
 namespace pn {
 
+struct StepStartParameters {
+    // Tolerance of the residual of dependent rows, relative to the magnitudes of their terms. The scale of
+    // accelerations counts with the factor `background`, and is at least `background` m/s^2.
+    double consistency_tolerance = 1e-6, background = 1e-3;
+    // Factor by which biases of a dependent row's basis rows may enter its own bias.
+    double dependence_growth = 10.0;
+    // A change of modes may take at most this fraction of the kinetic energy. If rows held by elements would take more,
+    // rows held with at most `most_unheld` of their forces count as dependent. `unheld_growth` is the step of that
+    // search.
+    double stopped_part = 1e-9, most_unheld = 1e-3, unheld_growth = 3.0;
+};
+
+inline constexpr StepStartParameters step_start_parameters{};
+
 // Evaluate and choose the independent rows. Contradicting rows raise a failure.
 void begin_step(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 // Evaluate in a configured workspace at another velocity. `chosen`: the rows were just chosen.

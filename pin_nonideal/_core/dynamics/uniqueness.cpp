@@ -11,14 +11,6 @@ namespace pn {
 
 namespace {
 
-constexpr double unknown_difference_step = 1e-7;  // relative to the unknowns: square root of the rounding, with a margin
-constexpr int most_mixed = 6;  // more laws mirror one branch at a time instead of all combinations
-constexpr double same_solution = 1e-9;  // relative residual at which a point is a solution
-constexpr double other_solution = 1e-6;  // relative distance beyond which two solutions differ
-constexpr double near_motion = 1e-6;  // tolerance between solutions of the arrays and motions, relative to the unknowns
-constexpr int refinements = 3;  // corrections of such a solution
-constexpr double holding_limit_tolerance = 1e-9;  // tolerance of a holding force, relative to its limit
-
 using Solutions = Failure::Solutions;
 
 Failure paradox(const Unknowns& u, double determinant, Solutions solutions = Solutions::not_told) {
@@ -49,7 +41,7 @@ void sort_by_distance(const ReactionEquation& equation, const VecX& start, std::
     for (const VecX& y : roots) size = size.cwiseMax(y);
     size = size.cwiseMax(min_scale);
     const auto rank = [&](const VecX& y) {
-        return std::pair(determinant_at(equation, y) < least_determinant_told,
+        return std::pair(determinant_at(equation, y) < uniqueness_parameters.least_determinant,
                          (y - start).cwiseQuotient(size).cwiseAbs().maxCoeff());
     };
     std::sort(roots.begin(), roots.end(), [&](const VecX& y, const VecX& x) { return rank(y) < rank(x); });
@@ -60,10 +52,10 @@ bool refine(Unknowns& u, const ReactionEquation& equation, VecX& y) {
     const FreeLoads free(u.w);
     ReactionNewton newton;
     VecX g(u.n);
-    for (int pass = 0; pass < refinements; ++pass) {
+    for (int pass = 0; pass < uniqueness_parameters.refinements; ++pass) {
         u.image(y, g);
         const VecX miss = g - y;
-        if (!(miss.cwiseAbs().maxCoeff() <= near_motion * y.cwiseAbs().maxCoeff())) return false;
+        if (!(miss.cwiseAbs().maxCoeff() <= uniqueness_parameters.near_motion * y.cwiseAbs().maxCoeff())) return false;
         newton.factorize(equation, y);
         newton.factor.solve(miss, newton.step);
         y += newton.step;
@@ -89,7 +81,7 @@ bool holds(Unknowns& u, const VecX& y) {
     u.motion();
     for (int e = 0; e < static_cast<int>(u.p.frictions.size()); ++e)
         if (u.w.state.mode[e] == sticking &&
-            !holding_force(u.p, u.w, e, u.t, u.q, u.v).is_within(holding_limit_tolerance))
+            !holding_force(u.p, u.w, e, u.t, u.q, u.v).is_within(uniqueness_parameters.holding_limit_tolerance))
             return false;
     return true;
 }
@@ -126,7 +118,8 @@ void decide_over_pieces(Unknowns& u, const VecX& start, VecX& y, const Failure& 
         else if (ReactionNewton().solve(equation, linear)) roots.y.push_back(linear);
         complete &= roots.complete && !roots.at_edge;
         for (const VecX& root : roots.y)
-            if (u.is_motion(root) && determinant_at(equation, root) > least_determinant_told) found.push_back(root);
+            if (u.is_motion(root) && determinant_at(equation, root) > uniqueness_parameters.least_determinant)
+                found.push_back(root);
     }
     if (found.empty() && !complete) throw Failure(Failure::Kind::not_converged, u.t, u.elements());
     if (found.empty()) throw failure;
@@ -142,11 +135,11 @@ void decide(Unknowns& u, const ReactionEquation& equation, const VecX& start, Ve
     equation.steepest(L);
     state.growth = growth(L);
     state.steps_since = 0;
-    const bool contracts = state.growth < 1.0 - least_determinant_told;
+    const bool contracts = state.growth < 1.0 - uniqueness_parameters.least_determinant;
     const bool in_pieces = shares_pressing(u.p, u.w);  // one zero-load set proves nothing about the others
     state.unique = contracts && !in_pieces ? Uniqueness::shown : Uniqueness::not_shown;
     if (contracts && solved) return;
-    if (solved && determinant_at(equation, y) > least_determinant_told) {
+    if (solved && determinant_at(equation, y) > uniqueness_parameters.least_determinant) {
         const bool linear = only_opening(u);
         if (linear && !in_pieces) state.unique = Uniqueness::shown;
         if (linear || pulls(u, y)) return;
@@ -163,7 +156,8 @@ void decide(Unknowns& u, const ReactionEquation& equation, const VecX& start, Ve
         if (!motions.empty()) found = motions;  // else a contact has tension and is about to open
         // A solution from infinite loads then has a contact in tension, unless det(I - dg/dy) is zero. A solution with
         // a negative determinant amplifies load changes, and the opening contact continues in another motion.
-        if (only_opening(u)) roots.at_edge = !(determinant_at(equation, found.front()) > least_determinant_told);
+        if (only_opening(u))
+            roots.at_edge = !(determinant_at(equation, found.front()) > uniqueness_parameters.least_determinant);
     }
     const double edge = std::min(1.0 - state.growth, 0.0);
     if (!roots.complete && solved && found.empty()) found.push_back(y);
@@ -181,12 +175,12 @@ void decide(Unknowns& u, const ReactionEquation& equation, const VecX& start, Ve
     // yet.
     const auto hold = std::count_if(found.begin(), found.end(), [&](const VecX& root) { return holds(u, root); });
     const bool shown = found.size() == 1 || hold > 1;
-    if (!shown && determinant_at(equation, y) > least_determinant_told) return;
+    if (!shown && determinant_at(equation, y) > uniqueness_parameters.least_determinant) return;
     state.unique = Uniqueness::several;
     VecX::Index most = 0;
     (found.back() - y).cwiseQuotient((found.back() + y).cwiseMax(min_scale)).cwiseAbs().maxCoeff(&most);
     u.w.now.several_element = u.elements()[most];
-    if (u.w.continues && determinant_at(equation, y) > least_determinant_told) return;
+    if (u.w.continues && determinant_at(equation, y) > uniqueness_parameters.least_determinant) return;
     if (found.size() == 1) throw paradox(u, std::min(least, edge));
     throw two_motions(u, least, found[0], found[1]);
 }
@@ -194,7 +188,7 @@ void decide(Unknowns& u, const ReactionEquation& equation, const VecX& start, Ve
 void differentiate(Unknowns& u, const VecX& y, const VecX& g, double size, MatX& J) {
     J.resize(u.n, u.n);
     VecX shifted = y, image_there(u.n);
-    const double h = unknown_difference_step * std::max(size, min_scale);
+    const double h = uniqueness_parameters.difference_step * std::max(size, min_scale);
     for (int k = 0; k < u.n; ++k) {
         shifted[k] = y[k] + h;
         u.image(shifted, image_there);
@@ -230,7 +224,7 @@ template <class Look>
 void each_mixture(const Unknowns& u, const MatX& J, const Look& look) {
     const auto laws = groups(u);
     const int m = static_cast<int>(laws.size());
-    const bool all = m <= most_mixed;
+    const bool all = m <= uniqueness_parameters.most_mixed;
     for (int mixture = 1; mixture < (all ? 1 << m : m + 1); ++mixture) {
         MatX other = J;
         VecX mirrored = VecX::Zero(u.n);
@@ -249,12 +243,12 @@ bool leads_elsewhere(Unknowns& u, const VecX& y, VecX& start, double size) {
     VecX g(u.n);
     MatX J;
     try {
-        for (int it = 0; it < max_reaction_newton; ++it) {
+        for (int it = 0; it < Unknowns::parameters.max_newton; ++it) {
             u.image(start, g);
             const VecX residual = g - start;
             const double scale = std::max({size, start.cwiseAbs().maxCoeff(), g.cwiseAbs().maxCoeff()});
-            if (residual.cwiseAbs().maxCoeff() <= same_solution * scale)
-                return (start - y).cwiseAbs().maxCoeff() > other_solution * scale;
+            if (residual.cwiseAbs().maxCoeff() <= uniqueness_parameters.same_solution * scale)
+                return (start - y).cwiseAbs().maxCoeff() > uniqueness_parameters.other_solution * scale;
             differentiate(u, start, g, scale, J);
             start += solve(MatX::Identity(u.n, u.n) - J, residual);
         }
@@ -277,10 +271,11 @@ void look_for_others(Unknowns& u, VecX& y, const MatX& J, double size) {
     RunState& state = u.w.state;
     const MatX I = MatX::Identity(u.n, u.n);
     const double here = determinant(I - J);
-    const bool regular = here > least_determinant_told;
+    const bool regular = here > uniqueness_parameters.least_determinant;
     u.w.now.determinant = here;
     state.unique = Uniqueness::not_shown;
-    if (std::abs(here) <= least_determinant_told) throw paradox(u, std::min(here, 0.0));  // counts as zero
+    if (std::abs(here) <= uniqueness_parameters.least_determinant)
+        throw paradox(u, std::min(here, 0.0));  // counts as zero
     const VecX bound = solve(I - J.cwiseAbs(), VecX::Ones(u.n));
     if ((bound.array() > 0.0).all()) return;
     const VecX c = constants(u), solution = y;

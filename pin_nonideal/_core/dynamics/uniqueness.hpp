@@ -5,8 +5,19 @@
 
 namespace pn {
 
-// Determinants below this value count as zero.
-constexpr double least_determinant_told = 1e-8;
+struct UniquenessParameters {
+    double difference_step = 1e-7;  // relative to the unknowns: square root of the rounding, with a margin
+    int most_mixed = 6;             // more laws mirror one branch at a time instead of all combinations
+    double same_solution = 1e-9;    // relative residual at which a point is a solution
+    double other_solution = 1e-6;   // relative distance beyond which two solutions differ
+    double near_motion = 1e-6;      // tolerance between solutions of the arrays and motions, relative to the unknowns
+    int refinements = 3;            // corrections of such a solution
+    double holding_limit_tolerance = 1e-9;  // tolerance of a holding force, relative to its limit
+    // Determinants below this value count as zero.
+    double least_determinant = 1e-8;
+};
+
+inline constexpr UniquenessParameters uniqueness_parameters{};
 
 // Decide uniqueness for bearings: g contracts, or all solutions are found. y is Newton's solution if `solved`. `start`
 // is the motion before, where the search began. If there are several solutions, y becomes the nearest to `start`, or

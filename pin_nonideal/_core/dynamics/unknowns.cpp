@@ -8,11 +8,6 @@
 
 namespace pn {
 
-// Rounding of a solution at the boundary of two zero-load sets, relative to the unknowns.
-static constexpr double zero_load_set_rounding = 1e-11;
-// Rounding of shared loads, relative to the largest multiplier.
-static constexpr double shared_rounding = 1e-13;
-
 Unknowns::Unknowns(const Program& program, Workspace& workspace, double time, const VecX& q_, const VecX& v_)
     : p(program), w(workspace), t(time), q(q_), v(v_) {
     each([&](size_t e) { ++n; bearings &= p.frictions[e].load != Friction::Load::user; },
@@ -59,8 +54,9 @@ void Unknowns::image(const VecX& y, VecX& g) {
 double Unknowns::rounding() const {
     if (!shares_pressing(p, w)) return 0.0;
     double factor = 0.0;
-    each([&](size_t e) { factor = std::max(factor, limit_under(p, w, static_cast<int>(e), 1.0)); }, [](const UserLaw&) {});
-    return shared_rounding * factor * reactions(p, w).lam.cwiseAbs().maxCoeff();
+    each([&](size_t e) { factor = std::max(factor, limit_under(p, w, static_cast<int>(e), 1.0)); },
+         [](const UserLaw&) {});
+    return parameters.shared_rounding * factor * reactions(p, w).lam.cwiseAbs().maxCoeff();
 }
 
 bool Unknowns::is_motion(const VecX& y) {
@@ -69,7 +65,7 @@ bool Unknowns::is_motion(const VecX& y) {
     VecX g(n);
     image(y, g);
     const double size = g.cwiseAbs().maxCoeff() + y.head(n).cwiseAbs().maxCoeff();
-    return (g - y.head(n)).cwiseAbs().maxCoeff() <= zero_load_set_rounding * size + rounding();
+    return (g - y.head(n)).cwiseAbs().maxCoeff() <= parameters.zero_load_set_rounding * size + rounding();
 }
 
 void Unknowns::equation(const VecX& y, ReactionEquation& found) {

@@ -7,10 +7,19 @@
 
 namespace pn {
 
-// Maximum steps of Newton's method for y = g(y).
-constexpr int max_reaction_newton = 30;
+struct UnknownsParameters {
+    // Rounding of a solution at the boundary of two zero-load sets, relative to the unknowns.
+    double zero_load_set_rounding = 1e-11;
+    // Rounding of shared loads, relative to the largest multiplier.
+    double shared_rounding = 1e-13;
+    // Maximum steps of Newton's method for y = g(y).
+    int max_newton = 30;
+};
 
 struct Unknowns {
+    using Parameters = UnknownsParameters;
+    static constexpr Parameters parameters{};
+
     const Program& p;
     Workspace& w;
     double t;

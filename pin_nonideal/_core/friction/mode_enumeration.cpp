@@ -51,8 +51,9 @@ struct EachChoice {
     bool keeps_conditions() {
         const double size = w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm();
         return std::all_of(question.at_rest.begin(), question.at_rest.end(), [&](int e) {
-            if (w.state.mode[e] != sticking) return slip_rate_along_mode(p, w, e) >= -limit_slack * size;
-            return holding_force(p, w, e, t, q, v).is_within(limit_slack);
+            if (w.state.mode[e] != sticking)
+                return slip_rate_along_mode(p, w, e) >= -slip_onset_parameters.limit_slack * size;
+            return holding_force(p, w, e, t, q, v).is_within(slip_onset_parameters.limit_slack);
         });
     }
 
@@ -101,7 +102,8 @@ struct EachChoice {
 
 }  // namespace
 
-bool take_only_choice(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, const ModeQuestion& question) {
+bool take_only_choice(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
+                      const ModeQuestion& question) {
     if (!may_be_tried(p, question.at_rest)) return false;
     EachChoice each{p, w, t, q, v, question, {}};
     each.try_all();

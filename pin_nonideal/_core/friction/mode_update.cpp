@@ -9,12 +9,6 @@ namespace pn {
 
 namespace {
 
-// Sticking removes slip of rounding. At a dead center of a loop, slip reverses while other bodies move, and its removal
-// could stop the whole motion. A relative change of the velocity above this value is a change of the motion.
-constexpr double min_velocity_change = 1e-6;
-constexpr double mode_condition_slack = 1e-9;  // rounding relative to the limit, or to the scale of accelerations
-constexpr int rounds = 6;                      // rounds of mode changes before the full problem is solved
-
 // Change the modes whose conditions fail in the current motion. An element past its limit slips, and an element driven
 // against its slip sticks. Return the number of changes. Return nothing if one motion does not decide, for elements of
 // several directions or redundant sticking elements.
@@ -25,11 +19,11 @@ std::optional<int> change_modes(const Program& p, Workspace& w, double t, const 
     for (int e : at_rest) {
         if (modes[e] == sticking) {
             const HoldingForce held = holding_force(p, w, e, t, q, v);
-            if (held.is_within(mode_condition_slack)) continue;
+            if (held.is_within(mode_update_parameters.condition_slack)) continue;
             if (p.frictions[e].dim > 1 || w.now.rows.redundant) return std::nullopt;
             modes[e] = held.force[0] < 0.0 ? slip_plus : slip_minus;
         } else {
-            if (slip_rate_along_mode(p, w, e) >= -mode_condition_slack * size) continue;
+            if (slip_rate_along_mode(p, w, e) >= -mode_update_parameters.condition_slack * size) continue;
             modes[e] = sticking;
         }
         ++changed;
@@ -48,11 +42,13 @@ bool go_on(const Program& p, Workspace& w, double t, VecX& q, VecX& v, const Mod
     for (int e : question.at_rest) modes[e] = sticking;
     if (breaks) modes[element] = holding_force(p, w, element, t, q, v).force[0] < 0.0 ? slip_plus : slip_minus;
     const VecX q_before = q, v_before = v;
-    for (int round = 0; round < rounds; ++round) {
+    for (int round = 0; round < mode_update_parameters.rounds; ++round) {
         set_modes(p, w, modes);
         try {
             project_into_modes(p, w, t, q, v);
-            if ((v - v_before).cwiseAbs().maxCoeff() > min_velocity_change * (1.0 + v_before.cwiseAbs().maxCoeff())) break;
+            if ((v - v_before).cwiseAbs().maxCoeff() >
+                mode_update_parameters.min_velocity_change * (1.0 + v_before.cwiseAbs().maxCoeff()))
+                break;
             begin_step(p, w, t, q, v);
         } catch (const Failure& failure) {
             if (failure.kind != Failure::Kind::inconsistent) throw;

@@ -8,6 +8,17 @@
 
 namespace pn {
 
+struct ModeUpdateParameters {
+    // Sticking removes slip of rounding. At a dead center of a loop, slip reverses while other bodies move, and its
+    // removal could stop the whole motion. A relative change of the velocity above this value is a change of the
+    // motion.
+    double min_velocity_change = 1e-6;
+    double condition_slack = 1e-9;  // rounding relative to the limit, or to the scale of accelerations
+    int rounds = 6;                 // rounds of mode changes before the full problem is solved
+};
+
+inline constexpr ModeUpdateParameters mode_update_parameters{};
+
 // Try these modes at (q, v), projected onto the required rows. The element of the event sticks, or slips if it was
 // sticking and reached its limit. Modes with violated conditions are changed for a few rounds. Return true if all
 // conditions hold: then the workspace is evaluated there. Otherwise q and v are restored.

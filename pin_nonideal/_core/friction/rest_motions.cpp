@@ -38,7 +38,7 @@ bool RestMotions::find_in_piece(RestProblem& problem, VecX& x) {
 }
 
 bool RestMotions::find(RestProblem& problem, VecX& x) {
-    for (int turn = 0; turn < max_zero_load_sets && find_in_piece(problem, x); ++turn) {
+    for (int turn = 0; turn < implicit_friction_parameters.max_zero_load_sets && find_in_piece(problem, x); ++turn) {
         if (!problem.has_pieces() || problem.is_motion(x)) return true;
         problem.enter_piece(x);
     }
@@ -52,7 +52,7 @@ bool RestMotions::find(RestProblem& problem, VecX& x) {
 }
 
 bool RestMotions::refine(RestProblem& problem, VecX& x) {
-    for (int turn = 0; turn < max_zero_load_sets; ++turn) {
+    for (int turn = 0; turn < implicit_friction_parameters.max_zero_load_sets; ++turn) {
         if (problem.has_pieces()) problem.enter_piece(x);
         if (!refine_rest(problem.equation, x)) return false;
         if (!problem.has_pieces() || problem.is_motion(x)) return true;
@@ -65,7 +65,7 @@ bool RestMotions::hold(RestProblem& problem, VecX& x) {
     const auto may_stick = [](const RestElement& e) { return e.may_stick; };  // the constraints drive the others
     if (!std::all_of(begin, begin + list_.size(), may_stick)) return false;
     x = problem.equation.holding_forces();
-    for (int turn = 0; turn < max_zero_load_sets; ++turn) {
+    for (int turn = 0; turn < implicit_friction_parameters.max_zero_load_sets; ++turn) {
         const bool holds = hold_at_rest(problem.equation, x);
         if (!problem.has_pieces() || problem.is_motion(x)) return holds;
         problem.enter_piece(x);

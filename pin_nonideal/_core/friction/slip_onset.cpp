@@ -10,9 +10,6 @@ namespace pn {
 
 namespace {
 
-constexpr double unsolved = 10.0;  // factor from the residual of the equation to the error of accelerations
-constexpr double max_onset_acceleration = 1e-6;  // accelerations below this fraction are slip onset exactly at a limit
-
 struct Beginning {
     VecX force, slip;   // along its directions: force relative to the middle of its limits, slip direction at onset
     bool slides, told;  // acceleration above rounding, slip direction known
@@ -21,7 +18,8 @@ struct Beginning {
 
 bool breaks(const ModeQuestion& question, int e, const VecX& force, double limit) {
     const std::vector<int>& list = question.breaking;
-    return force.norm() >= limit * (1.0 - limit_slack) && std::find(list.begin(), list.end(), e) != list.end();
+    return force.norm() >= limit * (1.0 - slip_onset_parameters.limit_slack) &&
+           std::find(list.begin(), list.end(), e) != list.end();
 }
 
 std::vector<Mode> modes_of(Workspace& w, const ModeQuestion& question, const std::vector<Beginning>& all) {
@@ -50,16 +48,18 @@ std::vector<Mode> modes_of(Workspace& w, const ModeQuestion& question, const Fri
                            const FrictionLimits& limits) {
     const VecX alpha = problem.alpha0 + problem.W * f, from_middle = f - limits.middle;
     const double noise = relative_acceleration_rounding * problem.alpha0.cwiseAbs().maxCoeff();
-    const double slowest = max_onset_acceleration * problem.alpha0.cwiseAbs().maxCoeff();
+    const double slowest = slip_onset_parameters.max_acceleration * problem.alpha0.cwiseAbs().maxCoeff();
     std::vector<Beginning> all;
     VecX onset;
     for (size_t i = 0, at = 0; i < question.at_rest.size(); at += problem.dims[i], ++i) {
         const int dim = problem.dims[i];
         const VecX force = from_middle.segment(at, dim), slip = alpha.segment(at, dim);
         const bool broken = breaks(question, question.at_rest[i], force, limits[i]);
-        const bool slides = force.norm() >= limits[i] * (1.0 - slip_limit_rounding) && slip.norm() > noise;
-        const bool slowly = dim > 1 ? force.norm() >= limits[i] * (1.0 - limit_slack) && slip.norm() < slowest
-                                    : broken && !slides;
+        const bool slides =
+            force.norm() >= limits[i] * (1.0 - slip_onset_parameters.limit_rounding) && slip.norm() > noise;
+        const bool slowly =
+            dim > 1 ? force.norm() >= limits[i] * (1.0 - slip_onset_parameters.limit_slack) && slip.norm() < slowest
+                    : broken && !slides;
         if (slowly && onset.size() == 0)
             onset = onset_accelerations(problem.W, problem.alpha0, problem.dims, limits);
         const double response = problem.W.diagonal().segment(at, dim).sum() / dim;
@@ -75,14 +75,15 @@ std::vector<Mode> modes_of(Workspace& w, const ModeQuestion& question, const Res
     FrictionLimits limits;
     equation.respond(x, alpha, limits);
     const VecX from_middle = x - limits.middle;
-    const double noise = relative_acceleration_rounding + unsolved * equation.error(x);
+    const double noise = relative_acceleration_rounding + slip_onset_parameters.unsolved * equation.error(x);
     std::vector<Beginning> all;
     for (size_t i = 0; i < question.at_rest.size(); ++i) {
         const RestElement& e = equation.elements[i];
         const VecX force = from_middle.segment(e.row, e.dim), slip = alpha.segment(e.row, e.dim);
         const bool broken = breaks(question, question.at_rest[i], force, limits[i]);
-        const bool at_its_limit = force.norm() >= limits[i] * (1.0 - slip_limit_rounding) ||
-                                  (force - e.rho * slip).norm() > limits[i] * (1.0 + slip_limit_rounding);
+        const bool at_its_limit =
+            force.norm() >= limits[i] * (1.0 - slip_onset_parameters.limit_rounding) ||
+            (force - e.rho * slip).norm() > limits[i] * (1.0 + slip_onset_parameters.limit_rounding);
         const double in_play = equation.force_in_play(i, x, limits);
         const bool slides = !e.may_stick || (at_its_limit && e.rho * slip.norm() > noise * in_play);
         const bool slowly = broken && !slides;

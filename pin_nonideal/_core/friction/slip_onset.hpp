@@ -8,8 +8,14 @@
 
 namespace pn {
 
-constexpr double slip_limit_rounding = 1e-13;    // rounding relative to a limit
-constexpr double limit_slack = 1e-9;             // allowed violation of a mode's condition, relative to a limit
+struct SlipOnsetParameters {
+    double unsolved = 10.0;          // factor from the residual of the equation to the error of accelerations
+    double max_acceleration = 1e-6;  // accelerations below this fraction are slip onset exactly at a limit
+    double limit_rounding = 1e-13;   // rounding relative to a limit
+    double limit_slack = 1e-9;       // allowed violation of a mode's condition, relative to a limit
+};
+
+inline constexpr SlipOnsetParameters slip_onset_parameters{};
 
 // Compute the modes for the forces f of a program with these limits. Slip directions are stored in the workspace.
 std::vector<Mode> modes_of(Workspace& w, const ModeQuestion& question, const FrictionProblem& problem, const VecX& f,

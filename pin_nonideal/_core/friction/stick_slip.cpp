@@ -22,12 +22,6 @@ namespace pn {
 
 namespace {
 
-constexpr double limit_tolerance = 1e-12;  // relative change of the limits at convergence
-// Change of a limit that counts as rounding, relative to the largest given force. Far from the loads of a long chain limits
-// are as small as that.
-constexpr double limit_force_rounding = 64 * std::numeric_limits<double>::epsilon();
-constexpr int max_limit_iterations = 100;  // maximum iterations of forces and limits
-
 bool contains(const std::vector<int>& list, int e) { return std::find(list.begin(), list.end(), e) != list.end(); }
 
 // Search of the modes of elements at rest at one state.
@@ -75,8 +69,8 @@ struct Search {
         const double size = w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm();
         return std::all_of(list.begin(), list.end(), [&](int e) {
             if (w.state.mode[e] == sticking)
-                return holding_force(p, w, e, t, q, v).is_within(slip_limit_rounding);
-            return p.frictions[e].dim == 1 && slip_rate_along_mode(p, w, e) >= -limit_slack * size;
+                return holding_force(p, w, e, t, q, v).is_within(slip_onset_parameters.limit_rounding);
+            return p.frictions[e].dim == 1 && slip_rate_along_mode(p, w, e) >= -slip_onset_parameters.limit_slack * size;
         });
     }
 
@@ -116,7 +110,8 @@ struct Search {
         problem.alpha0 = problem.slip_accelerations(p, w) - problem.W * f;
         for (int i = 0; i < problem.rows; ++i)
             if (problem.W(i, i) == 0.0) problem.alpha0[i] = driven[i];
-        const double least = limit_force_rounding / limit_tolerance * w.now.F.cwiseAbs().maxCoeff();
+        const double least = stick_slip_parameters.limit_force_rounding / stick_slip_parameters.limit_tolerance *
+                             w.now.F.cwiseAbs().maxCoeff();
         double change = 0.0;
         for (size_t i = 0, at = 0; i < list.size(); at += problem.dims[i], ++i) {
             const Friction& friction = p.frictions[list[i]];
@@ -135,7 +130,8 @@ struct Search {
         FrictionProblem problem(p, w, list);
         problem.clean(p, w);
         problem.alpha0 = problem.slip_accelerations(p, w);
-        const double noise = relative_acceleration_rounding * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
+        const double noise =
+            relative_acceleration_rounding * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
         for (int i = 0; i < problem.rows; ++i)  // rows held by the constraints have no slip acceleration
             if (problem.W(i, i) == 0.0 && std::abs(problem.alpha0[i]) <= noise) problem.alpha0[i] = 0.0;
         FrictionLimits limits(static_cast<int>(list.size()), problem.rows);
@@ -145,10 +141,10 @@ struct Search {
             limits.middle[at] = now.middle();
         }
         double change = 0.0;
-        for (int turn = 0; turn < max_limit_iterations; ++turn) {
+        for (int turn = 0; turn < stick_slip_parameters.max_limit_iterations; ++turn) {
             const VecX f = friction_program(problem.W, problem.alpha0, problem.dims, limits);
             const std::vector<Mode> next = modes_of(w, question, problem, f, limits);
-            if (next == modes && change <= limit_tolerance) return true;
+            if (next == modes && change <= stick_slip_parameters.limit_tolerance) return true;
             modes = next;
             change = follow(problem, f, modes, limits);
         }
@@ -159,7 +155,8 @@ struct Search {
     VecX near(const RestEquation& equation) const {
         VecX x = VecX::Zero(equation.n);
         for (size_t i = 0; i < list.size(); ++i)
-            for (int k = 0; k < equation.elements[i].dim; ++k) x[equation.elements[i].row + k] = question.near[list[i]][k];
+            for (int k = 0; k < equation.elements[i].dim; ++k)
+                x[equation.elements[i].row + k] = question.near[list[i]][k];
         return x;
     }
 
@@ -239,7 +236,8 @@ struct Search {
             one_limit = false;  // static and kinetic limits differ: the search missed such motions
             solved = motions.find(problem, x);
         }
-        while (solved && release(problem, equation, modes_of(w, question, equation, x))) solved = motions.find(problem, x);
+        while (solved && release(problem, equation, modes_of(w, question, equation, x)))
+            solved = motions.find(problem, x);
         if (trusted && !(motions.are_complete() && solved)) return false;
         if (!solved && motions.are_complete() && one_limit && !found)
             motions.paradox(problem, std::min(0.0, equation.determinant_far_away()), {});

@@ -4,9 +4,21 @@
 // All elements are solved at once. An outer iteration updates load-dependent limits.
 #pragma once
 
+#include <limits>
+
 #include "friction/slip_onset.hpp"
 
 namespace pn {
+
+struct StickSlipParameters {
+    double limit_tolerance = 1e-12;  // relative change of the limits at convergence
+    // Change of a limit that counts as rounding, relative to the largest given force. Far from the loads of a long
+    // chain limits are as small as that.
+    double limit_force_rounding = 64 * std::numeric_limits<double>::epsilon();
+    int max_limit_iterations = 100;  // maximum iterations of forces and limits
+};
+
+inline constexpr StickSlipParameters stick_slip_parameters{};
 
 // Compute the modes of all elements at rest. The workspace is evaluated with the new modes on return.
 void resolve_modes(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, const ModeQuestion& question);

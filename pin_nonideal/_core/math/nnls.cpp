@@ -11,24 +11,11 @@ namespace pn {
 
 namespace {
 
-// Rounding of a few products, relative to the numbers that cancel.
-constexpr double nnls_rounding = 1e-13;
-// Relative pivot below which a column counts as spanned by the others.
-constexpr double min_column_pivot = 1e-11;
-// Slack for the search of binding numbers if no z is feasible, relative to max |N|. It must exceed rounding.
-constexpr double binding_slack = 1e-9;
-// Rounding of a zero in a least-squares solution, relative to the numbers that it sums.
-constexpr double met_rounding = 1e-11;
-// Projections that make a column orthogonal to others, up to rounding.
-constexpr int orthogonal_passes = 2;
-// Maximum number of exchanges per column. The method is finite and takes about one. Further exchanges are rounding.
-constexpr int exchanges = 10;
-constexpr int most_cuts = 50;  // updates of the bound in largest_least, each exact for the binding numbers
-
 // Least-squares solutions over a set of columns, which changes by one column at a time. [Lawson, Hanson, ch. 24.]
 class ColumnSet {
 public:
-    ColumnSet(Eigen::Index rows, Eigen::Index most) : Q_(rows, std::min(rows, most)), R_(MatX::Zero(Q_.cols(), Q_.cols())) {}
+    ColumnSet(Eigen::Index rows, Eigen::Index most)
+        : Q_(rows, std::min(rows, most)), R_(MatX::Zero(Q_.cols(), Q_.cols())) {}
 
     // Append a column. Return false if the set spans it.
     bool append(const VecX& column) {
@@ -36,13 +23,13 @@ public:
         VecX rest = column;
         if (count_ == Q_.cols()) return false;
         R_.col(count_).setZero();
-        for (int pass = 0; pass < orthogonal_passes; ++pass) {
+        for (int pass = 0; pass < nnls_parameters.orthogonal_passes; ++pass) {
             const VecX part = Q_.leftCols(count_).transpose() * rest;
             rest.noalias() -= Q_.leftCols(count_) * part;
             R_.col(count_).head(count_) += part;
         }
         const double pivot = rest.norm();
-        if (!(pivot > min_column_pivot * length)) return false;
+        if (!(pivot > nnls_parameters.min_column_pivot * length)) return false;
         R_(count_, count_) = pivot;
         Q_.col(count_++) = rest / pivot;
         return true;
@@ -83,7 +70,7 @@ double largest(const VecX& x) { return x.size() > 0 ? x.cwiseAbs().maxCoeff() : 
 MatX complement_of(const MatX& Z) {
     const Eigen::Index n = Z.rows();
     if (Z.cols() == 0) return MatX::Identity(n, n);
-    const MatX Q = orthogonal_complement(Z, min_column_pivot);
+    const MatX Q = orthogonal_complement(Z, nnls_parameters.min_column_pivot);
     return Q * Q.transpose();
 }
 
@@ -97,9 +84,9 @@ VecX nonnegative_least_squares(const MatX& A, const VecX& b) {
     std::vector<int> used;
     std::vector<char> refused(n, 0), is_used(n, 0);
     ColumnSet columns(A.rows(), n);
-    for (int pass = 0; pass < exchanges * n; ++pass) {
+    for (int pass = 0; pass < nnls_parameters.exchanges * n; ++pass) {
         const VecX residual = b - A * x, descent = A.transpose() * residual;
-        const double rounding = nnls_rounding * (size_of_b + size * largest(x));
+        const double rounding = nnls_parameters.rounding * (size_of_b + size * largest(x));
         int best = -1;
         double steepest = 0.0;
         for (int j = 0; j < n; ++j) {
@@ -121,7 +108,7 @@ VecX nonnegative_least_squares(const MatX& A, const VecX& b) {
             for (size_t k = 0; k < used.size(); ++k)
                 if (s[k] <= 0.0) part = std::min(part, x[used[k]] > 0.0 ? x[used[k]] / (x[used[k]] - s[k]) : 0.0);
             for (size_t k = 0; k < used.size(); ++k) x[used[k]] += part * (s[k] - x[used[k]]);
-            const double least = nnls_rounding * largest(x);
+            const double least = nnls_parameters.rounding * largest(x);
             for (size_t k = used.size(); k-- > 0;) {
                 if (x[used[k]] > least) continue;
                 x[used[k]] = 0.0;
@@ -144,7 +131,7 @@ VecX least_violation(const MatX& Z, const VecX& N) {
     if (N.size() == 0 || N.minCoeff() >= 0.0) return VecX::Zero(N.size());
     const MatX P = complement_of(Z);
     const VecX off = P * (N - nonnegative_least_squares(P, P * N));  // Z z takes up the rest
-    const double noise = nnls_rounding * static_cast<double>(N.size()) * largest(N);
+    const double noise = nnls_parameters.rounding * static_cast<double>(N.size()) * largest(N);
     return off.unaryExpr([noise](double x) { return x < -noise ? -x : 0.0; });
 }
 
@@ -155,7 +142,7 @@ VecX shortest_with_zeros(const MatX& Z, const VecX& N, const std::vector<char>& 
     VecX numbers(count);
     for (int i = 0, k = 0; i < N.size(); ++i)
         if (zero[i]) { rows.row(k) = Z.row(i); numbers[k++] = N[i]; }
-    return -least_squares(rows, numbers, min_column_pivot);
+    return -least_squares(rows, numbers, nnls_parameters.min_column_pivot);
 }
 
 // Return the numbers that bind in the shortest z with N + Z z >= 0. These are the positive entries of u >= 0 for which
@@ -172,14 +159,14 @@ static std::vector<char> binding(const MatX& Z, const VecX& N) {
 Nonnegative shortest_nonnegative(const MatX& Z, const VecX& N) {
     Nonnegative found{VecX::Zero(Z.cols()), std::vector<char>(N.size(), 0), true};
     const auto violated = [&](double allowed) { return (N + Z * found.z).minCoeff() < -allowed; };
-    const auto noise = [&] { return met_rounding * (largest(N) + largest(found.z)); };
+    const auto noise = [&] { return nnls_parameters.met_rounding * (largest(N) + largest(found.z)); };
     if (N.size() == 0 || !violated(0.0)) return found;
     found.held = binding(Z, N);
     found.z = shortest_with_zeros(Z, N, found.held);
     found.met = !violated(noise());
     if (found.met) return found;
     const VecX violation = least_violation(Z, N);
-    found.held = binding(Z, N + violation + VecX::Constant(N.size(), binding_slack * largest(N)));
+    found.held = binding(Z, N + violation + VecX::Constant(N.size(), nnls_parameters.binding_slack * largest(N)));
     for (int i = 0; i < N.size(); ++i)
         if (violation[i] > 0.0) found.held[i] = 1;
     found.z = shortest_with_zeros(Z, N, found.held);
@@ -190,12 +177,12 @@ LargestLeast largest_least(const MatX& Z, const VecX& N) {
     const double size = largest(N);
     double value = N.maxCoeff() + std::max(size, min_scale);  // above any weighted mean of N
     LargestLeast found{size, VecX()};
-    for (int cut = 0; cut < most_cuts; ++cut) {
+    for (int cut = 0; cut < nnls_parameters.most_cuts; ++cut) {
         const VecX violation = least_violation(Z, (N.array() - value).matrix());
-        if (largest(violation) <= met_rounding * size) break;  // smaller violations are rounding
+        if (largest(violation) <= nnls_parameters.met_rounding * size) break;  // smaller violations are rounding
         found.weight = violation / violation.sum();
         const double bound = found.weight.dot(N);
-        if (!(bound < value - nnls_rounding * size)) { value = bound; break; }
+        if (!(bound < value - nnls_parameters.rounding * size)) { value = bound; break; }
         value = bound;
     }
     if (found.weight.size() > 0) found.value = value;

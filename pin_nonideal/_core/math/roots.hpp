@@ -6,12 +6,17 @@
 
 namespace pn {
 
-constexpr int dip_passes = 40;     // golden sections, which find a dip of 1e-16 of the margin's change
-constexpr int root_passes = 60;
-constexpr int start_halvings = 30;  // halvings toward the start, near which a slip from rest may stop again
-constexpr double root_width = 1e-13, root_margin = 1e-13;  // the root is a guess for the repeated step
+struct RootSearchParameters {
+    int dip_passes = 40;              // golden sections, which find a dip of 1e-16 of the margin's change
+    int root_passes = 60;             // maximum secants and bisections, of which 44 bisections reach `root_width`
+    int start_halvings = 30;          // halvings toward the start, near which a slip from rest may stop again
+    double root_width = 1e-13, root_margin = 1e-13;  // the root is a guess for the repeated step
+    double margin_slope_step = 1e-4;  // step of the difference for the rate of a margin, relative to the step
+};
+
+inline constexpr RootSearchParameters root_search_parameters{};
+
 constexpr double no_crossing = 2.0;  // part of a step that means no crossing
-constexpr double margin_slope_step = 1e-4;  // step of the difference for the rate of a margin, relative to the step
 
 // Return the root of a margin that is positive at `low` and negative at `high`, as parts of a step. Uses secants that
 // stay inside the bracket (Illinois).
@@ -19,11 +24,11 @@ template <class Margin>
 double root_between(double low, double margin_low, double high, double margin_high, const Margin& margin) {
     if (margin_low <= 0.0) return low;  // the margin starts at zero and falls at once
     int side = 0;
-    for (int it = 0; it < root_passes && high - low > root_width; ++it) {
+    for (int it = 0; it < root_search_parameters.root_passes && high - low > root_search_parameters.root_width; ++it) {
         double mid = (low * margin_high - high * margin_low) / (margin_high - margin_low);
         if (!(mid > low && mid < high)) mid = 0.5 * (low + high);
         const double here = margin(mid);
-        if (std::abs(here) < root_margin) return mid;
+        if (std::abs(here) < root_search_parameters.root_margin) return mid;
         if (here > 0.0) {
             low = mid;
             margin_low = here;
@@ -43,7 +48,7 @@ double root_between(double low, double margin_low, double high, double margin_hi
 // root is returned. Otherwise the margin falls at once, and the start is returned.
 template <class Margin>
 double root_after_start(double high, double margin_high, double least, const Margin& margin) {
-    for (int it = 0; it < start_halvings; ++it) {
+    for (int it = 0; it < root_search_parameters.start_halvings; ++it) {
         const double low = 0.5 * high, margin_low = margin(low);
         if (margin_low > least) return root_between(low, margin_low, high, margin_high, margin);
         high = low;
@@ -88,7 +93,7 @@ double dip_between(double a, double b, const Margin& margin, double& value) {
     constexpr double golden = 0.3819660112501051;
     const double end = b;
     double x1 = a + golden * (b - a), x2 = b - golden * (b - a), g1 = margin(x1), g2 = margin(x2);
-    for (int it = 0; it < dip_passes; ++it) {
+    for (int it = 0; it < root_search_parameters.dip_passes; ++it) {
         if (std::min(g1, g2) < 0.0) {
             value = std::min(g1, g2);
             return g1 < g2 ? x1 : x2;

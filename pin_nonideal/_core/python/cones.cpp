@@ -51,7 +51,7 @@ void bind_cones(nb::module_& m) {
         }, "count"_a, "warm"_a)
         .def_prop_ro("f", [](const ConeSolver& s) { return to_numpy(s.f); }, own)
         .def_prop_ro("residuals", [](const ConeSolver& s) {
-            const ConeResiduals r = ConeComplementarity::residuals(s.W, s.w0, s.elements, s.f);
+            const ConeResiduals r = cone_residuals(s.W, s.w0, s.elements, s.f);
             return std::make_tuple(r.signorini, r.coulomb, r.dissipation);
         })
         .def_prop_ro("certificate", [](const ConeSolver& s) { return to_numpy(s.solver.certificate()); }, own)

@@ -9,6 +9,7 @@
 
 #include "contact/onset.hpp"
 #include "python/arrays.hpp"
+#include "python/outcome.hpp"
 #include "python/reused_run.hpp"
 
 namespace pn {
@@ -22,12 +23,6 @@ struct Instant {
     std::vector<Numbers> friction;  // force of each element along its directions
     std::vector<double> limits;
     std::optional<bool> unique;  // no value: not proven
-};
-
-// Results of a finished run.
-struct Outcome {
-    Counters counters;
-    Recording recording;
 };
 
 // Program with one workspace, for evaluations of states and for runs.

@@ -10,13 +10,6 @@
 
 namespace pn {
 
-// Relative step of central differences: cube root of the unit roundoff, which balances rounding and truncation errors.
-constexpr double derivative_step = 6e-6;
-// Minimum slip acceleration at an onset, relative to the acceleration by friction alone. The inverse ratio is the rate
-// at which the slip direction relaxes, times the time since the onset. Implicit steps resolve inverse ratios up to
-// about 30.
-constexpr double least_onset = 1.0 / 30.0;
-
 void FollowedRun::derivative(double at, const VecX& y_outside, VecX& rate_outside) {
     inside_ = inside_rate_ = VecX::Zero(system.ny);
     inside_.head(system.ns) = y_outside;
@@ -30,7 +23,7 @@ MatX FollowedRun::jacobian(double at, const VecX& y_outside) {
     MatX out = MatX::Zero(n, n);
     VecX ahead = y_outside, back = y_outside, rate_ahead(n), rate_back(n);
     for (int k = 0; k < n - system.nw; ++k) {
-        const double step = derivative_step * (k < system.nq ? 1.0 : std::max(1.0, std::abs(y_outside[k])));
+        const double step = parameters.derivative_step * (k < system.nq ? 1.0 : std::max(1.0, std::abs(y_outside[k])));
         ahead[k] += step;
         back[k] -= step;
         derivative(at, ahead, rate_ahead);
@@ -47,16 +40,16 @@ std::optional<int> FollowedRun::singular_onset() {
         if (friction.dim == 1 || !at_rest(p, w, e, system.v)) continue;
         const FrictionProblem problem(p, w, {e});
         const double by_friction = w.now.limit[e] * problem.W.trace() / friction.dim;
-        if (slip_rate_along_mode(p, w, e) < least_onset * by_friction) return e;
+        if (slip_rate_along_mode(p, w, e) < parameters.least_onset * by_friction) return e;
     }
     return std::nullopt;
 }
 
-// Check if a chatter event was recorded less than `chatter_time` ago. Implicit steps then keep the modes and locate no
-// events.
+// Check if a chatter event was recorded less than `ChatterParameters::window` ago. Implicit steps then keep the modes and
+// locate no events.
 bool FollowedRun::bridges_cluster() const {
     return !out.events.empty() && out.events.back().kind == Event::Kind::chatter &&
-           progress.t < out.events.back().time + chatter_time;
+           progress.t < out.events.back().time + Clusters::parameters.window;
 }
 
 bool FollowedRun::follow(double end, const OutsideStep::Interpolant& interpolant) {

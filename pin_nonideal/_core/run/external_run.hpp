@@ -10,8 +10,21 @@
 
 namespace pn {
 
+struct FollowedRunParameters {
+    // Relative step of central differences: cube root of the unit roundoff, which balances rounding and truncation
+    // errors.
+    double derivative_step = 6e-6;
+    // Minimum slip acceleration at an onset, relative to the acceleration by friction alone. The inverse ratio is the
+    // rate at which the slip direction relaxes, times the time since the onset. Implicit steps resolve inverse ratios
+    // up to about 30.
+    double least_onset = 1.0 / 30.0;
+};
+
 class FollowedRun : public Simulation {
 public:
+    using Parameters = FollowedRunParameters;
+    static constexpr Parameters parameters{};
+
     using Simulation::Simulation;
 
     // Compute dy/dt of y = (q, v, law states, work of the ledger's columns), and its Jacobian by y with central

@@ -6,8 +6,18 @@
 
 namespace pn {
 
+struct RunLimitsParameters {
+    long early_steps = 20000;       // number of steps after which the progress is checked
+    double least_progress = 1e-10;  // minimum progress, relative to the duration; slower runs raise a Failure
+    // Number of steps between two progress reports.
+    long steps_a_tick = 16;
+};
+
 class RunLimits {
 public:
+    using Parameters = RunLimitsParameters;
+    static constexpr Parameters parameters{};
+
     RunLimits(const Options& options, Workspace& workspace, Progress& progress, Recording& out)
         : options_(options), w(workspace), progress_(progress), out_(out) {}
     ~RunLimits() { w.watch = nullptr; }

@@ -12,30 +12,6 @@
 
 namespace pn {
 
-namespace {
-
-// Maximum step while the scene is at rest: absolute [s], and relative to the duration of the rest. Only user functions
-// can end the rest, so they are evaluated at least this often.
-constexpr double rest_step = 0.1, rest_part_step = 0.002;
-// Steps longer than `whole_way` times the remaining time end at the stop. Steps longer than `even_part` times the
-// remaining time are cut to that length. Two even steps then replace a long and a tiny one.
-constexpr double whole_way = 1.0 - 1e-10, even_part = 0.5;
-
-// Factor on the step size if event location fails.
-constexpr double shortened = 0.3;
-// Minimum step [s, or relative to the time] for which the projection of the step's end counts as an error. Constraints
-// that turn or open in a shorter step are detected in the next one.
-constexpr double shortest_measured = 1e-7;
-// Minimum step, in floating-point spacings of the time. Smaller steps raise a Failure.
-constexpr double least_spacings = 4.0;
-// Step after one that ended before a rest, relative to the time to the rest. The rest then lies inside the step.
-constexpr double past_rest = 1.02;
-
-// If collocation fails in steps shorter than this [s], the selected method takes the next trial.
-constexpr double shortest_sought = 1e-9;
-
-}  // namespace
-
 Simulation::Simulation(const Program& program, Workspace& workspace, const Options& run_options, Recording& recording)
     : p(program), w(workspace), options(run_options), out(recording), t_end(options.end()),
       run_limits(run_options, workspace, progress, recording), system(program, workspace, options.record.energy),
@@ -148,14 +124,14 @@ Simulation::Proposal Simulation::propose() {
     double size = adaptive ? progress.h : remaining;
     if (adaptive && p.asks_functions && (system.velocity(progress.y).array() == 0.0).all()) {
         const double since = out.events.empty() ? options.t0 : out.events.back().time;
-        size = std::min(size, std::max(rest_step, rest_part_step * (progress.t - since)));
+        size = std::min(size, std::max(parameters.rest_step, parameters.rest_part_step * (progress.t - since)));
     }
     bool last = false;
-    if (size >= remaining * whole_way) {
+    if (size >= remaining * parameters.whole_way) {
         size = remaining;
         last = true;
-    } else if (size > even_part * remaining) {
-        size = even_part * remaining;
+    } else if (size > parameters.even_part * remaining) {
+        size = parameters.even_part * remaining;
     }
     if (!adaptive && !p.frictions.empty()) {
         const double shorter = locator.shorten_toward_rest(progress.rate, size);
@@ -177,10 +153,11 @@ std::optional<double> Simulation::to_hand_over() {
     if (system.ng == 0 || (adaptive && !progress.may_hand_over)) return std::nullopt;
     bool asks = true;
     for (;;) {
-        const double size = std::min(adaptive ? progress.h : options.dt, torques.next_stop(progress.t, t_end) - progress.t);
+        const double size =
+            std::min(adaptive ? progress.h : options.dt, torques.next_stop(progress.t, t_end) - progress.t);
         const std::optional<HandOver::Found> next = hand_over.first(size);
         progress.may_hand_over = next.has_value();
-        if (!next || next->time >= size * whole_way) return std::nullopt;  // passed in the step after a stop
+        if (!next || next->time >= size * parameters.whole_way) return std::nullopt;  // passed in the step after a stop
         if (hand_over.is_reached(next->time)) {
             hand_over.pass(next->time);
             progress.hand_over_time = progress.t;
@@ -241,11 +218,11 @@ std::optional<double> Simulation::try_step(const Proposal& proposal) {
     const bool needs_end = options.method.first_same_as_last && !stepper.collocates();
     double error = needs_end ? 0.0 : stepper.error();
     if (!(error <= 1.0)) {
-        w.state.seeks_directions &= !stepper.collocates() || size > shortest_sought;
+        w.state.seeks_directions &= !stepper.collocates() || size > parameters.shortest_sought;
         return error;
     }
     const bool measures = p.driven_exactly && options.method.adaptive() &&
-                          size > shortest_measured * std::max(1.0, std::abs(progress.t));
+                          size > parameters.shortest_measured * std::max(1.0, std::abs(progress.t));
     if (measures) {
         projection_move = stepper.y1;
         w.now.projected_gap = w.now.projected_rate = 0.0;
@@ -272,7 +249,7 @@ bool Simulation::control_error(const Proposal& proposal, std::optional<double> e
     else ++out.rejected;
     progress.may_hand_over |= !accepted;
     const double spacing = std::abs(std::nextafter(progress.t, t_end) - progress.t);
-    if (accepted || !error || progress.h >= least_spacings * spacing) return accepted;
+    if (accepted || !error || progress.h >= parameters.least_spacings * spacing) return accepted;
     if (open_loop) throw *open_loop;
     throw Failure(Failure::Kind::step_size, progress.t);
 }
@@ -300,7 +277,7 @@ bool Simulation::locate_event(const Proposal& proposal) {
     }
     ++out.rejected;
     progress.may_hand_over = true;
-    progress.h = shortened * proposal.size;
+    progress.h = parameters.shortened * proposal.size;
     back_to_start();
     return false;
 }
@@ -317,7 +294,7 @@ bool Simulation::leaves_rate(const Proposal& proposal) const {
 // neither applies.
 bool Simulation::goes_on(const Failure& failure) {
     const bool may_end = modes.may_end(failure);
-    const bool at_hand_over = hand_over_ahead || progress.t - progress.hand_over_time <= chatter_time;
+    const bool at_hand_over = hand_over_ahead || progress.t - progress.hand_over_time <= Clusters::parameters.window;
     const bool of_hand_over = at_hand_over && ModeChanges::of_closed_contacts(failure);
     const bool leads_on = of_hand_over || ModeChanges::leads_on(failure);
     if (!may_end && !leads_on) return false;
@@ -346,7 +323,7 @@ void Simulation::accept(const Proposal& proposal, const std::optional<FoundEvent
     ++out.steps;
     out.limited += norm.is_limited();
     const std::optional<double> to_rest = event ? std::nullopt : locator.time_to_rest();
-    if (to_rest) progress.h = past_rest * *to_rest;
+    if (to_rest) progress.h = parameters.past_rest * *to_rest;
     progress.t = event ? event->time : proposal.last && !to_rest ? proposal.stop : stepper.t0 + stepper.h;
     progress.numerical_energy += system.numerical_energy;
     const bool arrives = event && event->kind == FoundEvent::Kind::rest_or_limit;

@@ -15,9 +15,32 @@
 
 namespace pn {
 
+struct SimulationParameters {
+    // Maximum step while the scene is at rest: absolute [s], and relative to the duration of the rest. Only user
+    // functions can end the rest, so they are evaluated at least this often.
+    double rest_step = 0.1, rest_part_step = 0.002;
+    // Steps longer than `whole_way` times the remaining time end at the stop. Steps longer than `even_part` times the
+    // remaining time are cut to that length. Two even steps then replace a long and a tiny one.
+    double whole_way = 1.0 - 1e-10, even_part = 0.5;
+    // Factor on the step size if event location fails.
+    double shortened = 0.3;
+    // Minimum step [s, or relative to the time] for which the projection of the step's end counts as an error.
+    // Constraints that turn or open in a shorter step are detected in the next one.
+    double shortest_measured = 1e-7;
+    // Minimum step, in floating-point spacings of the time. Smaller steps raise a Failure.
+    double least_spacings = 4.0;
+    // Step after one that ended before a rest, relative to the time to the rest. The rest then lies inside the step.
+    double past_rest = 1.02;
+    // If collocation fails in steps shorter than this [s], the selected method takes the next trial.
+    double shortest_sought = 1e-9;
+};
+
 // Time loop of one run. SteppedRun and FollowedRun advance the same loop from outside.
 class Simulation {
 public:
+    using Parameters = SimulationParameters;
+    static constexpr Parameters parameters{};
+
     Simulation(const Program& p, Workspace& w, const Options& options, Recording& out);
     void start(const VecX& q0, const VecX& v0);
     void restore(const std::string& state);

@@ -8,15 +8,8 @@
 
 namespace pn {
 
-namespace {
-
-// Rounding tolerance of the quotient: relative, and absolute.
-constexpr double quotient_rounding = 1e-14, count_rounding = 1e-9;
-
-}  // namespace
-
 double whole_lengths(double time, double length) {
-    return std::floor(time / length * (1.0 + quotient_rounding) + count_rounding);
+    return std::floor(time / length * (1.0 + Torques::parameters.quotient_rounding) + Torques::parameters.count_rounding);
 }
 
 Torques::Torques(System& system, Progress& progress, const Options& options, Output& output, Breaks& breaks)

@@ -6,8 +6,16 @@
 
 namespace pn {
 
+struct TorqueScheduleParameters {
+    // Rounding tolerance of the quotient: relative, and absolute.
+    double quotient_rounding = 1e-14, count_rounding = 1e-9;
+};
+
 class Torques {
 public:
+    using Parameters = TorqueScheduleParameters;
+    static constexpr Parameters parameters{};
+
     Torques(System& system, Progress& progress, const Options& options, Output& output, Breaks& breaks);
 
     // Pass the breaks of time functions up to a time. Time stepping computes velocity jumps itself.

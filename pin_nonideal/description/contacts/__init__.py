@@ -10,7 +10,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from pin_nonideal.description.constraints import Axis
-from pin_nonideal.description.laws import static_ratio
+from pin_nonideal.description.joint_friction import static_ratio
 from pin_nonideal.errors import InputError
 from pin_nonideal.validation import (
     array,

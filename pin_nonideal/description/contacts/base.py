@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from pin_nonideal.description.laws import static_ratio
+from pin_nonideal.description.joint_friction import static_ratio
 from pin_nonideal.errors import InputError
 from pin_nonideal.validation import array, fraction, label, nonnegative, optional_text, text
 

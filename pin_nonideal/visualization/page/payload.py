@@ -18,17 +18,27 @@ from .camera import link_length, pattern_spacings, upward, view
 from .constraint_curves import Guide, guides_of
 from .contact_points import contact_point_marks, contact_points
 from .contact_surfaces import contact_surfaces
-from .force_arrows import Arrow, arrows_of
+from .force_arrows import arrows_of
 from .frames import Motion, sample
-from .friction_glyphs import Element, elements_of
+from .friction_glyphs import elements_of
 from .joint_tracks import Tracks
-from .markers import Mark, marks_of
+from .markers import marks_of
 from .mode_timeline import bands_of
 from .relations import names_relation, stored_relations
 from .resampling import resample
-from .signal_list import Signal, rounding_of, signals_of, without_rounding
+from .run_facts import facts_of, subtitle_of
+from .signal_list import rounding_of, signals_of, without_rounding
 from .signals import Chosen, Plot, default_plot_names, parse_plots, plots_of
 from .stick_figure import link_bars
+from .stored_items import (
+    plain_fields,
+    stored_arrow,
+    stored_element,
+    stored_guide,
+    stored_mark,
+    stored_plot,
+    stored_signal,
+)
 from .style import table
 from .visuals import Visual, joint_axis, visuals_of
 
@@ -91,9 +101,9 @@ def packed_runs(
     rounding = rounding_of((signal.unit, signal.values) for signal in signals)
     header = {
         "title": title,
-        "subtitle": _subtitle(run),
+        "subtitle": subtitle_of(run),
         "failure": getattr(run, "failure", None),
-        "facts": _facts(run, motion),
+        "facts": facts_of(run, motion),
         "looks": table(),
         "times": payload.add(motion.times, "f8"),
         "held": payload.add(motion.held, "u1") if motion.held.any() else None,
@@ -104,22 +114,22 @@ def packed_runs(
             _other(payload, shapes, *other) for other in zip(runs[1:], motions[1:], names[1:], strict=True)
         ],
         "marks": [
-            _stored_mark(payload, motion, mark)
+            stored_mark(payload, motion, mark)
             for mark in [*marks, *contact_point_marks(touches, motion, marks)]
         ],
-        "guides": [_stored_guide(payload, guide) for guide in guides],
+        "guides": [stored_guide(payload, guide) for guide in guides],
         "trails": [{"joint": j, "point": point} for j, point in _trails(model, guides, bare)],
-        "arrows": [_stored_arrow(payload, motion, arrow) for arrow in arrows],
+        "arrows": [stored_arrow(payload, motion, arrow) for arrow in arrows],
         "plots": _plots(payload, runs, [one for one, _ in known], names, curves, rounding),
         "events": _events(payload, run),
         "modes": _modes(payload, run),
         "elements": [
-            _stored_element(payload, motion, element if forces else replace(element, normal=None))
+            stored_element(payload, motion, element if forces else replace(element, normal=None))
             for element in elements_of(finer, motion, marks, touches)
         ],
-        "view": _plain(looking),
+        "view": plain_fields(looking),
         "collisions": shapes.add(collisions_of(scene)),
-        "signals": [_stored_signal(payload, signal, rounding) for signal in signals],
+        "signals": [stored_signal(payload, signal, rounding) for signal in signals],
         "relations": stored_relations(payload, run, finer, [x for x in items if names_relation(run, x)]),
     }
     header["shapes"] = shapes.stored
@@ -174,7 +184,7 @@ def _plots(
     each = [[_without_noise(plot.thinned(), rounding) for plot in _curves(*pair, items)] for pair in pairs]
     plots = []
     for plot in each[0]:
-        stored = _stored_plot(payload, plot)
+        stored = stored_plot(payload, plot)
         share = f"{len(each)} of {len(runs)} runs" if len(runs) > len(each) else ""
         stored["note"] = " · ".join(filter(None, [plot.note, share]))
         for number, others in enumerate(each[1:], 1):
@@ -192,17 +202,6 @@ def _without_noise(plot: Plot, rounding: dict[str, float]) -> Plot:
     least = rounding_of((plot.unit, values) for values in plot.curves.values())
     level = max(rounding.get(plot.unit, 0.0), least.get(plot.unit, 0.0))
     return replace(plot, curves={k: without_rounding(v, level) for k, v in plot.curves.items()})
-
-
-def _stored_signal(payload: Payload, signal: Signal, rounding: dict[str, float]) -> Table:
-    return {
-        "label": signal.label,
-        "unit": signal.unit,
-        "section": signal.section,
-        "words": signal.words,
-        "t": payload.add(signal.t, "f8"),
-        "values": payload.add(without_rounding(signal.values, rounding[signal.unit])),
-    }
 
 
 def _compared(payload: Payload, plot: Plot, other: Plot, number: int, name: str) -> list[Table]:
@@ -251,18 +250,6 @@ def _trails(model: pin.Model, guides: list[Guide], bare: bool) -> list[tuple[int
     return list(trails.items())
 
 
-def _stored_plot(payload: Payload, plot: Plot) -> Table:
-    curves = [{"label": k, "values": payload.curve(v)} for k, v in plot.curves.items()]
-    return {
-        "title": plot.title,
-        "unit": plot.unit,
-        "note": plot.note,
-        "log": plot.log,
-        "t": payload.add(plot.t, "f8"),
-        "curves": curves,
-    }
-
-
 def _events(payload: Payload, run: Trajectory) -> Table:
     """Return the times of the events with indices of their kinds and elements."""
     kinds = sorted({str(event.kind) for event in run.events})
@@ -284,56 +271,6 @@ def _impulse(event: Any) -> Array:
     return np.zeros(3) if impulse is None else np.asarray(impulse, dtype=float)
 
 
-def _plain(item: Any, apart: Sequence[str] = ()) -> Table:
-    """Return the fields of a dataclass, with arrays as lists, except those that are stored apart."""
-    return {
-        key: v.tolist() if isinstance(v, np.ndarray) and key not in apart else v
-        for key, v in vars(item).items()
-    }
-
-
-def _stored_arrow(payload: Payload, motion: Motion, arrow: Arrow) -> Table:
-    """Return an arrow with its origin in the frame of its joint, stored once if it is constant."""
-    stored = _plain(arrow, ("values", "origin"))
-    stored["values"] = payload.add(arrow.values)
-    if arrow.origin is not None:
-        stored["origin"] = payload.add(
-            _without_repetition(motion.local(arrow.joint, arrow.origin), motion.size)
-        )
-    return stored
-
-
-def _without_repetition(vectors: Array, size: float) -> Array:
-    """Return vectors at all frames, (n, 3), or one vector, (1, 3), if they are constant."""
-    return vectors[:1] if np.abs(vectors - vectors[0]).max() < 1e-9 * size else vectors
-
-
-def _stored_mark(payload: Payload, motion: Motion, mark: Mark) -> Table:
-    stored = _plain(mark, ("path", "closed"))
-    stored["path"] = None if mark.path is None else payload.add(_without_repetition(mark.path, motion.size))
-    stored["closed"] = None if mark.closed is None else payload.add(mark.closed, "u1")
-    return stored
-
-
-def _stored_element(payload: Payload, motion: Motion, element: Element) -> Table:
-    stored = _plain(element, ("point", "axis", "share", "normal"))
-    for key, size in (("point", motion.size), ("axis", 1.0)):
-        stored[key] = payload.add(_without_repetition(np.atleast_2d(getattr(element, key)), size))
-    for key in ("share", "normal"):
-        if stored[key] is not None:
-            stored[key] = payload.add(getattr(element, key))
-    return stored
-
-
-def _stored_guide(payload: Payload, guide: Guide) -> Table:
-    apart = ("points", "shift", "normals")
-    stored = _plain(guide, apart)
-    for key in apart:
-        if stored[key] is not None:
-            stored[key] = payload.add(getattr(guide, key))
-    return stored
-
-
 def _modes(payload: Payload, run: Trajectory) -> list[Table]:
     """Return the mode bands of the elements: start and mode of each interval."""
     timelines = []
@@ -341,40 +278,3 @@ def _modes(payload: Payload, run: Trajectory) -> list[Table]:
         starts, modes = [piece[0] for piece in pieces], [piece[2] for piece in pieces]
         timelines.append({"name": name, "starts": payload.add(starts, "f8"), "modes": payload.add(modes)})
     return timelines
-
-
-def _subtitle(run: Trajectory) -> str:
-    model = run.scene.model
-    count = len(run.scene.constraint_slices)
-    words = [_counted(model.njoints - 1, "joint"), _counted(count, "constraint")]
-    if count:
-        words.append(f"violation below {_above(float(np.max(run.violation)))}")
-    return " · ".join(words)
-
-
-def _counted(count: int, word: str) -> str:
-    return f"{count or 'no'} {word}{'' if count == 1 else 's'}"
-
-
-def _above(value: float) -> str:
-    """Return a value rounded up to two digits."""
-    if not value > 0.0:
-        return "1e-16"
-    power = 10.0 ** (np.floor(np.log10(value)) - 1.0)
-    return f"{np.ceil(value / power) * power:.1e}"
-
-
-def _facts(run: Trajectory, motion: Motion) -> list[tuple[str, str]]:
-    """Return the data of a run for the help dialog."""
-    model = run.scene.model
-    frames = f"{len(motion.times)} frames"
-    if motion.held.any():
-        frames += f", {int(motion.held.sum())} of them still: the samples do not tell the motion between them"
-    facts = [
-        ("scene", str(run.scene.name)),
-        ("model", f"{model.name}, {model.njoints - 1} joints, nq {model.nq}, nv {model.nv}"),
-        ("time", f"{run.t[0]:g} to {run.t[-1]:g} s, {len(run.t)} samples, {frames}"),
-    ]
-    for key, value in vars(run.stats).items():
-        facts.append((str(key), f"{value:g}" if isinstance(value, float) else str(value)))
-    return [*facts, ("Pinocchio", str(pin.__version__))]

@@ -5,15 +5,6 @@
 
 namespace pn {
 
-// Weight of a row, relative to the inertia that it moves, and the ratio of the next lower one.
-constexpr double most_weight = 1e8, less_weight = 1e-2;
-// A move longer than this many times the longest move of a single row resolves no gap: rows contradict each other.
-constexpr double max_move_ratio = 10.0;
-// Lever [m] below which the length of single moves is computed to judge a move.
-constexpr double short_lever = 0.1;
-// Largest part of a probing motion that rows leave to a node without freedom.
-constexpr double most_left = 1e-3;
-
 bool LeastMove::pose() {
     if (!problem.factor()) return false;
     islands_.find(problem);
@@ -24,7 +15,7 @@ bool LeastMove::pose() {
     immobile_.assign(problem.nodes.size(), 0);
     for (int i = 0; i < islands_.size(); ++i)
         for (int node : islands_[i].nodes) island_of_[node] = i;
-    weight_.assign(islands_.size(), most_weight);
+    weight_.assign(islands_.size(), parameters.most_weight);
     own_response_.resize(problem.rows);
     if (scaled_.size() < problem.rows) scaled_.resize(problem.rows);
     G_.assign(9 * problem.elements.size(), 0.0);
@@ -91,7 +82,7 @@ void LeastMove::exert(int i, const VecX& r, VecX& move) {
 // Compute the move of an island. Lower the weights while it is too long.
 bool LeastMove::seek(int i, const VecX& r, VecX& move) {
     double longest = -1.0;
-    for (; weight_[i] >= 1.0; weight_[i] *= less_weight, factored_[i] = 0) {
+    for (; weight_[i] >= 1.0; weight_[i] *= parameters.less_weight, factored_[i] = 0) {
         if (!factor(i)) return false;
         double size = 0.0, residual = 0.0;
         for (int n : islands_[i].nodes) move.segment(problem.nodes[n].first, problem.nodes[n].size).setZero();
@@ -107,9 +98,9 @@ bool LeastMove::seek(int i, const VecX& r, VecX& move) {
         exert(i, r, move);
         for (int n : islands_[i].nodes)
             size = std::max(size, move.segment(problem.nodes[n].first, problem.nodes[n].size).cwiseAbs().maxCoeff());
-        if (size * short_lever <= residual) return true;
+        if (size * parameters.short_lever <= residual) return true;
         if (longest < 0.0) longest = longest_single(i, r);
-        if (size <= max_move_ratio * longest) return true;
+        if (size <= parameters.max_move_ratio * longest) return true;
     }
     for (int n : islands_[i].nodes) move.segment(problem.nodes[n].first, problem.nodes[n].size).setZero();
     return false;
@@ -154,7 +145,8 @@ void LeastMove::probe(int i) {
         const double* M = problem.M.data() + node.M;
         immobile_[n] = 1;
         for (int k = 0; k < node.size; ++k)
-            if (!(std::abs(probe_[node.first + k]) * std::sqrt(M[k * (node.size + 1)]) <= most_left)) immobile_[n] = 0;
+            if (!(std::abs(probe_[node.first + k]) * std::sqrt(M[k * (node.size + 1)]) <= parameters.most_left))
+                immobile_[n] = 0;
     }
 }
 

@@ -5,20 +5,6 @@
 
 namespace pn {
 
-namespace {
-
-using ConeKind = ConeElement::Kind;
-
-constexpr double decrease = 0.01;  // required part of the predicted decrease of the squared error
-constexpr int most_refusals = 4, most_unguarded = 3;  // refused steps, then full steps without decrease
-constexpr double most_proximal = 0.1;  // largest weight of the proximal term
-constexpr double more_proximal = 5.0;  // growth of the weight after a refused step
-constexpr double kept_from = 0.3, kept_to = 3.0;  // change of the weight that keeps the factor
-constexpr double stagnant = 0.25;  // ratio of two errors that counts as no progress near the solution
-constexpr double block_newton_stall_tolerance = 1e-9;  // error near the solution
-
-}  // namespace
-
 void BlockNewton::pose(const BlockProblem& p) {
     rho_.assign(p.rows, 0.0);
     root_rho_.assign(p.rows, 0.0);
@@ -265,7 +251,7 @@ bool BlockNewton::shorten(const BlockProblem& p, const Island& island, const Vec
             }
         }
         error = evaluate(p, island, f_try_, w_try_, merit);
-        if (merit <= (1.0 - decrease * length) * bound) return true;
+        if (merit <= (1.0 - parameters.decrease * length) * bound) return true;
     }
     length = 1.0;
     return false;
@@ -284,17 +270,17 @@ double BlockNewton::solve(const BlockProblem& p, const Island& island, BlockFact
     each_row([&](int r) { unit_ = std::max(unit_, root_rho_[r] * std::abs(w[r] + p.offset[r])); });
     move(p, island, f, x, w);
     double merit, error = evaluate(p, island, f, w, merit), least = error;
-    if (error <= parameters_.solved) return error;
+    if (error <= parameters.solved) return error;
     factor.analyse(p, island);
     for (int i : island.elements) piece_[i] = Piece::unknown;
     each_row([&](int r) { f_best_[r] = f[r]; });
-    const auto cautious = [&] { return std::clamp(error, parameters_.proximal, most_proximal); };
-    double weight = bold ? parameters_.proximal : cautious();
+    const auto cautious = [&] { return std::clamp(error, parameters.proximal, parameters.most_proximal); };
+    double weight = bold ? parameters.proximal : cautious();
     double factored = 0.0, recent[4] = {merit, merit, merit, merit};
     int refusals = 0, unguarded = 0, stagnant_steps = 0;
-    for (int step = 0; step < parameters_.steps && error > parameters_.solved; ++step, ++steps_) {
+    for (int step = 0; step < parameters.steps && error > parameters.solved; ++step, ++steps_) {
         if (!bold) weight = cautious();
-        const bool anew = !(weight >= kept_from * factored && weight <= kept_to * factored);
+        const bool anew = !(weight >= parameters.kept_from * factored && weight <= parameters.kept_to * factored);
         bool symmetric = true;
         if (anew) factored = weight;
         if (linearize(p, island, factored, anew, symmetric)) {
@@ -306,15 +292,16 @@ double BlockNewton::solve(const BlockProblem& p, const Island& island, BlockFact
         const double before = error, merit_before = merit;
         const double bound = bold ? merit : std::max({recent[0], recent[1], recent[2], recent[3]});
         const bool accepted = shorten(p, island, f, w, bound, bold ? 2 : 6, length, error, merit);
-        if (!accepted && bold && refusals < most_refusals && weight < kept_from * most_proximal) {
+        if (!accepted && bold && refusals < parameters.most_refusals &&
+            weight < parameters.kept_from * parameters.most_proximal) {
             error = evaluate(p, island, f, w, merit);
-            weight = step == 0 ? cautious() : std::min(most_proximal, more_proximal * weight);
+            weight = step == 0 ? cautious() : std::min(parameters.most_proximal, parameters.more_proximal * weight);
             ++refusals;
             factored = 0.0;
             continue;
         }
         if (!accepted) {
-            if (++unguarded > most_unguarded) {
+            if (++unguarded > parameters.most_unguarded) {
                 error = before;
                 break;
             }
@@ -325,7 +312,7 @@ double BlockNewton::solve(const BlockProblem& p, const Island& island, BlockFact
             f[r] += length * df_[r];
             w[r] += length * dw_[r];
         });
-        if (!accepted || error <= block_newton_stall_tolerance) {
+        if (!accepted || error <= parameters.stall_tolerance) {
             move(p, island, f, x, w);
             error = evaluate(p, island, f, w, merit);
         }
@@ -333,14 +320,14 @@ double BlockNewton::solve(const BlockProblem& p, const Island& island, BlockFact
         if (!(merit < HUGE_VAL)) break;
         if (accepted && length == 1.0) {
             refusals = 0;
-            weight = std::max({parameters_.proximal, weight * (merit < 0.1 * merit_before ? 0.01 : 0.3),
-                               std::min(1e-3 * error, most_proximal)});
+            weight = std::max({parameters.proximal, weight * (merit < 0.1 * merit_before ? 0.01 : 0.3),
+                               std::min(1e-3 * error, parameters.most_proximal)});
         }
         if (error < least) {
             least = error;
             each_row([&](int r) { f_best_[r] = f[r]; });
         }
-        if (least < block_newton_stall_tolerance && error > stagnant * before && ++stagnant_steps > 1) break;
+        if (least < parameters.stall_tolerance && error > parameters.stagnant * before && ++stagnant_steps > 1) break;
     }
     if (error > least || !(error < HUGE_VAL)) each_row([&](int r) { f[r] = f_best_[r]; });
     move(p, island, f, x, w);

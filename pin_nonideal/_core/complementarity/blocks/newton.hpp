@@ -14,17 +14,26 @@
 
 namespace pn {
 
+// Errors are relative to an element's forces, as `solve` returns them.
 struct BlockNewtonParameters {
-    double solved = 1e-12;    // error that needs no further step
-    double proximal = 1e-8;   // least weight d of the proximal term
-    int steps = 40;           // maximum number of steps
+    double solved = 1e-12;          // error that needs no further step
+    double stall_tolerance = 1e-9;  // error near the solution: steps without progress end, and rounding is removed
+    double stagnant = 0.25;         // ratio of two errors that counts as no progress near the solution
+    int steps = 40;                 // maximum number of steps
+    double decrease = 0.01;         // required part of the predicted decrease of the squared error
+    int most_refusals = 4;          // refused steps, each with a larger proximal term
+    int most_unguarded = 3;         // full steps without decrease
+    double proximal = 1e-8;         // least weight d of the proximal term: the root of the unit roundoff
+    double most_proximal = 0.1;     // largest weight of the proximal term
+    double more_proximal = 5.0;     // growth of the weight after a refused step
+    // Least and largest change of the weight that keeps the factor.
+    double kept_from = 0.3, kept_to = 3.0;
 };
 
 class BlockNewton {
 public:
     using Parameters = BlockNewtonParameters;
-
-    explicit BlockNewton(const Parameters& parameters = {}) : parameters_(parameters) {}
+    static constexpr Parameters parameters{};
 
     // Set up the stiffness rho of all elements.
     void pose(const BlockProblem& p);
@@ -73,7 +82,6 @@ private:
     bool shorten(const BlockProblem& p, const Island& island, const VecX& f, const VecX& w, double bound,
                  int most_halvings, double& length, double& error, double& merit);
 
-    Parameters parameters_;
     std::vector<double> rho_, root_rho_, G_;
     std::vector<Piece> piece_;
     std::vector<Projection> there_;  // at the last evaluation

@@ -4,20 +4,6 @@
 
 namespace pn {
 
-namespace {
-
-constexpr double accepted = 1e-9;          // error of a solution. Newton stops at rounding, far below in most problems
-// Error that is not worth the path of compliances, which costs a hundred Newton steps.
-constexpr double tolerated = 1e-8;
-constexpr double compliance_path_tolerance = 1e-6;             // error on the path of compliances
-constexpr double first_block_compliance = 1.0, min_block_compliance = 1e-7;  // relative to an element's own response
-constexpr double first_factor = 0.1, last_factor = 0.95;           // ratio of successive compliances
-constexpr double attempted_from = 1e-2;    // largest compliance from which a solution is attempted
-constexpr int most_stages = 30;
-constexpr int most_sweep_rounds = 8, sweeps_a_round = 50;
-
-}  // namespace
-
 bool BlockSolver::pose() {
     if (!problem.factor()) return false;
     newton_.pose(problem);
@@ -45,7 +31,7 @@ bool BlockSolver::attempt(int island, VecX& f) {
         least_ = error;
         best_ = f;
     }
-    return least_ <= accepted;
+    return least_ <= parameters.accepted;
 }
 
 // Reduce a compliance of all elements to zero, from no forces. Each problem on the way has a solution close to that of
@@ -53,19 +39,19 @@ bool BlockSolver::attempt(int island, VecX& f) {
 bool BlockSolver::stiffen(int island, VecX& f) {
     for (int i : islands_[island].elements) f.segment(problem.elements[i].row, problem.elements[i].dim()).setZero();
     on_path_ = f;
-    double compliance = first_block_compliance, factor = first_factor;
-    for (int stage = 0; stage < most_stages && compliance > min_block_compliance; ++stage) {
+    double compliance = parameters.first_compliance, factor = parameters.first_factor;
+    for (int stage = 0; stage < parameters.most_stages && compliance > parameters.min_compliance; ++stage) {
         f = on_path_;
         const auto search = stage == 0 ? BlockNewton::Search::patient : BlockNewton::Search::bold;
-        if (newton(island, search, compliance, f) <= compliance_path_tolerance) {
+        if (newton(island, search, compliance, f) <= parameters.compliance_path_tolerance) {
             on_path_ = f;
-            if (compliance <= attempted_from && attempt(island, f)) return true;
+            if (compliance <= parameters.attempted_from && attempt(island, f)) return true;
             compliance *= factor;
         } else {  // a shorter step from the last compliance
             if (stage == 0) return false;
             compliance /= factor;
             factor = std::sqrt(factor);
-            if (factor > last_factor) return false;
+            if (factor > parameters.last_factor) return false;
             compliance *= factor;
         }
     }
@@ -75,10 +61,10 @@ bool BlockSolver::stiffen(int island, VecX& f) {
 // Alternate sweeps and Newton's method. Newton's method may cycle between sets of sliding elements, which sweeps leave.
 bool BlockSolver::settle(int island, VecX& f) {
     on_path_ = best_;
-    for (int round = 0; round < most_sweep_rounds; ++round) {
-        newton_.sweep(problem, islands_[island], sweeps_a_round, on_path_, x_, w_);
+    for (int round = 0; round < parameters.most_sweep_rounds; ++round) {
+        newton_.sweep(problem, islands_[island], parameters.sweeps_a_round, on_path_, x_, w_);
         f = on_path_;
-        if (attempt(island, f) || least_ <= tolerated) return true;
+        if (attempt(island, f) || least_ <= parameters.tolerated) return true;
     }
     return false;
 }
@@ -87,9 +73,9 @@ bool BlockSolver::settle(int island, VecX& f) {
 // error.
 double BlockSolver::solve(int island, VecX& f) {
     least_ = newton(island, BlockNewton::Search::bold, 0.0, f);
-    if (least_ <= accepted) return least_;
+    if (least_ <= parameters.accepted) return least_;
     best_ = f;
-    if (!attempt(island, f) && least_ > tolerated && !settle(island, f)) stiffen(island, f);
+    if (!attempt(island, f) && least_ > parameters.tolerated && !settle(island, f)) stiffen(island, f);
     f = best_;
     newton_.move(problem, islands_[island], f, x_, w_);
     return least_;

@@ -6,8 +6,24 @@
 
 namespace pn {
 
+struct BlockSolverParameters {
+    double accepted = 1e-9;  // error of a solution. Newton stops at rounding, far below in most problems
+    // Error that is not worth the path of compliances, which costs a hundred Newton steps.
+    double tolerated = 1e-8;
+    double compliance_path_tolerance = 1e-6;               // error on the path of compliances
+    double first_compliance = 1.0, min_compliance = 1e-7;  // relative to an element's own response
+    double first_factor = 0.1, last_factor = 0.95;         // ratio of successive compliances
+    double attempted_from = 1e-2;                          // largest compliance from which a solution is attempted
+    int most_stages = 30;                                  // maximum number of compliances on the path
+    // Maximum rounds of sweeps, and sweeps of a round.
+    int most_sweep_rounds = 8, sweeps_a_round = 50;
+};
+
 class BlockSolver {
 public:
+    using Parameters = BlockSolverParameters;
+    static constexpr Parameters parameters{};
+
     BlockProblem problem;  // set by the caller: nodes, elements, free and offset
 
     // Prepare the problem once its nodes and elements are set. Returns false if an inertia is not positive definite.

@@ -9,14 +9,6 @@ namespace pn {
 
 namespace {
 
-using ConeKind = ConeElement::Kind;
-
-constexpr double min_certificate_margin = 1e-7;                  // part of |y| |w0| by which y . w0 must be negative
-constexpr double shown = 1e-9;                                   // tolerance of quantities that must vanish
-constexpr double near_edges[] = {1e-5, 1e-4, 1e-3, 1e-6, 1e-7};  // parts of the largest force that count as zero
-constexpr double dependent = 1e-8;
-constexpr int most_sharpenings = 6;
-
 // Return the violation of the dual of a contact's cone by its rows u.
 double outside_dual(const ConeElement& e, const Eigen::Ref<const VecX>& u) {
     return std::max(0.0, e.bound * u.tail(e.dim - 1).norm() - u[0]);
@@ -58,11 +50,13 @@ bool no_forces(const ConeProblem& p, VecX& y) {
     for (int e = 0; e < p.size(); ++e) {
         const ConeElement& element = p.elements[e];
         const auto ue = u.segment(p.at[e], element.dim);
-        if (element.is(ConeKind::contact) && (outside_dual(element, ue) > shown || y[p.at[e]] < 0.0)) return false;
-        if (element.is(ConeKind::equality) && ue.cwiseAbs().maxCoeff() > shown) return false;
+        if (element.is(ConeKind::contact) &&
+            (outside_dual(element, ue) > certificate_parameters.shown || y[p.at[e]] < 0.0))
+            return false;
+        if (element.is(ConeKind::equality) && ue.cwiseAbs().maxCoeff() > certificate_parameters.shown) return false;
         if (element.is(ConeKind::box)) margin -= element.bound * ue.norm();
     }
-    return margin > min_certificate_margin;
+    return margin > certificate_parameters.min_margin;
 }
 
 // Replace y by a nearby y that balances exactly. Small forces become zero, and forces near the edge of a cone move onto it.
@@ -72,7 +66,7 @@ void sharpen(const ConeProblem& p, const MatX& E, double near_edge, VecX& y) {
     MatX J = MatX::Zero(rank + 3 * p.size(), p.n);
     VecX miss = VecX::Zero(J.rows());
     J.topRows(rank) = E.transpose();
-    for (int it = 0; it < most_sharpenings; ++it) {
+    for (int it = 0; it < certificate_parameters.most_sharpenings; ++it) {
         miss.head(rank) = E.transpose() * y;
         for (int e = 0; e < p.size(); ++e) {
             const ConeElement& element = p.elements[e];
@@ -88,7 +82,7 @@ void sharpen(const ConeProblem& p, const MatX& E, double near_edge, VecX& y) {
             }
             miss.segment(row, 3) = J.middleRows(row, 3) * y;
         }
-        y -= least_squares(J, miss, dependent);
+        y -= least_squares(J, miss, certificate_parameters.dependent);
     }
 }
 
@@ -96,11 +90,15 @@ void sharpen(const ConeProblem& p, const MatX& E, double near_edge, VecX& y) {
 bool squeezes(const ConeProblem& p, VecX& y) {
     if (!(y.norm() > 0.0 && y.norm() < HUGE_VAL)) return false;
     y.normalize();
-    if ((p.W().transpose() * y).cwiseAbs().maxCoeff() > shown || -y.dot(p.w0()) < min_certificate_margin) return false;
+    if ((p.W().transpose() * y).cwiseAbs().maxCoeff() > certificate_parameters.shown ||
+        -y.dot(p.w0()) < certificate_parameters.min_margin)
+        return false;
     for (int e = 0; e < p.size(); ++e) {
         const int i = p.at[e], tails = p.elements[e].dim - 1;
         if (!p.elements[e].is(ConeKind::contact)) continue;
-        if (y[i] < -shown || y.segment(i + 1, tails).norm() > p.elements[e].bound * y[i] + shown) return false;
+        if (y[i] < -certificate_parameters.shown ||
+            y.segment(i + 1, tails).norm() > p.elements[e].bound * y[i] + certificate_parameters.shown)
+            return false;
     }
     return true;
 }
@@ -128,7 +126,7 @@ bool squeezed(const ConeProblem& p, VecX& y) {
     nearest.pose(M, r, elements);
     ConePath().follow(nearest, f, ConePath::Slip::stands);
     f = f.cwiseProduct(nearest.scale()).eval();
-    for (const double edge : near_edges) {
+    for (const double edge : certificate_parameters.near_edges) {
         y = f.tail(n);
         if (!(y.norm() > 0.0 && y.norm() < HUGE_VAL)) return false;
         sharpen(p, E, edge, y);

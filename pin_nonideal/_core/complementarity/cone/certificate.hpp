@@ -5,6 +5,16 @@
 
 namespace pn {
 
+struct CertificateParameters {
+    double min_margin = 1e-7;  // part of |y| |w0| by which y . w0 must be negative
+    double shown = 1e-9;       // tolerance of quantities that must vanish
+    double near_edges[5] = {1e-5, 1e-4, 1e-3, 1e-6, 1e-7};  // parts of the largest force that count as zero
+    double dependent = 1e-8;   // rank threshold of the rows that y satisfies, relative to the largest
+    int most_sharpenings = 6;  // Newton steps of y onto the edges of its cones
+};
+
+inline constexpr CertificateParameters certificate_parameters{};
+
 enum class ConeStatus {
     solved,
     // No forces prevent penetration. Certificate: y >= 0 on normals with -(W^T y) in the dual of the cones and

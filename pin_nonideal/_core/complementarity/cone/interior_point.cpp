@@ -7,13 +7,8 @@ namespace pn {
 
 namespace {
 
-using ConeKind = ConeElement::Kind;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
-
-constexpr int max_central_path_steps = 60;
-constexpr double central_path_gap_tolerance = 1e-15, least_step = 1e-7;
-constexpr double smooth_speed = 1e-12;  // slip speed below which the direction is undefined
 
 // Return the scale that makes the cone |f_t| <= mu f_n circular: forces (root f_n, f_t / root), velocities the other way.
 double root_of(const ConeElement& e) { return e.slides() && e.bound > 0.0 ? std::sqrt(e.bound) : 1.0; }
@@ -71,7 +66,7 @@ void ConePath::update(const ConeProblem& p, const Eigen::Ref<const VecX>& f) {
         const double root = root_of(element);
         if (mode_ == Slip::follows && element.slides() && rows > 0 && !p.associated) {
             const Vector3d slip = tail(p, e, w);
-            s.speed = std::sqrt(slip.squaredNorm() + smooth_speed * smooth_speed);
+            s.speed = std::sqrt(slip.squaredNorm() + parameters.smooth_speed * parameters.smooth_speed);
             s.slip = slip / s.speed;
         }
         miss.segment(first, rows) -= s.y.tail.head(rows) / root;
@@ -159,11 +154,11 @@ double ConePath::gap(const ConeProblem& p) const {
 void ConePath::follow(const ConeProblem& p, Eigen::Ref<VecX> f, Slip slip) {
     start(p, f, slip);
     auto step = step_.vector(p.n), kept = kept_.vector(p.n);
-    for (int it = 0; it < max_central_path_steps; ++it, ++steps_) {
+    for (int it = 0; it < parameters.max_steps; ++it, ++steps_) {
         update(p, f);
         const double now = gap(p);
         const double miss = miss_.vector(p.n).cwiseAbs().maxCoeff();
-        if (now < central_path_gap_tolerance && miss < central_path_gap_tolerance * 10.0) return;
+        if (now < parameters.gap_tolerance && miss < parameters.gap_tolerance * 10.0) return;
         factorize(p);
         for (int e = 0; e < p.size(); ++e) states_[e].second = Cone();
         direction(p, 0.0, 0.0);
@@ -174,7 +169,7 @@ void ConePath::follow(const ConeProblem& p, Eigen::Ref<VecX> f, Slip slip) {
         }
         direction(p, sigma * now, sigma);
         const double a = std::min(1.0, max_boundary_part * length(p));
-        if (!(a > least_step)) return;
+        if (!(a > parameters.least_step)) return;
         kept = f;
         f += a * step;
         bool inside = true;

@@ -8,8 +8,18 @@
 
 namespace pn {
 
+struct ConePathParameters {
+    int max_steps = 60;            // maximum steps along the path
+    double gap_tolerance = 1e-15;  // mean z . y of the elements at the end, in the problem's units: rounding
+    double least_step = 1e-7;      // part of a step below which rounding allows no further progress
+    double smooth_speed = 1e-12;   // slip speed below which the direction is undefined
+};
+
 class ConePath {
 public:
+    using Parameters = ConePathParameters;
+    static constexpr Parameters parameters{};
+
     enum class Slip { follows, stands };
 
     // Compute f at the end of the path, up to rounding. With Slip::stands the slip speeds are those of the given `f`.

@@ -7,15 +7,8 @@ namespace pn {
 
 namespace {
 
-using ConeKind = ConeElement::Kind;
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
-
-constexpr double at_rest = 1e-9;                        // w below this part of the largest w0 counts as zero
-constexpr double minimum_norm_tolerance = 3e-15;        // relative to the forces
-constexpr double minimum_norm_stall_tolerance = 1e-12;  // the same if steps make no progress
-constexpr double damping = 1e-10;                       // damping of Newton's method, relative to the residual
-constexpr int max_minimum_norm_steps = 60, max_minimum_norm_halvings = 10;
 
 // Nearest point to z of a set, and its derivative.
 struct Nearest {
@@ -55,10 +48,11 @@ Nearest of_ball(const Vector3d& z, double radius) {
 Nearest nearest(const ConeElement& element, const Vector3d& z, const Vector3d& w, const Vector3d& given) {
     if (element.is(ConeKind::equality)) return {z, Matrix3d::Identity()};
     if (element.is(ConeKind::box))
-        return w.norm() > at_rest ? Nearest{given, Matrix3d::Zero()} : of_ball(z, element.bound);
-    if (w[0] > at_rest) return {};
+        return w.norm() > ConeShares::parameters.at_rest ? Nearest{given, Matrix3d::Zero()} : of_ball(z, element.bound);
+    if (w[0] > ConeShares::parameters.at_rest) return {};
     Vector3d slip(0.0, w[1], w[2]);
-    if (element.bound == 0.0 || slip.norm() == 0.0 || slip.norm() <= at_rest) return of_cone(z, element.bound);
+    if (element.bound == 0.0 || slip.norm() == 0.0 || slip.norm() <= ConeShares::parameters.at_rest)
+        return of_cone(z, element.bound);
     return of_ray(z, Vector3d::UnitX() - element.bound / slip.norm() * slip);
 }
 
@@ -123,18 +117,18 @@ bool ConeShares::even_out(const ConeProblem& p, Eigen::Ref<VecX> f) {
     y = told;
     const double size = given.norm();
     double now = miss(p, y, rank);
-    for (int it = 0; it < max_minimum_norm_steps && now > minimum_norm_tolerance * size; ++it) {
+    for (int it = 0; it < parameters.max_steps && now > parameters.tolerance * size; ++it) {
         project(p, z_.vector(p.n), g_.vector(p.n), true);
         for (int e = 0; e < p.size(); ++e) {
             const int i = p.at[e], d = p.elements[e].dim;
             DE.middleRows(i, d).noalias() = D_.matrix(p.n, 3).block(i, 0, d, d).lazyProduct(E.middleRows(i, d));
         }
         J.noalias() = E.transpose() * DE;
-        J.diagonal().array() += damping * std::min(1.0, now / size);
+        J.diagonal().array() += parameters.damping * std::min(1.0, now / size);
         solver_.factor(J);
         solver_.solve(miss_.vector(rank), step);
         double length = 1.0, there = HUGE_VAL;
-        for (int halving = 0; halving < max_minimum_norm_halvings && !(there < now); ++halving, length *= 0.5) {
+        for (int halving = 0; halving < parameters.max_halvings && !(there < now); ++halving, length *= 0.5) {
             ahead = y - length * step;
             there = miss(p, ahead, rank);
         }
@@ -143,7 +137,7 @@ bool ConeShares::even_out(const ConeProblem& p, Eigen::Ref<VecX> f) {
         now = there;
     }
     now = miss(p, y, rank);
-    if (!(now <= minimum_norm_stall_tolerance * size)) return false;
+    if (!(now <= parameters.stall_tolerance * size)) return false;
     f = g_.vector(p.n).cwiseQuotient(p.scale());
     return true;
 }

@@ -7,14 +7,7 @@ namespace pn {
 
 namespace {
 
-using ConeKind = ConeElement::Kind;
 using Eigen::Vector3d;
-
-// Errors that end the iteration. The second one ends it if steps make no progress.
-constexpr double cone_newton_tolerance = 1e-15, cone_newton_stall_tolerance = 1e-11;
-constexpr double cone_newton_decrease = 1e-4;  // required part of the predicted decrease
-constexpr int max_cone_halvings = 7, most_blind = 3;  // steps without decrease that let the modes change
-constexpr int most_stalled = 2;  // steps at rounding without progress
 
 // Data of the projection of one element's tangential rows.
 struct Disk {
@@ -122,16 +115,16 @@ void ConeNewton::differentiate(const ConeProblem& p, const Eigen::Ref<const VecX
 bool ConeNewton::advance(const ConeProblem& p, Eigen::Ref<VecX> f, double& merit) {
     auto step = step_.vector(p.n), ahead = ahead_.vector(p.n);
     double length = 1.0;
-    for (int halving = 0; halving < max_cone_halvings; ++halving, length *= 0.5) {
+    for (int halving = 0; halving < parameters.max_halvings; ++halving, length *= 0.5) {
         ahead = f - length * step;
         const double there = evaluate(p, ahead);
-        if (there < (1.0 - 2.0 * cone_newton_decrease * length) * merit) {
+        if (there < (1.0 - 2.0 * parameters.decrease * length) * merit) {
             f = ahead;
             merit = there;
             return true;
         }
     }
-    if (++blind_ > most_blind) return false;
+    if (++blind_ > parameters.most_blind) return false;
     f -= step;
     merit = evaluate(p, f);
     return merit < HUGE_VAL;
@@ -151,7 +144,8 @@ bool ConeNewton::changes_piece(const ConeProblem& p, const Eigen::Ref<const VecX
             const bool closed = element.is(ConeKind::contact) && f[i] > p.stiffness(e) * w[i];
             const Disk disk = disk_of(p, e, f, w);
             const bool sticks = disk.sticks() && disk.radius > 0.0;
-            now = disk.dim == 0 || sticks || disk.radius == 0.0 ? static_cast<signed char>(1 + 2 * closed + sticks) : curved;
+            now = disk.dim == 0 || sticks || disk.radius == 0.0 ? static_cast<signed char>(1 + 2 * closed + sticks)
+                                                                : curved;
         }
         changes |= now == curved || now != piece_[e];
         piece_[e] = now;
@@ -167,7 +161,7 @@ double ConeNewton::solve(const ConeProblem& p, Eigen::Ref<VecX> f, int most_step
     blind_ = 0;
     int stalled = 0;
     regular_ = false;
-    for (int it = 0; it < most_steps && last > cone_newton_tolerance; ++it, ++steps_) {
+    for (int it = 0; it < most_steps && last > parameters.tolerance; ++it, ++steps_) {
         if (changes_piece(p, f) || it == 0) {
             differentiate(p, f);
             solver_.factor(J);
@@ -180,7 +174,7 @@ double ConeNewton::solve(const ConeProblem& p, Eigen::Ref<VecX> f, int most_step
             least = now;
             best = f;
         }
-        if (least < cone_newton_stall_tolerance && now > 0.25 * last && ++stalled > most_stalled) break;
+        if (least < parameters.stall_tolerance && now > 0.25 * last && ++stalled > parameters.most_stalled) break;
         last = now;
     }
     f = best;

@@ -7,8 +7,20 @@
 
 namespace pn {
 
+struct ConeNewtonParameters {
+    // Errors that end the iteration. The second one ends it if steps make no progress.
+    double tolerance = 1e-15, stall_tolerance = 1e-11;
+    double decrease = 1e-4;  // required part of the predicted decrease
+    int max_halvings = 7;    // maximum halvings of a step that does not decrease the squared error
+    int most_blind = 3;      // steps without decrease that let the modes change
+    int most_stalled = 2;    // steps at rounding without progress
+};
+
 class ConeNewton {
 public:
+    using Parameters = ConeNewtonParameters;
+    static constexpr Parameters parameters{};
+
     // Iterate from f, and set f to the best point found. Returns the largest relative error of the equations.
     double solve(const ConeProblem& problem, Eigen::Ref<VecX> f, int most_steps);
     // Return the relative error of f.

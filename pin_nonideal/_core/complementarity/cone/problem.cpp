@@ -5,11 +5,6 @@
 
 namespace pn {
 
-// Part of the largest response below which an element has no response of its own.
-constexpr double min_element_response = 1e-14;
-// Part of large forces that counts as their rounding: 1e12 times the machine precision.
-constexpr double squeeze = 1e-4;
-
 void ConeProblem::pose(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const VecX>& w0,
                        const std::vector<ConeElement>& list) {
     n = static_cast<int>(w0.size());
@@ -21,7 +16,7 @@ void ConeProblem::pose(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const V
     for (const ConeElement& e : elements) {
         at.push_back(row);
         const double own = W.diagonal().segment(row, e.dim).cwiseAbs().maxCoeff();
-        const double response = own > min_element_response * largest ? own : largest;
+        const double response = own > parameters.min_element_response * largest ? own : largest;
         scale.segment(row, e.dim).setConstant(response > 0.0 ? 1.0 / std::sqrt(response) : 1.0);
         row += e.dim;
     }
@@ -39,7 +34,7 @@ void ConeProblem::measure() {
     auto stiffness = stiffness_.vector(size());
     for (int e = 0; e < size(); ++e) {
         const double own = W().diagonal().segment(at[e], elements[e].dim).cwiseAbs().mean();
-        stiffness[e] = own > min_element_response ? 1.0 / own : 1.0;
+        stiffness[e] = own > parameters.min_element_response ? 1.0 / own : 1.0;
     }
 }
 
@@ -48,7 +43,7 @@ void ConeProblem::forces_in_play(const Eigen::Ref<const VecX>& f, Eigen::Ref<Vec
         double most = 0.0;
         for (int i = at[e]; i < at[e] + elements[e].dim; ++i)
             most = std::max(most, std::abs(f[i]) + stiffness(e) * W().row(i).cwiseAbs().dot(f.cwiseAbs()));
-        size_of[e] = stiffness(e) + squeeze * most;
+        size_of[e] = stiffness(e) + parameters.squeeze * most;
     }
 }
 

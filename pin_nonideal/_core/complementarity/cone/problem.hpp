@@ -26,9 +26,20 @@ struct ConeElement {
     bool slides() const { return kind == Kind::contact && dim > 1; }
     bool is(Kind k) const { return kind == k; }
 };
+using ConeKind = ConeElement::Kind;
+
+struct ConeProblemParameters {
+    // Part of the largest response below which an element has no response of its own.
+    double min_element_response = 1e-14;
+    // Part of large forces that counts as their rounding: 1e12 times the machine precision.
+    double squeeze = 1e-4;
+};
 
 class ConeProblem {
 public:
+    using Parameters = ConeProblemParameters;
+    static constexpr Parameters parameters{};
+
     int n = 0;
     bool associated = false;  // u = w (associated law): slip opens the contact
     std::vector<ConeElement> elements;

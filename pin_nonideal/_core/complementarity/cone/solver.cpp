@@ -2,36 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <random>
 
 namespace pn {
-
-namespace {
-
-using ConeKind = ConeElement::Kind;
-
-constexpr double cone_tolerance = 1e-11;  // error of a solution
-constexpr double no_force = 1e10;  // larger forces, in the problem's units, only squeeze
-constexpr double held = 1e-7;  // velocity of rest at the end of the central path, relative to the largest w0
-constexpr double still = 1e-12;  // velocity of rest of a solution, relative to its terms
-constexpr double cone_velocity_rounding = 1e-14;  // rounding relative to the largest velocity
-constexpr double evened = 1e-13;  // error of a minimum-norm solution
-constexpr int few_steps = 3, first_steps = 20, more_steps = 30;
-constexpr int max_cone_alternations = 30, most_rounds = 40, sweeps = 40, most_starts = 100;
-constexpr int few_turns = 10, most_stretches = 60;
-constexpr double relaxation = 0.7;
-// Compliance of elements relative to their own response. It halves from the first value to the last.
-constexpr double first_cone_compliance = 1e-2, min_cone_compliance = 1e-9;
-constexpr int most_approaches = 40;
-constexpr double softer = 0.1;  // ratio of successive compliances, if only the limit is needed
-// Residual below which the search ends if residuals are accepted, and ratio of successive residuals that counts as
-// stagnation. If the residual stagnates while elements stiffen, no forces change it. Elements that share a load, such
-// as the corners of a turning foot, then have contradicting velocities.
-constexpr double unchangeable = 1e-9, lasts = 0.9;
-constexpr double first_friction_part = 0.1, min_friction_part = 1e-5;  // parts of the way from no friction to full friction
-
-}  // namespace
 
 ConeStatus ConeComplementarity::solve(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const VecX>& w0,
                                       const std::vector<ConeElement>& elements, bool warm, Eigen::Ref<VecX> f,
@@ -55,7 +28,8 @@ ConeStatus ConeComplementarity::solve(const Eigen::Ref<const MatX>& W, const Eig
         auto even = f_.vector(n);
         even = x;
         const bool shorter = shares_.even_out(problem_, even);
-        if (shorter && newton_.solve(problem_, even, few_steps) <= std::max(evened, error_)) x = even;
+        if (shorter && newton_.solve(problem_, even, parameters.few_steps) <= std::max(parameters.evened, error_))
+            x = even;
     }
     if (found) tidy(x);
     f = problem_.force_unit() * problem_.scale().cwiseProduct(x);
@@ -74,13 +48,13 @@ bool ConeComplementarity::hold(const Eigen::Ref<const MatX>& W, const Eigen::Ref
     path_.follow(grown_, x, ConePath::Slip::stands);
     if (!x.allFinite()) return false;
     problem_.respond(x, w);
-    if (w.cwiseAbs().maxCoeff() > held) return false;
-    if (!polish(x, more_steps) || !stands_still(x)) return false;
+    if (w.cwiseAbs().maxCoeff() > parameters.held) return false;
+    if (!polish(x, parameters.more_steps) || !stands_still(x)) return false;
     unique_shares_ = newton_.regular();
     auto even = f_.vector(problem_.n);
     even = x;
     if (!unique_shares_ && shares_.even_out(problem_, even) &&
-        newton_.solve(problem_, even, few_steps) <= std::max(evened, error_))
+        newton_.solve(problem_, even, parameters.few_steps) <= std::max(parameters.evened, error_))
         x = even;
     tidy(x);
     f = problem_.force_unit() * problem_.scale().cwiseProduct(x);
@@ -99,7 +73,7 @@ bool ConeComplementarity::stands_still(const Eigen::Ref<const VecX>& f) {
             speed = std::max(speed, std::abs(w[i]));
             terms = std::max(terms, std::abs(problem_.w0()[i]) + problem_.W().row(i).cwiseAbs().dot(f.cwiseAbs()));
         }
-        return speed <= still * terms + cone_velocity_rounding * all;
+        return speed <= parameters.still * terms + parameters.velocity_rounding * all;
     };
     for (int e = 0; e < problem_.size(); ++e) {
         const int begin = problem_.at[e], end = begin + problem_.elements[e].dim;
@@ -114,57 +88,21 @@ bool ConeComplementarity::polish(Eigen::Ref<VecX> f, int most_steps) {
     auto there = f_.vector(problem_.n);
     there = f;
     error_ = newton_.solve(problem_, there, most_steps);
-    if (!(error_ <= cone_tolerance) || there.cwiseAbs().maxCoeff() > no_force) return false;
+    if (!(error_ <= parameters.tolerance) || there.cwiseAbs().maxCoeff() > parameters.no_force) return false;
     f = there;
     return true;
 }
 
 bool ConeComplementarity::search(Eigen::Ref<VecX> f, bool warm) {
     if (problem_.n == 0) return true;
-    if (polish(f, first_steps)) return true;
+    if (polish(f, parameters.first_steps)) return true;
     if (warm) {
         f.setZero();
-        if (polish(f, first_steps)) return true;
+        if (polish(f, parameters.first_steps)) return true;
     }
     path_.follow(problem_, f, ConePath::Slip::follows);
-    if (polish(f, more_steps)) return true;
+    if (polish(f, parameters.more_steps)) return true;
     return !brief_ && (approach(f) || take_turns(f) || relax(f));
-}
-
-// Proximal point algorithm (Rockafellar, SIAM J. Control Optim. 14, 1976). Each element yields in proportion to the
-// change of its force. Every problem on the way is then regular, however many elements share a load. Forces that no
-// longer change cause no compliance.
-bool ConeComplementarity::approach(Eigen::Ref<VecX> f) {
-    grown_ = problem_;
-    auto last = x_.vector(problem_.n), nearest = nearest_.vector(problem_.n);
-    last.setZero();
-    double compliance = first_cone_compliance, before = HUGE_VAL;
-    for (int turn = 0; turn < most_approaches && !(least_miss_ <= unchangeable); ++turn) {
-        grown_.W() = problem_.W();
-        grown_.W().diagonal().array() += compliance;
-        grown_.w0() = problem_.w0() - compliance * last;
-        f = last;
-        double error = newton_.solve(grown_, f, more_steps);
-        if (!(error <= cone_tolerance)) {
-            f.setZero();
-            error = newton_.solve(grown_, f, more_steps);
-        }
-        if (!(error <= cone_tolerance)) {
-            path_.follow(grown_, f, ConePath::Slip::follows);
-            if (f.allFinite()) error = newton_.solve(grown_, f, more_steps);
-        }
-        compliance = std::max(min_cone_compliance, 0.5 * compliance);
-        if (!(error <= cone_tolerance) || f.cwiseAbs().maxCoeff() > no_force) continue;
-        last = f;
-        if (polish(f, few_steps)) return true;
-        error = newton_.error(problem_, f);
-        if (error > lasts * before && error < least_miss_) {
-            nearest = f;
-            least_miss_ = error;
-        }
-        before = error;
-    }
-    return least_miss_ <= unchangeable && take_nearest(f);
 }
 
 // Solve with compliance to the whole forces that decreases to its limit. f is kept if this gives no solution.
@@ -172,29 +110,23 @@ bool ConeComplementarity::stiffen(Eigen::Ref<VecX> f) {
     grown_ = problem_;
     auto there = x_.vector(problem_.n);
     there.setZero();
-    for (double compliance = first_cone_compliance; compliance >= min_cone_compliance; compliance *= softer) {
+    for (double compliance = parameters.first_compliance; compliance >= parameters.min_compliance;
+         compliance *= parameters.softer) {
         grown_.W() = problem_.W();
         grown_.W().diagonal().array() += compliance;
-        if (newton_.solve(grown_, there, more_steps) <= cone_tolerance) continue;
+        if (newton_.solve(grown_, there, parameters.more_steps) <= parameters.tolerance) continue;
         path_.follow(grown_, there, ConePath::Slip::follows);
-        if (!there.allFinite() || !(newton_.solve(grown_, there, more_steps) <= cone_tolerance)) return false;
+        if (!there.allFinite() || !(newton_.solve(grown_, there, parameters.more_steps) <= parameters.tolerance))
+            return false;
     }
     const double error = error_;
     f_.vector(problem_.n) = there;
     there = f;
     f = f_.vector(problem_.n);
-    if (polish(f, few_steps)) return true;
+    if (polish(f, parameters.few_steps)) return true;
     f = there;
     error_ = error;
     return false;
-}
-
-// Set f to the stored forces of smallest residual, if this residual is accepted.
-bool ConeComplementarity::take_nearest(Eigen::Ref<VecX> f) {
-    if (!(least_miss_ <= most_miss_)) return false;
-    f = nearest_.vector(problem_.n);
-    error_ = least_miss_;
-    return true;
 }
 
 // Remove rounding: no force pulls, and none leaves its cone.
@@ -210,14 +142,60 @@ void ConeComplementarity::tidy(Eigen::Ref<VecX> f) const {
     }
 }
 
+// --- Searches from afar
+
+// Proximal point algorithm (Rockafellar, SIAM J. Control Optim. 14, 1976). Each element yields in proportion to the
+// change of its force. Every problem on the way is then regular, however many elements share a load. Forces that no
+// longer change cause no compliance.
+bool ConeComplementarity::approach(Eigen::Ref<VecX> f) {
+    grown_ = problem_;
+    auto last = x_.vector(problem_.n), nearest = nearest_.vector(problem_.n);
+    last.setZero();
+    double compliance = parameters.first_compliance, before = HUGE_VAL;
+    for (int turn = 0; turn < parameters.most_approaches && !(least_miss_ <= parameters.unchangeable); ++turn) {
+        grown_.W() = problem_.W();
+        grown_.W().diagonal().array() += compliance;
+        grown_.w0() = problem_.w0() - compliance * last;
+        f = last;
+        double error = newton_.solve(grown_, f, parameters.more_steps);
+        if (!(error <= parameters.tolerance)) {
+            f.setZero();
+            error = newton_.solve(grown_, f, parameters.more_steps);
+        }
+        if (!(error <= parameters.tolerance)) {
+            path_.follow(grown_, f, ConePath::Slip::follows);
+            if (f.allFinite()) error = newton_.solve(grown_, f, parameters.more_steps);
+        }
+        compliance = std::max(parameters.min_compliance, 0.5 * compliance);
+        if (!(error <= parameters.tolerance) || f.cwiseAbs().maxCoeff() > parameters.no_force) continue;
+        last = f;
+        if (polish(f, parameters.few_steps)) return true;
+        error = newton_.error(problem_, f);
+        if (error > parameters.lasts * before && error < least_miss_) {
+            nearest = f;
+            least_miss_ = error;
+        }
+        before = error;
+    }
+    return least_miss_ <= parameters.unchangeable && take_nearest(f);
+}
+
+// Set f to the stored forces of smallest residual, if this residual is accepted.
+bool ConeComplementarity::take_nearest(Eigen::Ref<VecX> f) {
+    if (!(least_miss_ <= most_miss_)) return false;
+    f = nearest_.vector(problem_.n);
+    error_ = least_miss_;
+    return true;
+}
+
 // Alternate between slip speeds and the forces for fixed slip speeds (Cadoux, "Méthodes d'optimisation pour la
 // dynamique non régulière", 2009).
 bool ConeComplementarity::take_turns(Eigen::Ref<VecX> f) {
     f.setZero();
-    for (int turn = 0; turn < max_cone_alternations; ++turn) {
+    for (int turn = 0; turn < parameters.max_alternations; ++turn) {
         path_.follow(problem_, f, ConePath::Slip::stands);
         if (!f.allFinite()) f.setZero();
-        if (polish(f, more_steps)) return true;
+        if (polish(f, parameters.more_steps)) return true;
     }
     return false;
 }
@@ -227,15 +205,15 @@ bool ConeComplementarity::relax(Eigen::Ref<VecX> f) {
     auto w = w_.vector(problem_.n), x = x_.vector(problem_.n);
     f.setZero();
     problem_.respond(f, w);
-    for (int round = 0; round < most_rounds; ++round) {
-        for (int sweep = 0; sweep < sweeps; ++sweep)
+    for (int round = 0; round < parameters.most_rounds; ++round) {
+        for (int sweep = 0; sweep < parameters.sweeps; ++sweep)
             for (int e = 0; e < problem_.size(); ++e) {
                 const ConeElement& element = problem_.elements[e];
                 const int i = problem_.at[e], d = element.dim, head = element.is(ConeKind::contact);
                 auto fe = f.segment(i, d);
                 auto before = x.head(d);
                 before = fe;
-                fe -= relaxation * problem_.stiffness(e) * w.segment(i, d);
+                fe -= parameters.relaxation * problem_.stiffness(e) * w.segment(i, d);
                 if (head) fe[0] = std::max(fe[0], 0.0);
                 const double length = fe.tail(d - head).norm(), limit = element.bound * (head ? fe[0] : 1.0);
                 if (!element.is(ConeKind::equality) && length > limit) fe.tail(d - head) *= limit / length;
@@ -243,7 +221,7 @@ bool ConeComplementarity::relax(Eigen::Ref<VecX> f) {
                 for (int k = 0; k < d; ++k) w -= before[k] * problem_.W().col(i + k);
             }
         if (!f.allFinite()) return false;
-        if (polish(f, more_steps)) return true;
+        if (polish(f, parameters.more_steps)) return true;
     }
     return false;
 }
@@ -251,30 +229,30 @@ bool ConeComplementarity::relax(Eigen::Ref<VecX> f) {
 // Continuation from zero friction, where the problem is convex, to full friction.
 bool ConeComplementarity::grow_friction(Eigen::Ref<VecX> f) {
     grown_ = problem_;
-    double reached = 0.0, stretch = first_friction_part;
+    double reached = 0.0, stretch = parameters.first_friction_part;
     auto there = x_.vector(problem_.n);
     f.setZero();
-    for (int tried = 0; tried < most_stretches && stretch > min_friction_part; ++tried) {
+    for (int tried = 0; tried < parameters.most_stretches && stretch > parameters.min_friction_part; ++tried) {
         const double next = std::min(1.0, reached + stretch);
         for (int e = 0; e < problem_.size(); ++e) grown_.elements[e].bound = next * problem_.elements[e].bound;
         there = f;
-        double error = newton_.solve(grown_, there, more_steps);
-        for (int turn = 0; turn < few_turns && !(error <= cone_tolerance); ++turn) {
+        double error = newton_.solve(grown_, there, parameters.more_steps);
+        for (int turn = 0; turn < parameters.few_turns && !(error <= parameters.tolerance); ++turn) {
             path_.follow(grown_, there, turn == 0 ? ConePath::Slip::follows : ConePath::Slip::stands);
             if (!there.allFinite()) break;
             auto end = f_.vector(problem_.n);
             end = there;
-            error = newton_.solve(grown_, end, more_steps);
-            if (error <= cone_tolerance) there = end;
+            error = newton_.solve(grown_, end, parameters.more_steps);
+            if (error <= parameters.tolerance) there = end;
         }
-        if (!(error <= cone_tolerance)) {
+        if (!(error <= parameters.tolerance)) {
             stretch *= 0.3;
             continue;
         }
         f = there;
         reached = next;
         stretch *= 2.0;
-        if (reached == 1.0) return polish(f, more_steps);
+        if (reached == 1.0) return polish(f, parameters.more_steps);
     }
     return false;
 }
@@ -282,60 +260,15 @@ bool ConeComplementarity::grow_friction(Eigen::Ref<VecX> f) {
 // Random starts with a fixed seed.
 bool ConeComplementarity::scatter(Eigen::Ref<VecX> f) {
     std::minstd_rand lot(1);
-    for (int start = 0; start < most_starts; ++start) {
+    for (int start = 0; start < parameters.most_starts; ++start) {
         for (int i = 0; i < problem_.n; ++i) f[i] = 4.0 * (lot() / double(std::minstd_rand::max()) - 0.5);
         for (int e = 0; e < problem_.size(); ++e)
             if (problem_.elements[e].is(ConeKind::contact)) f[problem_.at[e]] = 2.0 * std::abs(f[problem_.at[e]]);
-        if (polish(f, more_steps)) return true;
+        if (polish(f, parameters.more_steps)) return true;
         path_.follow(problem_, f, ConePath::Slip::stands);
-        if (f.allFinite() && polish(f, more_steps)) return true;
+        if (f.allFinite() && polish(f, parameters.more_steps)) return true;
     }
     return false;
-}
-
-void add_residuals(const ConeElement& e, const double* f, const double* w, double force, double speed,
-                   ConeResiduals& out) {
-    constexpr double least = std::numeric_limits<double>::min();
-    force = std::max(force, least);
-    speed = std::max(speed, least);
-    const int head = e.is(ConeKind::contact);
-    double limit = e.bound, ft = 0.0, wt = 0.0, product = 0.0;
-    if (head) {
-        limit *= std::max(f[0], 0.0);
-        out.signorini = std::max({out.signorini, -w[0] / speed, -f[0] / force, std::abs(f[0] * w[0]) / (force * speed)});
-    }
-    for (int k = head; k < e.dim; ++k) {
-        ft += f[k] * f[k];
-        wt += w[k] * w[k];
-        product += f[k] * w[k];
-    }
-    ft = std::sqrt(ft);
-    wt = std::sqrt(wt);
-    if (e.is(ConeKind::equality)) {
-        out.signorini = std::max(out.signorini, wt / speed);
-    } else {
-        out.coulomb = std::max(out.coulomb, (ft - limit) / force);
-        out.dissipation = std::max(out.dissipation, std::abs(product + limit * wt) / (force * speed));
-    }
-}
-
-ConeResiduals ConeComplementarity::residuals(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const VecX>& w0,
-                                             const std::vector<ConeElement>& elements,
-                                             const Eigen::Ref<const VecX>& f) {
-    ConeResiduals out;
-    if (w0.size() == 0) return out;
-    const double force = f.cwiseAbs().maxCoeff(), free = w0.cwiseAbs().maxCoeff();
-    int i = 0;
-    for (const ConeElement& e : elements) {
-        double w[3] = {0.0, 0.0, 0.0}, speed = free;
-        for (int k = 0; k < e.dim; ++k) {
-            w[k] = w0[i + k] + W.row(i + k).dot(f);
-            speed = std::max(speed, W.row(i + k).cwiseAbs().dot(f.cwiseAbs()));
-        }
-        add_residuals(e, f.data() + i, w, force, speed, out);
-        i += e.dim;
-    }
-    return out;
 }
 
 }  // namespace pn

@@ -9,23 +9,41 @@
 #include "complementarity/cone/certificate.hpp"
 #include "complementarity/cone/newton.hpp"
 #include "complementarity/cone/minimum_norm.hpp"
+#include "complementarity/cone/residuals.hpp"
 
 namespace pn {
 
-// Largest errors, relative to the velocity scale (the largest |w0|, or |W| |f| if that is larger), to the largest
-// force, and to their product.
-struct ConeResiduals {
-    double signorini = 0.0;    // error of w_n >= 0, f_n >= 0, f_n w_n = 0
-    double coulomb = 0.0;      // error of |f_t| <= mu f_n, |f| <= limit
-    double dissipation = 0.0;  // error of f_t . w_t = -mu f_n |w_t|, f . w = -limit |w|
+struct ConeComplementarityParameters {
+    double tolerance = 1e-11;          // error of a solution
+    double no_force = 1e10;            // larger forces, in the problem's units, only squeeze
+    double held = 1e-7;                // velocity of rest at the end of the central path, relative to the largest w0
+    double still = 1e-12;              // velocity of rest of a solution, relative to its terms
+    double velocity_rounding = 1e-14;  // rounding relative to the largest velocity
+    double evened = 1e-13;             // error of a minimum-norm solution
+    // Newton steps from near a solution, from a guess, and from the end of the central path or of a continuation.
+    int few_steps = 3, first_steps = 20, more_steps = 30;
+    int max_alternations = 30;          // maximum alternations of slip speeds and forces
+    int most_rounds = 40, sweeps = 40;  // rounds of projected Gauss-Seidel sweeps, and sweeps of a round
+    double relaxation = 0.7;            // part of an element's own step that a sweep takes
+    int most_starts = 100;              // random starts
+    // Alternations at one part of the friction, and number of parts on the way to full friction.
+    int few_turns = 10, most_stretches = 60;
+    // Compliance of elements relative to their own response. It halves from the first value to the last.
+    double first_compliance = 1e-2, min_compliance = 1e-9;
+    int most_approaches = 40;  // proximal steps, of which 24 reach the last compliance
+    double softer = 0.1;       // ratio of successive compliances, if only the limit is needed
+    // Residual below which the search ends if residuals are accepted, and ratio of successive residuals that counts as
+    // stagnation. If the residual stagnates while elements stiffen, no forces change it. Elements that share a load,
+    // such as the corners of a turning foot, then have contradicting velocities.
+    double unchangeable = 1e-9, lasts = 0.9;
+    double first_friction_part = 0.1, min_friction_part = 1e-5;  // parts of the way from no friction to full friction
 };
-
-// Add the errors of an element with forces f and velocities w to `out`. `force` and `speed` are their scales.
-void add_residuals(const ConeElement& element, const double* f, const double* w, double force, double speed,
-                   ConeResiduals& out);
 
 class ConeComplementarity {
 public:
+    using Parameters = ConeComplementarityParameters;
+    static constexpr Parameters parameters{};
+
     // Solve for f. If `warm`, f holds a guess (often the solution of the previous step), otherwise its value is
     // ignored. If the result is not `solved`, f is the best point found. Forces that share a load have minimum norm.
     // With `may_keep_shares`, a guess that solves the problem keeps its shares.
@@ -36,8 +54,6 @@ public:
     // associated law has w = 0 as its only solution exactly if such forces exist.
     bool hold(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const VecX>& w0,
               const std::vector<ConeElement>& elements, Eigen::Ref<VecX> f);
-    static ConeResiduals residuals(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const VecX>& w0,
-                                   const std::vector<ConeElement>& elements, const Eigen::Ref<const VecX>& f);
 
     // Accept a relative residual up to `most` if no forces meet the laws to rounding. The caller then reports the
     // residual. By default no residual is accepted.

@@ -5,13 +5,6 @@
 
 namespace pn {
 
-constexpr double newton_rounding = 1e-15;              // residual relative to the solution
-constexpr double fixed_point_stall_tolerance = 1e-12;  // the same for worse rounding, if the residual no longer falls
-constexpr int growth_passes = 200;
-constexpr double min_improved_growth = 0.5;  // smaller bounds are not improved
-constexpr double growth_settled = 1e-4;  // relative improvement of the bound by a pass that ends the iteration
-constexpr double kept_weight = 1e-2;  // part of the previous weights that stays, so that none becomes zero or alternates
-
 void ReactionEquation::resize(int size, int vectors) {
     constant.resize(size);
     element.resize(vectors);
@@ -70,12 +63,13 @@ double ReactionNewton::factorize(const ReactionEquation& equation, const VecX& y
 
 bool ReactionNewton::solve(const ReactionEquation& equation, VecX& y) {
     double last = HUGE_VAL;
-    for (int pass = 0; pass < max_fixed_point_newton; ++pass) {
+    for (int pass = 0; pass < parameters.max_steps; ++pass) {
         equation.image(y, 1.0, image);
         residual = image - y;
         const double error = residual.cwiseAbs().maxCoeff(), size = y.cwiseAbs().maxCoeff();
         if (!std::isfinite(error)) return false;
-        if (error <= newton_rounding * size || (error >= last && error <= fixed_point_stall_tolerance * size)) return true;
+        if (error <= parameters.rounding * size || (error >= last && error <= parameters.stall_tolerance * size))
+            return true;
         last = error;
         factorize(equation, y);
         factor.solve(residual, step);
@@ -88,14 +82,16 @@ bool ReactionNewton::solve(const ReactionEquation& equation, VecX& y) {
 // For any positive u, max (L u)_i / u_i is such a bound (Collatz and Wielandt).
 double growth(const MatX& L) {
     double best = L.rowwise().sum().maxCoeff();
-    if (best <= min_improved_growth) return best;
+    if (best <= growth_bound_parameters.min_improved) return best;
     VecX u = VecX::Ones(L.rows());
-    for (int pass = 0; pass < growth_passes; ++pass) {
+    for (int pass = 0; pass < growth_bound_parameters.passes; ++pass) {
         const VecX next = L * u;
         const double before = best;
         best = std::min(best, next.cwiseQuotient(u).maxCoeff());
-        if (best <= min_improved_growth || (pass > 0 && before - best <= growth_settled * best)) break;
-        u = next + kept_weight * best * u;
+        if (best <= growth_bound_parameters.min_improved ||
+            (pass > 0 && before - best <= growth_bound_parameters.settled * best))
+            break;
+        u = next + growth_bound_parameters.kept_weight * best * u;
         u /= u.maxCoeff();
     }
     return best;

@@ -10,8 +10,14 @@
 
 namespace pn {
 
-// Maximum steps of Newton's method for a solution of the equation.
-constexpr int max_fixed_point_newton = 30;
+struct GrowthBoundParameters {
+    int passes = 200;           // maximum passes of the power iteration
+    double min_improved = 0.5;  // smaller bounds are not improved
+    double settled = 1e-4;      // relative improvement of the bound by a pass that ends the iteration
+    double kept_weight = 1e-2;  // part of the previous weights that stays, so that none becomes zero or alternates
+};
+
+inline constexpr GrowthBoundParameters growth_bound_parameters{};
 
 struct ReactionEquation {
     VecX constant;             // c
@@ -37,8 +43,18 @@ struct ReactionEquation {
     bool finite() const;
 };
 
+struct ReactionNewtonParameters {
+    double rounding = 1e-15;         // residual relative to the solution
+    double stall_tolerance = 1e-12;  // the same for worse rounding, if the residual no longer falls
+    // Maximum steps of Newton's method for a solution of the equation.
+    int max_steps = 30;
+};
+
 // Newton's method on the arrays, with persistent storage.
 struct ReactionNewton {
+    using Parameters = ReactionNewtonParameters;
+    static constexpr Parameters parameters{};
+
     MatX matrix;  // I - dg/dy
     LU factor;
     VecX image, residual, step;

@@ -8,24 +8,6 @@ namespace pn {
 
 namespace {
 
-constexpr int most_halved = 3;  // bisected unknowns
-constexpr double most_work = 20000.0;  // parts of the box, weighted by the size of the matrices
-constexpr double max_followed_growth = 0.9;  // largest growth of the unknowns that follow
-constexpr double min_box_part = 1e-7;  // smallest part of the box (its square is rounding, where two solutions merge)
-constexpr double alone = 0.9;  // size to which Newton's interval form must shrink a part, relative to it
-constexpr double margin = 1e-9;  // relative enlargement of a part and its bounds
-constexpr double interval_residual_tolerance = 1e-13;  // residual relative to its terms
-constexpr double same_root = 1e-9;  // relative distance of equal solutions
-constexpr double least_determinant = 1e-8;  // smaller determinants count as zero
-constexpr double infinite_solution_scale = 1e-9;  // s below which a solution counts as infinite
-constexpr double far_newton_start = 100.0;  // start of Newton's method beyond the bends of g
-constexpr int follow_passes = 1000;
-
-struct Part {
-    int fixed;  // coordinate that is one, while the others run from zero to one
-    std::array<double, most_halved + 1> center, half;  // by bisected unknown, then of s
-};
-
 // Search in z with y = scale z / s and max(z of the bisected unknowns, s) = 1.
 class Search {
 public:
@@ -33,6 +15,13 @@ public:
     ReactionRoots run();
 
 private:
+    static constexpr IntervalSolverParameters parameters{};
+
+    struct Part {
+        int fixed;  // coordinate that is one, while the others run from zero to one
+        std::array<double, parameters.most_halved + 1> center, half;  // by bisected unknown, then of s
+    };
+
     void divide();
     double terms(const VecX& z, double s) const { return 1.0 + (s * in_s_ + L_ * z.cwiseAbs()).maxCoeff(); }
     bool follow(VecX& z, double s) const;
@@ -86,7 +75,7 @@ Search::Search(const ReactionEquation& given) : eq_(given), n_(given.size()) {
 // contracts best.
 void Search::divide() {
     for (int i = 0; i < n_; ++i) following_.push_back(i);
-    while (!following_.empty() && growth(among(L_, following_, following_)) > max_followed_growth) {
+    while (!following_.empty() && growth(among(L_, following_, following_)) > parameters.max_followed_growth) {
         size_t best = 0;
         double least = HUGE_VAL;
         for (size_t i = 0; i < following_.size(); ++i) {
@@ -110,11 +99,11 @@ bool Search::follow(VecX& z, double s) const {
     MatX J;
     double before = HUGE_VAL;
     VecX trial = z;
-    for (int pass = 0; pass < follow_passes; ++pass) {
+    for (int pass = 0; pass < parameters.follow_passes; ++pass) {
         eq_.image(trial, s, g);
         for (int i = 0; i < m; ++i) residual[i] = g[following_[i]] - trial[following_[i]];
         const double error = residual.cwiseAbs().maxCoeff();
-        if (error > before * max_followed_growth) {  // Newton's step failed, but the image itself contracts
+        if (error > before * parameters.max_followed_growth) {  // Newton's step failed, but the image itself contracts
             eq_.image(z, s, g);
             for (int i : following_) z[i] = g[i];
             trial = z;
@@ -122,7 +111,7 @@ bool Search::follow(VecX& z, double s) const {
             continue;
         }
         z = trial;
-        if (error <= interval_residual_tolerance * terms(z, s)) return true;
+        if (error <= parameters.residual_tolerance * terms(z, s)) return true;
         before = error;
         eq_.slope(z, s, J);
         const VecX step = solve(MatX::Identity(m, m) - among(J, following_, following_), residual);
@@ -175,10 +164,10 @@ bool Search::polish(int column, VecX& z, double& s) const {
     VecX g(n_);
     MatX A, D;
     const VecX none = VecX::Zero(n_);
-    for (int pass = 0; pass < max_fixed_point_newton; ++pass) {
+    for (int pass = 0; pass < ReactionNewton::parameters.max_steps; ++pass) {
         eq_.image(z, s, g);
         const VecX residual = g - z;
-        if (residual.cwiseAbs().maxCoeff() <= interval_residual_tolerance * terms(z, s)) return true;
+        if (residual.cwiseAbs().maxCoeff() <= parameters.residual_tolerance * terms(z, s)) return true;
         interval_slope(z, s, none, 0.0, column, A, D);
         VecX step = solve(A, residual);
         if (!step.allFinite()) return false;
@@ -192,18 +181,18 @@ bool Search::polish(int column, VecX& z, double& s) const {
 }
 
 void Search::keep(const VecX& z, double s) {
-    if (s < infinite_solution_scale) {
+    if (s < parameters.infinite_solution_scale) {
         found_.at_edge = true;
         return;
     }
     const VecX y = z / s;
     for (const VecX& other : found_.y) {
         const VecX apart = other.cwiseQuotient(scale_) - y;
-        if (apart.cwiseAbs().maxCoeff() <= same_root * y.cwiseAbs().maxCoeff()) return;
+        if (apart.cwiseAbs().maxCoeff() <= parameters.same_root * y.cwiseAbs().maxCoeff()) return;
     }
     MatX J;
     eq_.slope(z, s, J);
-    if (std::abs(determinant(MatX::Identity(n_, n_) - J)) < least_determinant) found_.at_edge = true;
+    if (std::abs(determinant(MatX::Identity(n_, n_) - J)) < parameters.least_determinant) found_.at_edge = true;
     found_.y.push_back(y.cwiseProduct(scale_));
 }
 
@@ -230,25 +219,27 @@ bool Search::settled(const Part& part) {
     MatX A, D;
     interval_slope(z, s, r, r_s, column(part), A, D);
     if (column(part) >= 0) r[column(part)] = r_s;
-    r.array() = r.array() * (1.0 + margin) + interval_residual_tolerance * terms(z, s);
+    r.array() = r.array() * (1.0 + parameters.margin) + parameters.residual_tolerance * terms(z, s);
     const VecX residual = g - z;
     if (((residual.cwiseAbs() - (A.cwiseAbs() + D) * r).array() > 0.0).any()) return true;
     const MatX inverse = pn::inverse(A);
     if (!inverse.allFinite()) return false;
     const VecX step = (inverse * residual).cwiseAbs(), bound = inverse.cwiseAbs() * (D * r);
     if (((step - bound - r).array() > 0.0).any()) return true;
-    if ((bound.array() > alone * r.array()).any()) return false;
+    if ((bound.array() > parameters.alone * r.array()).any()) return false;
     if (!polish(column(part), z, s)) return false;
     for (int i = 0; i <= halved(); ++i) {
         const double at = i < halved() ? z[halved_[i]] : s;
-        if (std::abs(at - part.center[i]) > part.half[i] * (1.0 + margin) + margin * min_box_part) return false;
+        if (std::abs(at - part.center[i]) >
+            part.half[i] * (1.0 + parameters.margin) + parameters.margin * parameters.min_box_part)
+            return false;
     }
     keep(z, s);
     return true;
 }
 
 ReactionRoots Search::run() {
-    if (halved() > most_halved) {
+    if (halved() > parameters.most_halved) {
         found_.complete = false;
     } else {
         for (int fixed = 0; fixed <= halved(); ++fixed) {
@@ -262,27 +253,27 @@ ReactionRoots Search::run() {
     }
     const double work = 1.0 + n_ * n_ * n_ / 64.0;
     for (int count = 0; !parts_.empty(); ++count) {
-        if (count * work > most_work) {
+        if (count * work > parameters.most_work) {
             found_.complete = false;
             break;
         }
         const Part part = parts_.back();
         parts_.pop_back();
         if (settled(part)) continue;
-        if (*std::max_element(part.half.begin(), part.half.begin() + halved() + 1) > min_box_part) split(part);
+        if (*std::max_element(part.half.begin(), part.half.begin() + halved() + 1) > parameters.min_box_part) split(part);
         else found_.at_edge = true;
     }
     if (!found_.complete) {
         newton_from(VecX::Zero(n_));
         newton_from(VecX::Ones(n_));
-        for (int i = 0; i < n_; ++i) newton_from(VecX::Ones(n_) + far_newton_start * VecX::Unit(n_, i));
+        for (int i = 0; i < n_; ++i) newton_from(VecX::Ones(n_) + parameters.far_newton_start * VecX::Unit(n_, i));
     }
     return std::move(found_);
 }
 
 void Search::newton_from(VecX z) {
     double s = 1.0;
-    if (polish(-1, z, s) && (z.array() >= -interval_residual_tolerance).all()) keep(z, s);
+    if (polish(-1, z, s) && (z.array() >= -parameters.residual_tolerance).all()) keep(z, s);
 }
 
 }  // namespace

@@ -19,15 +19,6 @@ using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, max_unk
 using Short = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1>;
 using Turned = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 3>;
 
-constexpr double inflated = 1.05;               // boxes overlap, so that no solution lies on a border
-constexpr double least_box = 1e-9;              // smaller boxes stay undecided
-constexpr double box_radius_rounding = 1e-14;   // rounding in a box, added to its radius
-constexpr double infinite_solution_tau = 1e-9;  // tau of a solution at infinity
-constexpr double same_motion = 1e-7;            // relative difference below which forces are equal
-constexpr double shrinks = 0.8;                 // reduction of a box's widest side that justifies another pass
-constexpr double least_pivot = 1e-10;           // pivot of W relative to its diagonal
-constexpr int most_undecided = 100, most_boxes = 20000;
-
 // Interval of a value: middle and radius.
 struct Length {
     double middle, radius;
@@ -109,7 +100,8 @@ struct Element {
             return force * x + limit.size.middle * direction;
         }
         const Arrow point(asked, x, radius);
-        const bool inside = point.length.least() <= limit.size.most(), outside = point.length.most() >= limit.size.least();
+        const bool inside = point.length.least() <= limit.size.most(),
+                   outside = point.length.most() >= limit.size.least();
         if (inside) slopes = {response, Rows::Zero(dim, x.size())};
         if (outside && inside) slopes.join(slope_outside(point, limit));
         else if (outside) slopes = slope_outside(point, limit);
@@ -207,14 +199,16 @@ struct Search {
 
     void keep(const VecX& x) {
         for (const VecX& y : found.forces)
-            if ((x - y).cwiseQuotient(unit).norm() <= same_motion * (1.0 + y.cwiseQuotient(unit).norm())) return;
+            if ((x - y).cwiseQuotient(unit).norm() <=
+                enumeration_parameters.same_motion * (1.0 + y.cwiseQuotient(unit).norm()))
+                return;
         found.forces.push_back(x);
     }
 
     // Store the solution near the middle of a box, if it is a motion.
     void take(Point x) {
-        if (x[n] < -infinite_solution_tau) return;
-        if (x[n] <= infinite_solution_tau) {
+        if (x[n] < -enumeration_parameters.infinite_solution_tau) return;
+        if (x[n] <= enumeration_parameters.infinite_solution_tau) {
             ++undecided;
             return;
         }
@@ -225,8 +219,8 @@ struct Search {
 
     // Krawczyk's test. Returns true if the box is done. Otherwise the box may have shrunk.
     bool decide(Box& box) {
-        const Point radius =
-            (inflated * box.radius).array() + box_radius_rounding * (box.radius.array() > 0.0).cast<double>();
+        const Point radius = (enumeration_parameters.inflated * box.radius).array() +
+                             enumeration_parameters.radius_rounding * (box.radius.array() > 0.0).cast<double>();
         Square J(n, n), J_radius(n, n);
         Point lack(n);
         for (const Element& e : elements) {
@@ -259,7 +253,7 @@ struct Search {
             box.middle[k] += 0.5 * (low + high);
             box.radius[k] = std::min(box.radius[k], 0.5 * (high - low));
         }
-        if (box.widest() < shrinks * before) {
+        if (box.widest() < enumeration_parameters.shrinks * before) {
             open.push_back(box);
             return true;
         }
@@ -267,7 +261,7 @@ struct Search {
     }
 
     void halve(Box box) {
-        if (box.widest() < least_box) {
+        if (box.widest() < enumeration_parameters.least_box) {
             if (undecided++ < 3) take(box.middle);
             return;
         }
@@ -282,8 +276,8 @@ struct Search {
     }
 
     void run() {
-        for (int count = 0; !open.empty() && undecided < most_undecided; ++count) {
-            if (count >= most_boxes) return;
+        for (int count = 0; !open.empty() && undecided < enumeration_parameters.most_undecided; ++count) {
+            if (count >= enumeration_parameters.most_boxes) return;
             Box box = open.back();
             open.pop_back();
             const bool excluded = std::any_of(elements.begin(), elements.end(), [&](const Element& e) {
@@ -304,7 +298,7 @@ bool is_searched(const RestEquation& equation) {
     Cholesky cholesky;
     if (!cholesky.compute(equation.W)) return false;  // redundant elements have infinitely many shares
     const auto pivots = cholesky.factor().diagonal().array().square();
-    return (pivots > least_pivot * equation.W.diagonal().array()).all();
+    return (pivots > enumeration_parameters.least_pivot * equation.W.diagonal().array()).all();
 }
 
 AllMotions all_motions(const RestEquation& equation) {

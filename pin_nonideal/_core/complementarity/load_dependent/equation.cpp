@@ -11,15 +11,6 @@ namespace pn {
 
 namespace {
 
-constexpr double force_difference_step = 1e-7;  // relative to the forces: square root of the rounding, with a margin
-constexpr double min_response_pivot = 1e-8;  // pivot of the Cholesky factor of W, relative to its diagonal
-constexpr double null_response = 1e-13;  // eigenvalues of W below this part of the largest count as zero
-constexpr double unmoved = 1e-9;  // part of the loads that forces without motion may change
-
-constexpr double sticking_limit_rounding = 1e-9;  // relative excess of a sticking force over its limit
-constexpr double unbounded_force = 1e9;           // unbounded forces, relative to those of limits and accelerations
-constexpr int most_signs = 6;                     // elements with all combinations of slip signs
-
 auto part(const VecX& x, const RestElement& e) { return x.segment(e.row, e.dim); }
 
 // Compute G with W = G G^T, and the loads' derivatives times G^-T. Returns false if forces that move nothing change a load.
@@ -28,18 +19,19 @@ bool energy_factor(const RestEquation& equation, MatX& G, MatX& loads) {
     Cholesky cholesky;
     if (cholesky.compute(W)) {
         G = cholesky.factor().triangularView<Eigen::Lower>();
-        if ((G.diagonal().array().square() > min_response_pivot * W.diagonal().array()).all()) {
+        if ((G.diagonal().array().square() > RestEquation::parameters.min_response_pivot * W.diagonal().array()).all()) {
             loads = cholesky.solve_lower(equation.loads.transpose()).transpose();
             return true;
         }
     }
     const Spectrum spectrum = symmetric_spectrum(W);
-    const double least = null_response * spectrum.values.cwiseAbs().maxCoeff();
+    const double least = RestEquation::parameters.null_response * spectrum.values.cwiseAbs().maxCoeff();
     const int null = static_cast<int>((spectrum.values.array() <= least).count()), n = equation.n;
     const MatX along = spectrum.vectors.rightCols(n - null);
     const VecX root = spectrum.values.tail(n - null).cwiseSqrt();
     const MatX unmoving = equation.loads * spectrum.vectors.leftCols(null);
-    if (unmoving.size() > 0 && unmoving.cwiseAbs().maxCoeff() > unmoved * equation.loads.cwiseAbs().maxCoeff())
+    if (unmoving.size() > 0 &&
+        unmoving.cwiseAbs().maxCoeff() > RestEquation::parameters.unmoved * equation.loads.cwiseAbs().maxCoeff())
         return false;
     G = along * root.asDiagonal();
     loads = equation.loads * along * root.cwiseInverse().asDiagonal();
@@ -62,7 +54,8 @@ void RestEquation::respond(const VecX& x, VecX& alpha, FrictionLimits& limits) c
             limit = e.constant;
             limits.middle[e.row] = e.middle;
             if (e.directed) limit += std::max(vectors[3 * e.vector], 0.0);
-            for (int k = e.vector; !e.directed && k < e.vector + e.vectors; ++k) limit += vectors.segment<3>(3 * k).norm();
+            for (int k = e.vector; !e.directed && k < e.vector + e.vectors; ++k)
+                limit += vectors.segment<3>(3 * k).norm();
         }
     }
     for (size_t i = 0; i < elements.size(); ++i) {
@@ -83,8 +76,8 @@ void RestEquation::differentiate(const VecX& x, MatX& dalpha, MatX& dlimits, Mat
         VecX alpha, alpha_there(n), shifted = x;
         FrictionLimits limits, limits_there;
         respond(x, alpha, limits);
-        const double h =
-            force_difference_step * std::max({x.cwiseAbs().maxCoeff(), limits.size.cwiseAbs().maxCoeff(), min_scale});
+        const double h = parameters.difference_step *
+                         std::max({x.cwiseAbs().maxCoeff(), limits.size.cwiseAbs().maxCoeff(), min_scale});
         for (int k = 0; k < n; ++k) {
             shifted[k] = x[k] + h;
             respond(shifted, alpha_there, limits_there);
@@ -198,7 +191,7 @@ std::vector<bool> RestEquation::sticks(const VecX& x) const {
         const RestElement& e = elements[i];
         out.push_back(e.may_stick &&
                       (part(from_middle, e) - e.rho * part(alpha, e)).norm() <=
-                       limits[i] * (1.0 + sticking_limit_rounding));
+                       limits[i] * (1.0 + parameters.sticking_limit_rounding));
     }
     return out;
 }
@@ -218,12 +211,12 @@ double RestEquation::determinant_far_away() const {
     MatX dalpha, dlimits, dmiddle;
     const int count = static_cast<int>(elements.size());
     double least = HUGE_VAL;
-    for (int signs = 0; signs < 1 << std::min(count, most_signs); ++signs) {
+    for (int signs = 0; signs < 1 << std::min(count, parameters.most_signs); ++signs) {
         VecX x = VecX::Zero(n);
         for (int i = 0; i < count; ++i) {
             const RestElement& e = elements[i];
             const double size = limits[i] + e.rho * part(alpha, e).norm(), sign = signs >> i & 1 ? 1.0 : -1.0;
-            x.segment(e.row, e.dim) = unbounded_force * (e.may_stick ? VecX(sign * size * VecX::Unit(e.dim, 0))
+            x.segment(e.row, e.dim) = parameters.unbounded_force * (e.may_stick ? VecX(sign * size * VecX::Unit(e.dim, 0))
                                                          : VecX(-size * e.direction));
         }
         differentiate(x, dalpha, dlimits, dmiddle);

@@ -26,7 +26,20 @@ struct RestElement {
     bool directed = false;        // only the first component counts, and only if positive
 };
 
+struct RestEquationParameters {
+    double difference_step = 1e-7;          // relative to the forces: square root of the rounding, with a margin
+    double min_response_pivot = 1e-8;       // pivot of the Cholesky factor of W, relative to its diagonal
+    double null_response = 1e-13;           // eigenvalues of W below this part of the largest count as zero
+    double unmoved = 1e-9;                  // part of the loads that forces without motion may change
+    double sticking_limit_rounding = 1e-9;  // relative excess of a sticking force over its limit
+    double unbounded_force = 1e9;           // unbounded forces, relative to those of limits and accelerations
+    int most_signs = 6;                     // elements with all combinations of slip signs
+};
+
 struct RestEquation {
+    using Parameters = RestEquationParameters;
+    static constexpr Parameters parameters{};
+
     int n = 0;
     MatX W;
     VecX alpha0;

@@ -10,15 +10,6 @@ namespace pn {
 
 namespace {
 
-constexpr double load_equation_tolerance = 1e-13;  // largest error of the equation, relative to each element's forces
-constexpr double load_equation_stall_tolerance = 1e-10;  // the same if no step reduces the error
-constexpr double max_alternation_ratio = 0.5;  // error ratio of the alternation, above which Newton's method takes over
-constexpr double within = 1e-13;  // excess of a sticking force over its limit, relative to the largest force
-constexpr double min_residual_gain = 1e-3;  // required relative decrease of the residual by a step
-constexpr int max_alternations = 40, max_load_newton = 40, max_load_halvings = 12;
-constexpr double load_newton_decrease = 1e-4;  // required part of the predicted decrease
-constexpr double first_continuation_step = 0.25, min_continuation_step = 1e-4;  // steps of the continuation parameter
-
 // Alternation of limits and forces. For given limits the forces are a convex program.
 struct Turns {
     const RestEquation& equation;
@@ -68,11 +59,12 @@ struct Turns {
 
     bool iterate(VecX& x) {
         double last = HUGE_VAL;
-        for (int it = 0; it < max_alternations; ++it) {
+        for (int it = 0; it < load_dependent_parameters.max_alternations; ++it) {
             x = next(x);
             const double error = equation.error(x);
-            if (error <= load_equation_tolerance) return true;
-            if (!(error < HUGE_VAL) || (it > 2 && error > max_alternation_ratio * last)) return false;
+            if (error <= load_dependent_parameters.tolerance) return true;
+            if (!(error < HUGE_VAL) || (it > 2 && error > load_dependent_parameters.max_alternation_ratio * last))
+                return false;
             last = error;
         }
         return false;
@@ -95,7 +87,7 @@ bool follow_path(const RestEquation& equation, VecX& x) {
     equation.respond(x, alpha, partly.fixed);
     partly.frozen = 1.0;
     if (!Turns(partly).iterate(x)) return false;
-    double stretch = first_continuation_step;
+    double stretch = load_dependent_parameters.first_continuation_step;
     while (partly.frozen > 0.0) {
         VecX ahead = x;
         const double before = partly.frozen;
@@ -107,7 +99,7 @@ bool follow_path(const RestEquation& equation, VecX& x) {
         }
         partly.frozen = before;
         stretch *= 0.25;
-        if (stretch < min_continuation_step) return false;
+        if (stretch < load_dependent_parameters.min_continuation_step) return false;
     }
     return true;
 }
@@ -128,7 +120,7 @@ void lack_of_rest(const RestEquation& equation, const VecX& x, VecX& lack, MatX&
     const VecX from_middle = x - limits.middle;
     const MatX slope = MatX::Identity(equation.n, equation.n) - dmiddle;
     const int n = equation.n, count = static_cast<int>(equation.elements.size());
-    const double no_limit = load_equation_tolerance * largest_force_in_play(equation, x, limits);
+    const double no_limit = load_dependent_parameters.tolerance * largest_force_in_play(equation, x, limits);
     lack.setZero(2 * n);
     J.setZero(2 * n, n);
     for (int i = 0; i < count; ++i) {
@@ -159,19 +151,20 @@ bool hold_at_rest(const RestEquation& equation, VecX& x) {
     VecX lack, there, ahead;
     MatX J, J_there;
     lack_of_rest(equation, x, lack, J);
-    for (int it = 0; it < max_load_newton; ++it) {
+    for (int it = 0; it < load_dependent_parameters.max_newton; ++it) {
         VecX alpha;
         FrictionLimits limits;
         equation.respond(x, alpha, limits);
-        if (lack.cwiseAbs().maxCoeff() <= within * largest_force_in_play(equation, x, limits)) return true;
+        if (lack.cwiseAbs().maxCoeff() <= load_dependent_parameters.within * largest_force_in_play(equation, x, limits))
+            return true;
         const VecX step = least_squares(J, lack, response_rank_threshold);
         const double now = lack.norm();
         double length = 1.0;
         bool gains = false;
-        for (int halving = 0; halving < max_load_halvings && !gains; ++halving, length *= 0.5) {
+        for (int halving = 0; halving < load_dependent_parameters.max_halvings && !gains; ++halving, length *= 0.5) {
             ahead = x - length * step;
             lack_of_rest(equation, ahead, there, J_there);
-            gains = there.norm() < (1.0 - min_residual_gain * length) * now;
+            gains = there.norm() < (1.0 - load_dependent_parameters.min_residual_gain * length) * now;
         }
         if (!gains) return false;
         x = ahead;
@@ -183,20 +176,20 @@ bool hold_at_rest(const RestEquation& equation, VecX& x) {
 
 bool refine_rest(const RestEquation& equation, VecX& x) {
     double error = equation.error(x);
-    for (int it = 0; it < max_load_newton && error > load_equation_tolerance; ++it) {
+    for (int it = 0; it < load_dependent_parameters.max_newton && error > load_dependent_parameters.tolerance; ++it) {
         const VecX step = newton_step(equation, x, equation.residual(x));
         double length = 1.0, there = HUGE_VAL;
         VecX ahead;
-        for (int halving = 0; halving < max_load_halvings; ++halving, length *= 0.5) {
+        for (int halving = 0; halving < load_dependent_parameters.max_halvings; ++halving, length *= 0.5) {
             ahead = x - length * step;
             there = equation.error(ahead);
-            if (there < (1.0 - load_newton_decrease * length) * error) break;
+            if (there < (1.0 - load_dependent_parameters.decrease * length) * error) break;
         }
         if (!(there < error)) break;
         x = ahead;
         error = there;
     }
-    return error <= load_equation_stall_tolerance;
+    return error <= load_dependent_parameters.stall_tolerance;
 }
 
 VecX onset_accelerations(const RestEquation& equation, const VecX& x) {
@@ -218,7 +211,7 @@ bool solve_rest(const RestEquation& equation, VecX& x) {
     if (!found) found = follow_path(equation, x = guess);
     if (!found) return false;
     const VecX at_limits = Turns(equation).next(x);  // slipping forces are exactly at their limits
-    if (equation.error(at_limits) <= load_equation_tolerance + equation.error(x)) x = at_limits;
+    if (equation.error(at_limits) <= load_dependent_parameters.tolerance + equation.error(x)) x = at_limits;
     return true;
 }
 

@@ -10,14 +10,18 @@
 
 namespace pn {
 
-// Slope of the distance along the segment that counts as zero, due to rounding.
-constexpr double level_line = 1e-15;
-// Curvature of the distance times half the segment, below which all points of the segment are equally near.
-constexpr double straight_line = 1e-12;
-// Slope at the nearest point beyond which this point is a kink of the distance, inside the solid.
-constexpr double kink = 1e-9;
-// Maximum number of evaluations. Bisection alone ends within this number, and Newton's method takes three to eight.
-constexpr int most_line_looks = 100;
+struct SegmentSearchParameters {
+    // Slope of the distance along the segment that counts as zero, due to rounding.
+    double level = 1e-15;
+    // Curvature of the distance times half the segment, below which all points of the segment are equally near.
+    double straight = 1e-12;
+    // Slope at the nearest point beyond which this point is a kink of the distance, inside the solid.
+    double kink = 1e-9;
+    // Maximum number of evaluations. Bisection alone ends within this number, and Newton's method takes three to eight.
+    int most_looks = 100;
+};
+
+inline constexpr SegmentSearchParameters segment_search_parameters{};
 
 template <class Sides>
 struct NearestAlongLine {
@@ -37,11 +41,11 @@ struct NearestAlongLine {
         if (half == 0.0) return;
         Scalar low = -half, high = half, steepest = HUGE_VAL;
         bool low_seen = false, high_seen = false;
-        for (int look = 0; look < most_line_looks; ++look) {
+        for (int look = 0; look < segment_search_parameters.most_looks; ++look) {
             if (look > 0) at = OnSolid(there(s), solid);
             const Scalar slope = e.dot(at.n), steep = slope < 0.0 ? -slope : slope;
             bend = e.dot(at.turning(e));
-            if (!(steep > level_line)) break;
+            if (!(steep > segment_search_parameters.level)) break;
             const bool fast = steep < 0.5 * steepest && bend > 0.0;
             steepest = steep;
             (slope > 0.0 ? high : low) = part;
@@ -56,7 +60,8 @@ struct NearestAlongLine {
             part = next;
         }
         const Scalar slope = e.dot(at.n);
-        free = part > -half && part < half && bend * half > straight_line && slope * slope < kink * kink;
+        free = part > -half && part < half && bend * half > segment_search_parameters.straight &&
+               slope * slope < segment_search_parameters.kink * segment_search_parameters.kink;
         if (!free) return;
         part = part - slope / bend;
         at = OnSolid(there(s), solid);

@@ -12,17 +12,20 @@
 
 namespace pn {
 
-// Slope of the distance around a rim that counts as zero, due to rounding.
-constexpr double level_rim = 1e-15;
-// Curvature of the distance times the radius, below which all points of a rim are equally near.
-constexpr double straight_rim = 1e-12;
-// Slope at the nearest point beyond which this point is a kink of the distance, inside the solid.
-constexpr double rim_kink = 1e-9;
-// Maximum number of evaluations. Bisection alone ends within this number, and Newton's method takes three to eight.
-constexpr int most_rim_looks = 80;
-// Bisections over the chords of a disk, and half angle [rad] of the arc in which Newton's method continues from the result.
-constexpr int most_chords = 40;
-constexpr double beside_chords = 1e-3;
+struct RimSearchParameters {
+    // Slope of the distance around a rim that counts as zero, due to rounding.
+    double level = 1e-15;
+    // Curvature of the distance times the radius, below which all points of a rim are equally near.
+    double straight = 1e-12;
+    // Slope at the nearest point beyond which this point is a kink of the distance, inside the solid.
+    double kink = 1e-9;
+    // Maximum number of evaluations. Bisection alone ends within this number, and Newton's method takes three to eight.
+    int most_looks = 80;
+    int most_chords = 40;         // bisections over the chords of a disk
+    double beside_chords = 1e-3;  // half angle [rad] of the arc in which Newton's method continues from their result
+};
+
+inline constexpr RimSearchParameters rim_search_parameters{};
 
 // Point of body 1 and the nearest point of a solid on body 2. As body 1 moves, the point slides along the first `free`
 // directions of `along` and stays the nearest. It slides around a rim (1), on a side (2), or not at all (0). `bend`
@@ -69,15 +72,17 @@ struct NearestAroundRim {
         Way now = start(s, out.at);
         Arc arc{{now.y, -now.x}, {-now.y, now.x}};
         Scalar steepest = HUGE_VAL;
-        for (int look = 0; look < most_rim_looks; ++look) {
+        for (int look = 0; look < rim_search_parameters.most_looks; ++look) {
             const OnSolid at = nearest(s, solid, now);
             const Way slope = slope_of(at);
-            if (!(dot(slope, slope) > level_rim * level_rim)) break;  // the solid lies below the whole disk
+            if (!(dot(slope, slope) > rim_search_parameters.level * rim_search_parameters.level))
+                break;  // the solid lies below the whole disk
             const Scalar around = cross(now, slope), outward = dot(now, slope), steep = around < 0.0 ? -around : around;
-            if (!(steep > level_rim) && !(outward > 0.0)) break;
+            if (!(steep > rim_search_parameters.level) && !(outward > 0.0)) break;
             if (!cut(arc, now, slope)) {
                 now = of_chords(s, solid, now);
-                arc = {turned(now, Scalar(-beside_chords)), turned(now, Scalar(beside_chords))};
+                arc = {turned(now, Scalar(-rim_search_parameters.beside_chords)),
+                       turned(now, Scalar(rim_search_parameters.beside_chords))};
                 continue;
             }
             const Scalar bend = radius * curvature(at, now) - outward;
@@ -107,7 +112,7 @@ private:
         bool holds(const Way& way) const { return cross(low, way) > 0.0 && cross(way, high) > 0.0; }
         Way middle() const {
             const Way sum{low.x + high.x, low.y + high.y};
-            return dot(sum, sum) > level_rim ? unit(sum) : Way{-low.y, low.x};
+            return dot(sum, sum) > rim_search_parameters.level ? unit(sum) : Way{-low.y, low.x};
         }
     };
     // Cut the arc along the chord through a point of the arc. Returns false if a piece would remain at either end.
@@ -129,7 +134,7 @@ private:
         const Vec along = out(way), beside = around(way);
         Way found = way;
         double low = -1.0, high = 1.0;
-        for (int look = 0; look < most_chords; ++look) {
+        for (int look = 0; look < rim_search_parameters.most_chords; ++look) {
             const double part = 0.5 * (low + high), half = radius * std::sqrt(1.0 - part * part);
             const NearestAlongLine<Sides> line(s, solid, middle + radius * part * beside, along, half);
             const bool inside = half > line.part && -half < line.part;
@@ -155,7 +160,7 @@ private:
     // over a face.
     Way start(const Sides& s, const OnSolid& at) const {
         const Way slope = slope_of(at);
-        if (dot(slope, slope) > level_rim) return unit({-slope.x, -slope.y});
+        if (dot(slope, slope) > rim_search_parameters.level) return unit({-slope.x, -slope.y});
         const Vec toward = s.b.x - middle;
         const Way there{toward.dot(ex), toward.dot(ey)};
         return dot(there, there) > 0.0 ? unit(there) : Way{Scalar(1.0), Scalar(0.0)};
@@ -167,7 +172,10 @@ private:
             out.at = nearest(s, solid, now);
             out.bend[0] = curvature(out.at, now) - this->out(now).dot(out.at.n) / radius;
             const Scalar slope = out.at.n.dot(out.along[0]);
-            out.free = out.bend[0] * radius > straight_rim && slope * slope < rim_kink * rim_kink ? 1 : 0;
+            out.free = out.bend[0] * radius > rim_search_parameters.straight &&
+                               slope * slope < rim_search_parameters.kink * rim_search_parameters.kink
+                           ? 1
+                           : 0;
             if (out.free == 0) return;
             if (step == 0) now = turned(now, -slope / (out.bend[0] * radius));
         }

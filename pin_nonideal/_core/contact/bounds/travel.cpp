@@ -7,17 +7,6 @@ namespace pn {
 
 namespace {
 
-// Safety factor of the travel, for the moves of projections.
-constexpr double way_factor = 2.0;
-// Sliding joints get a margin before levers are recomputed: this fraction of the distance, plus this many steps.
-constexpr double room_ahead = 0.5, travel_steps_ahead = 4.0;
-// Factor that makes a floating-point sum an upper bound.
-constexpr double rounded_up = 1.0 + 0x1p-51;
-// Factor that makes a floating-point sum over all joints an upper bound.
-constexpr double joints_rounded_up = 1.0 + 1e-12;
-// Minimum lever of a joint with a limit: one unit of the joint counts as one meter of its body.
-constexpr double lever_of_stop = 1.0;
-
 // Extents of a contact's geometry from its frames, without planes.
 struct Extents { double first = 0.0, second = 0.0; };
 
@@ -43,21 +32,21 @@ bool slides(JointKind kind) { return kind != JointKind::revolute && kind != Join
 }  // namespace
 
 static void add(const std::vector<double>& parts, std::vector<double>& sums) {
-    for (size_t i = 0; i < sums.size(); ++i) sums[i] = (sums[i] + parts[i]) * rounded_up;
+    for (size_t i = 0; i < sums.size(); ++i) sums[i] = (sums[i] + parts[i]) * WayBound::parameters.rounded_up;
 }
 
 void Ways::add_bodies() {
     add(body_step, body);
     add(joint_step, joint);
     add(turn_step, turn);
-    most = scene = (scene + scene_step) * rounded_up;
+    most = scene = (scene + scene_step) * WayBound::parameters.rounded_up;
 }
 
 void Ways::go_on() {
     if (summed) return add_bodies();
     add(slid_step, slid);
     add(turned_step, turned);
-    most = (most + most_step) * rounded_up;
+    most = (most + most_step) * WayBound::parameters.rounded_up;
 }
 
 WayBound::WayBound(const Program& program)
@@ -71,7 +60,7 @@ WayBound::WayBound(const Program& program)
         int ends[] = {0, 0};
         if (const auto* limit = std::get_if<LimitRow>(&block.kind)) {
             pair.joint = ends[0] = limit->joint;
-            extent_[limit->joint] = std::max(extent_[limit->joint], lever_of_stop);
+            extent_[limit->joint] = std::max(extent_[limit->joint], parameters.lever_of_stop);
         } else if (const auto [first, second] = frames(block.kind); first && !p.is_users(static_cast<int>(gap))) {
             pair.first = ends[0] = first->joint;
             pair.second = ends[1] = second->joint;
@@ -129,7 +118,8 @@ void WayBound::set_levers(const Terms& terms, Ways& ways) const {
         const Body &own = terms.body[i], &before = terms.body[parent];
         double apart = (own.ref + own.p - before.ref - before.p).norm();
         if (slides(moved->kind)) {
-            const double room = room_ahead * apart + travel_steps_ahead * (ways.slid_step[i] + ways.turned_step[i]);
+            const double room =
+                parameters.room_ahead * apart + parameters.steps_ahead * (ways.slid_step[i] + ways.turned_step[i]);
             ways.slid_until[i] = ways.joint[i] + room;
             apart += room;
         }
@@ -140,7 +130,7 @@ void WayBound::set_levers(const Terms& terms, Ways& ways) const {
 
 // Travel not yet summed uses the old levers.
 void WayBound::step(const Terms& terms, const VecX& speed, double h, Ways& ways) const {
-    const double time = way_factor * h;
+    const double time = parameters.way_factor * h;
     bool far = !ways.placed;
     for (const Moved& moved : moved_) {
         const int i = moved.joint;
@@ -159,7 +149,7 @@ void WayBound::step(const Terms& terms, const VecX& speed, double h, Ways& ways)
     ways.most_step = 0.0;
     for (const Moved& moved : moved_)
         ways.most_step += ways.slid_step[moved.joint] + ways.turned_step[moved.joint] * ways.lever[moved.joint];
-    ways.most_step *= joints_rounded_up;
+    ways.most_step *= parameters.joints_rounded_up;
 }
 
 // Propagate along the tree: the travel of a body is that of its parent plus that of its joint.

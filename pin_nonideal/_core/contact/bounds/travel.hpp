@@ -30,8 +30,24 @@ struct Ways {
     void add_bodies();
 };
 
+struct TravelBoundParameters {
+    // Safety factor of the travel, for the moves of projections.
+    double way_factor = 2.0;
+    // Sliding joints get a margin before levers are recomputed: this fraction of the distance, plus this many steps.
+    double room_ahead = 0.5, steps_ahead = 4.0;
+    // Factor that makes a floating-point sum an upper bound.
+    double rounded_up = 1.0 + 0x1p-51;
+    // Factor that makes a floating-point sum over all joints an upper bound.
+    double joints_rounded_up = 1.0 + 1e-12;
+    // Minimum lever of a joint with a limit: one unit of the joint counts as one meter of its body.
+    double lever_of_stop = 1.0;
+};
+
 class WayBound {
 public:
+    using Parameters = TravelBoundParameters;
+    static constexpr Parameters parameters{};
+
     explicit WayBound(const Program& p);
 
     void size(Ways& ways) const;

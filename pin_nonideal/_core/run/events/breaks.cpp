@@ -15,19 +15,6 @@ namespace pn {
 
 namespace {
 
-// Maximum change of a continuous rate, relative to 1 + the largest velocity.
-constexpr double break_rate_rounding = 1e-11;
-// Thresholds that start the search for a jump. `unexplained`: change of the rate beyond the integral of the
-// accelerations, relative to the rate. `uneven`: change of the acceleration, relative to the acceleration.
-constexpr double unexplained = 1e-4, uneven = 0.2;
-// A jump keeps at least this fraction of the initial defect in one half of each bisected interval. A smooth function
-// keeps less.
-constexpr double kept_part = 0.3;
-// Maximum jump of a value [m or rad]. Larger jumps raise a Failure.
-constexpr double value_jump = 1e-9;
-// Number of intervals of an adaptive step in which a user function is checked. Adaptive steps can be long.
-constexpr int adaptive_intervals = 16;
-
 struct Probe {
     double t;
     Jet f;
@@ -57,7 +44,7 @@ double acceleration_change(const Probe& a, const Probe& b) { return std::abs(b.f
 // Return the first point after the jump that causes most of the defect, to neighboring floating-point times. Return
 // nothing if the function is smooth.
 std::optional<Probe> find_jump(const TimeFunction& f, Probe& a, Probe b, double (*defect)(const Probe&, const Probe&)) {
-    const double least = kept_part * defect(a, b);
+    const double least = Breaks::parameters.kept_part * defect(a, b);
     for (;;) {
         const double middle = a.t + 0.5 * (b.t - a.t);
         if (!(a.t < middle && middle < b.t)) return b;
@@ -106,7 +93,7 @@ bool Breaks::pass() {
     enter();
     const std::vector<double> after = rates(progress_.t);
     system_.read(progress_.y);
-    const double allowed = break_rate_rounding * (1.0 + system_.v.cwiseAbs().maxCoeff());
+    const double allowed = parameters.rate_rounding * (1.0 + system_.v.cwiseAbs().maxCoeff());
     bool jumps = false;
     for (size_t i = 0; i < motions_.size(); ++i) jumps |= std::abs(after[i] - before[i]) > allowed;
     if (jumps) {
@@ -152,7 +139,7 @@ void Breaks::jump(const std::vector<double>& before, const std::vector<double>& 
 
 void Breaks::tell(const std::vector<double>& before, const std::vector<double>& after, const VecX& v_minus,
                   const VecX& impulse) {
-    const double allowed = break_rate_rounding * (1.0 + v_minus.cwiseAbs().maxCoeff());
+    const double allowed = parameters.rate_rounding * (1.0 + v_minus.cwiseAbs().maxCoeff());
     for (size_t i = 0; i < motions_.size(); ++i) {
         if (!(std::abs(after[i] - before[i]) > allowed)) continue;
         const Block& block = p.blocks[motions_[i].block];
@@ -163,7 +150,7 @@ void Breaks::tell(const std::vector<double>& before, const std::vector<double>& 
 }
 
 void Breaks::look(double end, bool adaptive) {
-    const int intervals = adaptive ? adaptive_intervals : 1;
+    const int intervals = adaptive ? parameters.adaptive_intervals : 1;
     end = w.now.row_time(end);
     for (const Motion& motion : motions_) {
         const TimeFunction& f = *motion.function;
@@ -175,15 +162,16 @@ void Breaks::look(double end, bool adaptive) {
         for (int k = 1; k <= intervals && !found; ++k) {
             const Probe a = before, b = probe(f, begin + (end - begin) * k / intervals);
             if (!(a.t < b.t)) break;
-            if (rate_defect(a, b) > unexplained * rate_size(a, b)) found = find_jump(f, before, b, rate_defect);
+            if (rate_defect(a, b) > parameters.unexplained * rate_size(a, b))
+                found = find_jump(f, before, b, rate_defect);
             if (found) break;
             before = a;
-            if (acceleration_change(a, b) > uneven * std::max(std::abs(a.f[2]), std::abs(b.f[2])))
+            if (acceleration_change(a, b) > parameters.uneven * std::max(std::abs(a.f[2]), std::abs(b.f[2])))
                 found = find_jump(f, before, b, acceleration_change);
             if (!found) before = b;
         }
         if (!found) continue;
-        if (std::abs(found->f[0] - before.f[0]) > value_jump)
+        if (std::abs(found->f[0] - before.f[0]) > parameters.value_jump)
             throw Failure(Failure::Kind::closure, found->t, {motion.block}, std::abs(found->f[0] - before.f[0]));
         if (found->t < progress_.detected_break) progress_.detected_break = found->t;
         enter();

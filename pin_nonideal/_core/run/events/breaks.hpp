@@ -10,8 +10,26 @@
 
 namespace pn {
 
+struct BreaksParameters {
+    // Maximum change of a continuous rate, relative to 1 + the largest velocity.
+    double rate_rounding = 1e-11;
+    // Thresholds that start the search for a jump. `unexplained`: change of the rate beyond the integral of the
+    // accelerations, relative to the rate. `uneven`: change of the acceleration, relative to the acceleration.
+    double unexplained = 1e-4, uneven = 0.2;
+    // A jump keeps at least this fraction of the initial defect in one half of each bisected interval. A smooth
+    // function keeps less.
+    double kept_part = 0.3;
+    // Maximum jump of a value [m or rad]. Larger jumps raise a Failure.
+    double value_jump = 1e-9;
+    // Number of intervals of an adaptive step in which a user function is checked. Adaptive steps can be long.
+    int adaptive_intervals = 16;
+};
+
 class Breaks {
 public:
+    using Parameters = BreaksParameters;
+    static constexpr Parameters parameters{};
+
     Breaks(System& system, Progress& progress, Output& output, Recording& out);
 
     // Set the stretch between the last break and the next one at the current time, or at another one. Rows are evaluated
@@ -38,7 +56,8 @@ private:
 
     std::vector<double> rates(double t) const;
     void jump(const std::vector<double>& before, const std::vector<double>& after);
-    void tell(const std::vector<double>& before, const std::vector<double>& after, const VecX& v_minus, const VecX& impulse);
+    void tell(const std::vector<double>& before, const std::vector<double>& after, const VecX& v_minus,
+              const VecX& impulse);
 
     const Program& p;
     Workspace& w;

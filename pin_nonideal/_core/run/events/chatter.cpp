@@ -4,19 +4,6 @@
 
 namespace pn {
 
-namespace {
-
-// Number of events within `chatter_time` that starts a stretch of time stepping with `chatter_steps` steps. If events
-// crowd again right after it, the next stretch is longer by `chatter_growth`, up to `longest_chatter` [s].
-constexpr int chatter_events = 60;
-// Number of instants with mode changes within `chatter_time` that counts as an accumulation (Zeno) if the last one
-// finds no motion.
-constexpr size_t dwindling_events = 6;
-constexpr int chatter_steps = 50;
-constexpr double chatter_growth = 2.0, longest_chatter = 1e-2;
-
-}  // namespace
-
 Clusters::Clusters(System& system, Progress& progress, const Options& options, StiffnessGuard& stiffness,
                    TimeStepping& time_stepping, Recording& out)
     : w(system.w), progress_(progress), options_(options), stiffness_(stiffness), time_stepping_(time_stepping),
@@ -24,10 +11,10 @@ Clusters::Clusters(System& system, Progress& progress, const Options& options, S
 
 bool Clusters::bridge(int element, double t_end) {
     std::vector<double>& recent = progress_.recent_event_times;
-    if (recent.size() > chatter_events) recent.erase(recent.begin());
-    if (recent.size() < chatter_events || progress_.t - recent.front() > chatter_time) return false;
+    if (recent.size() > parameters.events) recent.erase(recent.begin());
+    if (recent.size() < parameters.events || progress_.t - recent.front() > parameters.window) return false;
     if (!options_.method.outside()) {
-        stiffness_.require_time_steps(next_stretch() / chatter_steps);
+        stiffness_.require_time_steps(next_stretch() / parameters.steps);
         step_over(element, t_end);
         return true;
     }
@@ -39,13 +26,13 @@ bool Clusters::bridge(int element, double t_end) {
 void Clusters::remember() {
     std::vector<double>& last = progress_.mode_change_times;
     if (!last.empty() && last.back() == progress_.t) return;
-    if (last.size() == dwindling_events) last.erase(last.begin());
+    if (last.size() == parameters.dwindling_events) last.erase(last.begin());
     last.push_back(progress_.t);
 }
 
 bool Clusters::dwindles() const {
     const std::vector<double>& last = progress_.mode_change_times;
-    return last.size() == dwindling_events && progress_.t - last.front() <= chatter_time;
+    return last.size() == parameters.dwindling_events && progress_.t - last.front() <= parameters.window;
 }
 
 // Return the length [s] of the next stretch: twice the last one if events crowded again right after it.
@@ -53,14 +40,14 @@ double Clusters::next_stretch() const {
     const std::vector<double>& recent = progress_.recent_event_times;
     const double first = recent.empty() ? progress_.t : recent.front();
     const bool again = progress_.bridged_time > 0.0 && first - progress_.bridged_end < progress_.bridged_time;
-    return again ? std::min(chatter_growth * progress_.bridged_time, longest_chatter) : chatter_time;
+    return again ? std::min(parameters.growth * progress_.bridged_time, parameters.longest) : parameters.window;
 }
 
 void Clusters::step_over(int element, double t_end) {
     progress_.bridged_time = next_stretch();
     progress_.recent_event_times.clear();
     progress_.mode_change_times.clear();
-    const double dt = progress_.bridged_time / chatter_steps;
+    const double dt = progress_.bridged_time / parameters.steps;
     out_.events.push_back({progress_.t, Event::Kind::chatter, element});
     const double stop = std::min(t_end, progress_.t + progress_.bridged_time);
     w.state.seeks_directions = false;

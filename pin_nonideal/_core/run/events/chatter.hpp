@@ -6,10 +6,23 @@
 
 namespace pn {
 
-constexpr double chatter_time = 1e-4;  // window of the event count, and shortest stretch of time stepping [s]
+struct ChatterParameters {
+    // Number of events within `window` that starts a stretch of time stepping.
+    int events = 60;
+    // Number of instants with mode changes within `window` that counts as an accumulation (Zeno) if the last one
+    // finds no motion.
+    size_t dwindling_events = 6;
+    int steps = 50;  // steps of a stretch
+    // Growth of the stretch if events crowd again right after it, and longest stretch [s].
+    double growth = 2.0, longest = 1e-2;
+    double window = 1e-4;  // window of the event count, and shortest stretch of time stepping [s]
+};
 
 class Clusters {
 public:
+    using Parameters = ChatterParameters;
+    static constexpr Parameters parameters{};
+
     Clusters(System& system, Progress& progress, const Options& options, StiffnessGuard& stiffness,
              TimeStepping& time_stepping, Recording& out);
 

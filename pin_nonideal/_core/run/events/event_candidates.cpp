@@ -12,28 +12,15 @@
 
 namespace pn {
 
-namespace {
-
-// Rounding tolerance of the force / limit ratio at the stages.
-constexpr double share_rounding = 1e-9;
-// Safety margins of the force / limit ratio between the stages. The first is a factor on the rise of a parabola above
-// three stages, the second a fraction of the ratio's range.
-constexpr double times_parabola = 3.0, range_between = 0.02;
-// Allowed reverse speed of an element that has just begun to slip, relative to the speed of rest.
-constexpr double fresh_slip = 1e-3;
-// A minimum speed between two stages counts as a dip below zero if it is below this fraction of the speeds' range. The
-// error of the cubics through the stages is smaller.
-constexpr double dip_part = 0.02;
-
-}  // namespace
-
 // Return the reverse slip speed up to which an element has not stopped.
 double EventCandidates::noise() const {
-    return fresh_slip * rest_speed * (1.0 + system_.velocity(stepper_.y1).cwiseAbs().maxCoeff());
+    return parameters.fresh_slip * rest_speed * (1.0 + system_.velocity(stepper_.y1).cwiseAbs().maxCoeff());
 }
 
 double EventCandidates::allowance(int e) const {
-    return w.state.lingers[e] ? raised_rest_speed * (1.0 + system_.velocity(stepper_.y0).cwiseAbs().maxCoeff()) : 0.0;
+    return w.state.lingers[e]
+               ? parameters.raised_rest_speed * (1.0 + system_.velocity(stepper_.y0).cwiseAbs().maxCoeff())
+               : 0.0;
 }
 
 // Check if a sticking element is beyond its limit at the step's end, or may have been between two stages.
@@ -46,13 +33,15 @@ bool EventCandidates::may_reach_limit(int e) {
         most = std::max(most, share(k));
     }
     const double range = most - least;
-    if (range <= share_rounding) return most > 1.0 + share_rounding || least < -1.0 - share_rounding;
+    if (range <= parameters.share_rounding)
+        return most > 1.0 + parameters.share_rounding || least < -1.0 - parameters.share_rounding;
     for (size_t k = 2; k < looks.size(); ++k) {
         const double t0 = looks[k - 2].part, t1 = looks[k - 1].part, t2 = looks[k].part;
         rise = std::max({rise, rise_between(t0, share(k - 2), t1, share(k - 1), t2, share(k)),
                          rise_between(t0, -share(k - 2), t1, -share(k - 1), t2, -share(k))});
     }
-    return std::max(most, -least) + times_parabola * rise + range_between * range > 1.0 + release_limit_rounding;
+    return std::max(most, -least) + parameters.times_parabola * rise + parameters.range_between * range >
+           1.0 + parameters.release_limit_rounding;
 }
 
 // Check if a slipping element has reversed at the step's end, or may have done so inside.
@@ -74,7 +63,7 @@ bool EventCandidates::dips(int e) const {
     }
     if (below) return true;
     if (most <= allowed - below_rest) return false;  // held by sticking elements, it never left rest
-    const double dip = dip_part * (most - least);
+    const double dip = parameters.dip_part * (most - least);
     for (size_t k = 0; k + 1 < looks.size(); ++k) {
         const double length = (looks[k + 1].part - looks[k].part) * stepper_.h;
         const double from = speed(k), to = speed(k + 1), leaves = length * system_.slip_rate(*looks[k].rate, e),
@@ -113,7 +102,8 @@ bool EventCandidates::may_pull(int gap) {
     for (size_t k = 2; k < looks.size(); ++k)
         fall = std::max(fall, rise_between(looks[k - 2].part, -load(k - 2), looks[k - 1].part, -load(k - 1),
                                            looks[k].part, -load(k)));
-    return least - times_parabola * fall - range_between * (most - least) < -load_rounding(p, w, gap);
+    return least - parameters.times_parabola * fall - parameters.range_between * (most - least) <
+           -load_rounding(p, w, gap);
 }
 
 std::vector<Watch> EventCandidates::find() {
@@ -130,7 +120,8 @@ std::vector<Watch> EventCandidates::find() {
     if (!w.now.rows.redundant)  // redundant loads are checked together
         for (int i : w.now.touching)
             if (!is_bare(p, i) && may_pull(i)) list.push_back({Watch::Kind::load, i});
-    for (const GapSearch::Candidate& candidate : gaps_.find_candidates()) list.push_back({Watch::Kind::gap, candidate.gap});
+    for (const GapSearch::Candidate& candidate : gaps_.find_candidates())
+        list.push_back({Watch::Kind::gap, candidate.gap});
     return list;
 }
 

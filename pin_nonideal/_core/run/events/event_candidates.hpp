@@ -14,20 +14,35 @@
 
 namespace pn {
 
-// Rounding of the margin of a sticking element under a constant force, relative to the friction limit.
-constexpr double release_limit_rounding = 1e-12;
-// Slip that may remain if sticking rows are almost redundant, relative to 1 + the largest speed of the scene [rad/s or
-// m/s]. Such rows amplify rounding.
-constexpr double raised_rest_speed = 1e-9;
-
 // Margin that may cross zero inside the step.
 struct Watch {
     enum class Kind { slip, stick, contact, load, gap } kind;
     int index;  // index of the friction element, the bilateral contact or the gap
 };
 
+struct EventCandidatesParameters {
+    // Rounding tolerance of the force / limit ratio at the stages.
+    double share_rounding = 1e-9;
+    // Safety margins of the force / limit ratio between the stages. The first is a factor on the rise of a parabola
+    // above three stages, the second a fraction of the ratio's range.
+    double times_parabola = 3.0, range_between = 0.02;
+    // Allowed reverse speed of an element that has just begun to slip, relative to the speed of rest.
+    double fresh_slip = 1e-3;
+    // A minimum speed between two stages counts as a dip below zero if it is below this fraction of the speeds' range.
+    // The error of the cubics through the stages is smaller.
+    double dip_part = 0.02;
+    // Rounding of the margin of a sticking element under a constant force, relative to the friction limit.
+    double release_limit_rounding = 1e-12;
+    // Slip that may remain if sticking rows are almost redundant, relative to 1 + the largest speed of the scene [rad/s
+    // or m/s]. Such rows amplify rounding.
+    double raised_rest_speed = 1e-9;
+};
+
 class EventCandidates {
 public:
+    using Parameters = EventCandidatesParameters;
+    static constexpr Parameters parameters{};
+
     // `pulls`: true for each contact in tension at the step's start.
     EventCandidates(System& system, Stepper& stepper, const std::vector<char>& pulls, GapSearch& gaps)
         : system_(system), stepper_(stepper), p(system.p), w(system.w), pulls_(pulls), gaps_(gaps) {}

@@ -8,32 +8,41 @@
 #include <optional>
 #include <vector>
 
-#include "friction/stick_slip.hpp"
 #include "run/events/event_search.hpp"
+#include "run/events/release_location.hpp"
 
 namespace pn {
 
-struct FoundEvent {
-    enum class Kind {
-        rest_or_limit,      // a friction element comes to rest, or a sticking element reaches its limit
-        released_together,  // redundant sticking elements begin to slip, including this one
-        reversal,           // the slip of an element reverses without coming to rest
-        pull,               // a bilateral contact begins to carry tension
-        lift,               // a unilateral contact loses its load, or several together have no nonnegative loads
-        touch,              // a gap closes
-        user,               // a user function crosses zero
-    } kind;
-    int index;  // index of the friction element, the contact in tension or the gap, -1 for several gaps
-    double time;
-    bool in_vain = false;  // touch of a gap that had no load when its contact was let go
-    bool of_hand_over = false;  // lift at which closed contacts pass to other features
-
-    bool changes_modes() const { return kind != Kind::reversal && kind != Kind::pull && kind != Kind::user; }
-    bool of_gap() const { return kind == Kind::lift || kind == Kind::touch; }
+struct EventLocationParameters {
+    // Speed below which slip in several directions has come to rest in fixed steps, relative to 1 + the largest
+    // velocity. Fixed steps do not locate this rest.
+    double arrived_speed = 1e-7;
+    // Slip passes by rest if it keeps more than `rest_part` of its speed at the step's start and exceeds
+    // `passing_speed`.
+    double rest_part = 0.05, passing_speed = 1e-6;
+    // Length of a fixed step toward a rest: relative to the time to the rest, and minimum relative to the full step.
+    double part_toward_rest = 0.5, least_shortened = 1e-3;
+    // A step that misses a rest ends before it, by `part_before_rest` of the time to the rest. If slip begins with
+    // fewer than `negligible_slip` tolerances, the step may end at the rest.
+    double part_before_rest = 0.1, negligible_slip = 10.0;
+    // --- Repeated step
+    int correction_passes = 12;  // maximum Newton steps and secants for the instant
+    // Maximum number of earlier gaps that replace a crossing. The repeated step differs slightly from its interpolant,
+    // so gaps that close almost together can change their order.
+    int most_closed_before = 4;
+    // Corrections of the instant that end its location: relative to the time, and relative to the step.
+    double time_rounding = 2e-16, end_tolerance = 1e-13;
+    // Maximum move of the step's end along the rate there, relative to the step. Longer moves repeat the step. A move
+    // neglects half of its square times the change of the rate per step. A flight can be a millionth of the tried step,
+    // and a move over all of it would neglect the fall.
+    double moved_part = 1e-6;
 };
 
 class EventLocator {
 public:
+    using Parameters = EventLocationParameters;
+    static constexpr Parameters parameters{};
+
     // `slip_at_start`: slip speed at the step's start of each element with several directions. `pulls`: true for each
     // contact in tension at that time.
     EventLocator(System& system, Stepper& stepper, ErrorNorm& norm, const std::vector<double>& slip_at_start,
@@ -54,19 +63,10 @@ private:
     bool misses_rest(const Watch& watch) const;
 
     double margin_at_end(const Watch& watch);
-    void end_step_at(double size);
     void correct_end_to(double size);
     void step_onto(const Crossing& crossing);
     void correct_instant(const Crossing& crossing, double full);
     void end_before_rest();
-
-    std::optional<double> release_rate(double t, const VecX& y, const std::vector<Mode>& modes, ModeQuestion& asked);
-    std::optional<double> release_rate_at_end(const std::vector<Mode>& modes, ModeQuestion& asked);
-    double release_part(double rate, const std::vector<Mode>& modes, ModeQuestion& asked);
-    std::optional<double> release_rate_inside(const std::vector<Mode>& modes, ModeQuestion& asked);
-    std::optional<FoundEvent> release_together();
-    bool all_press();
-    std::optional<FoundEvent> lift_together();
 
     System& system_;
     Stepper& stepper_;
@@ -75,6 +75,7 @@ private:
     Workspace& w;
     const std::vector<double>& slip_at_start_;
     EventSearch search_;
+    ReleaseLocator releases_;
     std::optional<double> time_to_rest_;
 };
 

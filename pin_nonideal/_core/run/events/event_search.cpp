@@ -15,28 +15,6 @@
 
 namespace pn {
 
-namespace {
-
-constexpr int location_grid = 24;  // grid intervals of a step at which a margin is sampled first
-constexpr double location_spacing = 1.0 / location_grid;
-// A parabola through three points falls below the middle one by at most 1/8 of its second difference. Dips up to twice
-// that depth are searched.
-constexpr double parabola_part = 0.25;
-// `leap_part`: negative margin that counts as a jump, relative to the margin at the step's start. `leap_digits`:
-// relative time difference that separates two instants.
-constexpr double leap_part = 1e-3, leap_digits = 1e-15;
-// Error of a force / limit ratio that comes from an interpolant of low order, relative to its change.
-constexpr double doubted_part = 1e-2;
-// Maximum evaluations that confirm an interpolated crossing, and tolerance of the correction relative to the step. The
-// remaining error is the square of the correction, which the repeated step corrects.
-constexpr int confirmations = 3;
-constexpr double confirmed_width = 1e-4;
-// A margin jumps if more than this fraction of it is left at the interpolated crossing. The polynomial through rates
-// before and after a jump is very steep, so slope corrections are tiny wherever the jump lies.
-constexpr double left_part = 0.1;
-
-}  // namespace
-
 EventSearch::EventSearch(System& system, Stepper& stepper, const std::vector<char>& pulls, GapWatch& watch)
     : system_(system), stepper_(stepper), p(system.p), w(system.w), gaps_(system, stepper, watch),
       candidates_(system, stepper, pulls, gaps_), probe_(VecX::Zero(system.ny)), probe_rate_(probe_) {}
@@ -52,7 +30,7 @@ double EventSearch::margin(const Watch& watch, double t, const VecX& y) {
     if (watch.kind == Watch::Kind::slip) return slip_along_mode(p, w, watch.index) + candidates_.allowance(watch.index);
     system_.read(y);
     const HoldingForce held = holding_force(p, w, watch.index, t, system_.q, system_.v);
-    return held.limit * (1.0 + release_limit_rounding) - held.force.norm();
+    return held.limit * (1.0 + EventCandidates::parameters.release_limit_rounding) - held.force.norm();
 }
 
 // Only candidate gaps of the step are checked.
@@ -101,7 +79,7 @@ double EventSearch::share_error(int e) const {
     }
     if (!further)
         for (const Stepper::Look& look : stepper_.looks())
-            error = std::max(error, doubted_part * std::abs(system_.share(*look.rate, e) -
+            error = std::max(error, parameters.doubted_part * std::abs(system_.share(*look.rate, e) -
                                                             system_.share(stepper_.rates[0], e)));
     for (int k = further ? 0 : 1; k < (further ? method.further_stages : method.stages); ++k) {
         const double part = further ? method.C_further[k] : method.C[k];
@@ -117,7 +95,8 @@ double EventSearch::margin_inside(const Watch& watch, Source source, double part
     if (source == Source::shares && !of_element)
         return stepper_.interpolated_rate(part, system_.ns + 2 * system_.ne + watch.index);
     if (source == Source::shares) {
-        return 1.0 + release_limit_rounding - share_error_ - std::abs(interpolated_share(watch.index, part));
+        return 1.0 + EventCandidates::parameters.release_limit_rounding - share_error_ -
+               std::abs(interpolated_share(watch.index, part));
     }
     if (source == Source::velocities) {
         const int first = system_.nq + p.blocks[f->block].dof;
@@ -147,29 +126,30 @@ bool EventSearch::slows_down(int e, double rest) const {
 // Return `no_crossing` if it does not.
 double EventSearch::first_crossing(const Watch& watch, Source source) {
     const auto margin_at = [&](double part) { return margin_inside(watch, source, part); };
-    double g[location_grid + 1];
+    double g[parameters.grid + 1];
     g[0] = margin_at(0.0);
     const double speed = system_.velocity(stepper_.y0).cwiseAbs().maxCoeff();
     const bool slips = watch.kind == Watch::Kind::slip;
     const double rest = slips ? rest_speed * (1.0 + speed) : 0.0;
     bool begins = g[0] <= rest;
-    for (int k = 1; k <= location_grid; ++k) {
-        g[k] = margin_at(k * location_spacing);
+    for (int k = 1; k <= parameters.grid; ++k) {
+        g[k] = margin_at(k * parameters.spacing);
         if (begins && g[k] < 0.0) {
             // Slip in several directions that has just begun may first turn. It has come to rest again only if it rose
             // before. Slip that decreases from the start came to rest at the end of the last step.
             const bool turns = slips && p.frictions[watch.index].dim > 1 && !slows_down(watch.index, rest);
-            const double part = k > 1 ? 0.0 : root_after_start(location_spacing, g[1], turns ? rest : 0.0, margin_at);
+            const double part = k > 1 ? 0.0 : root_after_start(parameters.spacing, g[1], turns ? rest : 0.0, margin_at);
             if (part > 0.0 || !turns) return part;
             continue;
         }
         begins = false;
-        if (g[k] < 0.0) return root_between((k - 1) * location_spacing, g[k - 1], k * location_spacing, g[k], margin_at);
+        if (g[k] < 0.0)
+            return root_between((k - 1) * parameters.spacing, g[k - 1], k * parameters.spacing, g[k], margin_at);
         if (k == 1 || g[k - 1] > g[k - 2] || g[k - 1] > g[k]) continue;
-        if (g[k - 1] > parabola_part * (g[k - 2] - 2.0 * g[k - 1] + g[k])) continue;
+        if (g[k - 1] > parameters.parabola_part * (g[k - 2] - 2.0 * g[k - 1] + g[k])) continue;
         double value = 0.0;
-        const double dip = dip_between((k - 2) * location_spacing, k * location_spacing, margin_at, value);
-        if (value < 0.0) return root_between((k - 2) * location_spacing, g[k - 2], dip, value, margin_at);
+        const double dip = dip_between((k - 2) * parameters.spacing, k * parameters.spacing, margin_at, value);
+        if (value < 0.0) return root_between((k - 2) * parameters.spacing, g[k - 2], dip, value, margin_at);
     }
     return no_crossing;
 }
@@ -178,14 +158,14 @@ double EventSearch::first_crossing(const Watch& watch, Source source) {
 // nothing if it does not converge. Return nothing either if the margin there is still near its value at the step's
 // start, since the margin then jumps.
 std::optional<double> EventSearch::confirm(const Watch& watch, double part, double slope, double at_start) {
-    for (int it = 0; it < confirmations && slope < 0.0; ++it) {
+    for (int it = 0; it < parameters.confirmations && slope < 0.0; ++it) {
         const double here = margin_inside(watch, Source::evaluation, part);
-        if (!(std::abs(here) < left_part * std::abs(at_start))) break;
+        if (!(std::abs(here) < parameters.left_part * std::abs(at_start))) break;
         const double next = part - here / slope;
         if (!(next >= 0.0 && next <= 1.0)) break;
         const double change = std::abs(next - part);
         part = next;
-        if (change < confirmed_width) return part;
+        if (change < parameters.confirmed_width) return part;
     }
     return std::nullopt;
 }
@@ -193,8 +173,9 @@ std::optional<double> EventSearch::confirm(const Watch& watch, double part, doub
 // Return the crossing of a contact load that jumps below zero, as when a corner reaches an edge. The event lies after
 // the jump, by the smallest time difference that separates two instants. Return nothing if the load does not jump.
 std::optional<Crossing> EventSearch::behind_leap(const Watch& watch, Source from, double part) {
-    if (!(margin_inside(watch, from, part) < -leap_part * margin_inside(watch, from, 0.0))) return std::nullopt;
-    part = std::max(part, leap_digits * (std::abs(stepper_.t0) + stepper_.h) / stepper_.h);
+    if (!(margin_inside(watch, from, part) < -parameters.leap_part * margin_inside(watch, from, 0.0)))
+        return std::nullopt;
+    part = std::max(part, parameters.leap_digits * (std::abs(stepper_.t0) + stepper_.h) / stepper_.h);
     for (; part < 1.0; part *= 2.0)
         if (margin_inside(watch, from, part) < 0.0) return Crossing{watch, part, 0.0, true};
     return std::nullopt;
@@ -210,15 +191,19 @@ Crossing EventSearch::cross(const Watch& watch, Source from) {
     if (part == no_crossing) return {watch, part, 0.0};
     if (watch.kind == Watch::Kind::load)
         if (const auto crossing = behind_leap(watch, from, part)) return *crossing;
-    const double before = std::max(0.0, part - margin_slope_step), after = before + margin_slope_step;
-    return {watch, part, (margin_inside(watch, from, after) - margin_inside(watch, from, before)) / margin_slope_step};
+    const double before = std::max(0.0, part - root_search_parameters.margin_slope_step),
+                 after = before + root_search_parameters.margin_slope_step;
+    return {watch, part,
+            (margin_inside(watch, from, after) - margin_inside(watch, from, before)) /
+                root_search_parameters.margin_slope_step};
 }
 
 // Confirm a crossing of the interpolated rates on the interpolated motion.
 Crossing EventSearch::confirmed(const Crossing& told) {
     system_.read(stepper_.y1);
     if (told.watch.kind == Watch::Kind::load) {
-        const auto part = confirm(told.watch, told.part, told.slope, system_.load(stepper_.start_rate(), told.watch.index));
+        const auto part =
+            confirm(told.watch, told.part, told.slope, system_.load(stepper_.start_rate(), told.watch.index));
         return part ? Crossing{told.watch, *part, told.slope} : cross(told.watch, Source::evaluation);
     }
     const double limit = static_limits(p, w, told.watch.index, stepper_.t0 + stepper_.h, system_.q, system_.v).reach();

@@ -18,8 +18,31 @@ struct Crossing {
     bool leaps = false;  // the margin jumps below zero without a root
 };
 
+struct EventSearchParameters {
+    int grid = 24;                // grid intervals of a step at which a margin is sampled first
+    double spacing = 1.0 / grid;  // length of a grid interval, relative to the step
+    // A parabola through three points falls below the middle one by at most 1/8 of its second difference. Dips up to
+    // twice that depth are searched.
+    double parabola_part = 0.25;
+    // `leap_part`: negative margin that counts as a jump, relative to the margin at the step's start. `leap_digits`:
+    // relative time difference that separates two instants.
+    double leap_part = 1e-3, leap_digits = 1e-15;
+    // Error of a force / limit ratio that comes from an interpolant of low order, relative to its change.
+    double doubted_part = 1e-2;
+    int confirmations = 3;  // maximum evaluations that confirm an interpolated crossing
+    // Tolerance of the correction of a crossing, relative to the step. The remaining error is the square of the
+    // correction, which the repeated step corrects.
+    double confirmed_width = 1e-4;
+    // A margin jumps if more than this fraction of it is left at the interpolated crossing. The polynomial through
+    // rates before and after a jump is very steep, so slope corrections are tiny wherever the jump lies.
+    double left_part = 0.1;
+};
+
 class EventSearch {
 public:
+    using Parameters = EventSearchParameters;
+    static constexpr Parameters parameters{};
+
     // `pulls`: true for each contact in tension at the step's start.
     EventSearch(System& system, Stepper& stepper, const std::vector<char>& pulls, GapWatch& watch);
 

@@ -17,14 +17,9 @@ namespace pn {
 
 namespace {
 
-// Minimum slip speed [rad/s or m/s] that defines a slip direction.
-constexpr double directed_slip = 1e-12;
-// Rounding tolerance of the limit of a sticking element, relative to the limit.
-constexpr double held_limit_rounding = 1e-9;
-
 bool hardly_moves(const System& system, int e) {
     const double slip = slip_velocity(system.w.now, system.p.frictions[e]).norm();
-    return slip <= raised_rest_speed * (1.0 + system.v.cwiseAbs().maxCoeff());
+    return slip <= EventCandidates::parameters.raised_rest_speed * (1.0 + system.v.cwiseAbs().maxCoeff());
 }
 
 // Select the modes of all elements at rest together, and project the state. Elements that turn out to move are removed
@@ -57,8 +52,10 @@ bool shares_load(System& system, double t, const std::vector<int>& resting, int 
     bool shares = false;
     if (!p.needs_reactions && !w.now.rows.redundant) return shares;
     for (int e : resting)
-        shares |= w.state.mode[e] == sticking &&
-                  (e == held || !holding_force(p, w, e, t, system.q, system.v).is_within(held_limit_rounding));
+        shares |=
+            w.state.mode[e] == sticking &&
+            (e == held ||
+             !holding_force(p, w, e, t, system.q, system.v).is_within(event_handling_parameters.held_limit_rounding));
     return shares;
 }
 
@@ -252,7 +249,8 @@ Strike strike_contacts(System& system, double t, VecX& y, bool starts, bool boun
 void remember_directions(System& system, std::vector<double>& slip, int arrived) {
     Workspace& w = system.w;
     const auto velocity = [&](int e) { return slip_velocity(w.now, system.p.frictions[e]); };
-    const double least = arrived < 0 ? directed_slip : std::max(directed_slip, velocity(arrived).norm());
+    const double least = arrived < 0 ? event_handling_parameters.directed_slip
+                                     : std::max(event_handling_parameters.directed_slip, velocity(arrived).norm());
     for (int e : w.now.loaded) {
         const Friction& f = system.p.frictions[e];
         if (w.state.lingers[e] && !hardly_moves(system, e)) w.state.lingers[e] = 0;

@@ -9,6 +9,15 @@
 
 namespace pn {
 
+struct EventHandlingParameters {
+    // Minimum slip speed [rad/s or m/s] that defines a slip direction.
+    double directed_slip = 1e-12;
+    // Rounding tolerance of the limit of a sticking element, relative to the limit.
+    double held_limit_rounding = 1e-9;
+};
+
+inline constexpr EventHandlingParameters event_handling_parameters{};
+
 // Select new modes at (t, y), and project y onto the constraints. Without an event, as at the start of a run, every
 // element gets its mode from its velocity. The workspace ends evaluated there, with the rate in dy. Return the changes,
 // empty without an event.

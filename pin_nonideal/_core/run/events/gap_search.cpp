@@ -10,22 +10,6 @@
 
 namespace pn {
 
-namespace {
-
-// Rounding of a closed gap [m], relative to the scene's size.
-constexpr double gap_rounding = 1e-14;
-// Bound of the accelerations between the stages of an accepted step, relative to the largest one at the stages.
-constexpr double between_stages = 2.0;
-// Maximum number of samples of a gap that stays near its plane. After that it counts as closed.
-constexpr int most_looks = 4000;
-// Parts of a step at which a gap is sampled that may stay on its plane throughout.
-constexpr double plane_parts[] = {0.11, 0.29, 0.5, 0.73, 0.93};
-// Safety factor on the travel of bodies, for the moves of projections.
-constexpr double travel_factor = 2.0;
-constexpr double gap_rate_rounding = 1e-12;  // rounding of the change of a constant rate, relative to the rates
-
-}  // namespace
-
 GapSearch::GapSearch(System& system, Stepper& stepper, GapWatch& watch)
     : system_(system), stepper_(stepper), p(system.p), w(system.w), watch_(watch), start_(watch.gaps), reach_(system.p),
       speed_(VecX::Zero(system.nv)), acceleration_(speed_), probe_(VecX::Zero(system.ny)) {}
@@ -38,7 +22,7 @@ void GapSearch::bound_rates() {
         acceleration_ = acceleration_.cwiseMax(look.rate->segment(nq, nv).cwiseAbs());
     const double *v0 = stepper_.y0.data() + nq, *v1 = stepper_.y1.data() + nq;
     for (int k = 0; k < nv; ++k) {
-        acceleration_[k] *= between_stages;
+        acceleration_[k] *= parameters.between_stages;
         // The speed exceeds the mean of both ends by at most half a step of acceleration.
         speed_[k] = 0.5 * (std::abs(v0[k]) + std::abs(v1[k])) + 0.5 * stepper_.h * acceleration_[k];
     }
@@ -50,7 +34,7 @@ GapSearch::Bends GapSearch::bends(int gap, const Look& end) const {
     if (Reach::knows(p, gap)) return {reach_.bound(w, gap), reach_.rise(w, gap)};
     const double h = stepper_.h, change = (end.width - start_.width[gap]) / h;
     const double r0 = start_.rate[gap], r1 = end.rate;
-    const double most = between_stages * std::max({std::abs(6.0 * change - 4.0 * r0 - 2.0 * r1) / h,
+    const double most = parameters.between_stages * std::max({std::abs(6.0 * change - 4.0 * r0 - 2.0 * r1) / h,
                                                    std::abs(6.0 * change - 2.0 * r0 - 4.0 * r1) / h,
                                                    std::abs(gap_acceleration(p, w, gap))});
     return {most, most};
@@ -75,7 +59,7 @@ const std::vector<GapSearch::Candidate>& GapSearch::find_candidates() {
     system_.read(stepper_.y1);
     if (!unseen.empty()) look_at_starts(unseen);
     if (start_.near_gaps.empty()) return candidates_;
-    rounding_ = gap_rounding * scene_size(p, w);
+    rounding_ = parameters.gap_rounding * scene_size(p, w);
     reach_.bound_bodies(w, speed_, acceleration_, stepper_.h);
     closed_round_.clear();
     for (int i : w.now.touching)
@@ -83,7 +67,8 @@ const std::vector<GapSearch::Candidate>& GapSearch::find_candidates() {
     for (int i : start_.near_gaps) {
         follow_gap(p, w, stepper_.t0 + stepper_.h, system_.v, i);
         watch_.end.push_back(Look::here(p, w, i, 1.0));
-        if (start_.near[i] == GapState::from_the_end || travel_factor * reach_.travel(i) < start_.width[i]) continue;
+        if (start_.near[i] == GapState::from_the_end || parameters.travel_factor * reach_.travel(i) < start_.width[i])
+            continue;
         if (has_closed_copy(i)) continue;
         const Look end = above(watch_.end.back(), level_here(i, 1.0));
         const Bends bent = bends(i, end);
@@ -103,7 +88,7 @@ bool GapSearch::stays_open(int gap, const Look& a, const Look& b, double bound) 
     }
     if (has_lowest_point(p, gap)) return stays_above(a.width, b.width, 0.5 * bound * length * length, least);
     const double change = b.rate - a.rate + bound * length;  // negative: no valid bound
-    if (change <= 0.0) return change >= -gap_rate_rounding * (std::abs(a.rate) + std::abs(b.rate));
+    if (change <= 0.0) return change >= -parameters.gap_rate_rounding * (std::abs(a.rate) + std::abs(b.rate));
     const double meet = (a.width - b.width + b.rate * length + 0.5 * bound * length * length) / change;
     if (!(meet > 0.0 && meet < length)) return true;
     return a.width + meet * (a.rate - 0.5 * bound * meet) > least;
@@ -172,10 +157,10 @@ std::optional<GapSearch::Touch> GapSearch::search(int gap, const Look& a, const 
     const double length = (b.part - a.part) * stepper_.h;
     // The gap closes monotonically.
     if (b.width < -rounding_ && a.rate + bends.above * length < 0.0) return between(gap, a, b);
-    if (bends.above * length * length < rounding_ || looks_ > most_looks) {
+    if (bends.above * length * length < rounding_ || looks_ > parameters.most_looks) {
         // Bodies can slide to the next contact point, as a corner from a face onto an edge. The gap of that point then
         // comes down to zero and stays there. It does not touch before it becomes negative.
-        const bool has_closed = looks_ > most_looks && !rests && !(a.separation && slides_on(gap));
+        const bool has_closed = looks_ > parameters.most_looks && !rests && !(a.separation && slides_on(gap));
         if (a.width > 0.0 && b.width < -rounding_) return between(gap, a, b);
         if (b.width < -rounding_ || has_closed) return Touch{b.part, b.rate * stepper_.h};
         return std::nullopt;
@@ -196,7 +181,7 @@ std::optional<GapSearch::Touch> GapSearch::search(int gap, const Look& a, const 
 // Check if a gap stays on its plane over the step, as the gap of a feature that lies beside the touching one.
 bool GapSearch::stays_on_plane(int gap, const Look& a, const Look& b) {
     if (std::abs(a.width) > rounding_ || std::abs(b.width) > rounding_) return false;
-    for (double part : plane_parts)
+    for (double part : parameters.plane_parts)
         if (std::abs(look(gap, part).width) > rounding_) return false;
     return true;
 }
@@ -207,7 +192,7 @@ std::optional<GapSearch::Touch> GapSearch::first_touch(int gap) {
     const auto is_asked = [&](const Candidate& candidate) { return candidate.gap == gap; };
     const auto candidate = std::find_if(candidates_.begin(), candidates_.end(), is_asked);
     const Look start = look_at_start(gap);
-    if (stays_on_plane(gap, start, candidate->end)) looks_ = most_looks + 1;
+    if (stays_on_plane(gap, start, candidate->end)) looks_ = parameters.most_looks + 1;
     return search(gap, start, candidate->end, candidate->bends);
 }
 

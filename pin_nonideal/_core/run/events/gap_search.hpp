@@ -11,8 +11,25 @@
 
 namespace pn {
 
+struct GapSearchParameters {
+    // Rounding of a closed gap [m], relative to the scene's size.
+    double gap_rounding = 1e-14;
+    // Bound of the accelerations between the stages of an accepted step, relative to the largest one at the stages.
+    double between_stages = 2.0;
+    // Maximum number of samples of a gap that stays near its plane. After that it counts as closed.
+    int most_looks = 4000;
+    // Parts of a step at which a gap is sampled that may stay on its plane throughout.
+    double plane_parts[5] = {0.11, 0.29, 0.5, 0.73, 0.93};
+    // Safety factor on the travel of bodies, for the moves of projections.
+    double travel_factor = 2.0;
+    double gap_rate_rounding = 1e-12;  // rounding of the change of a constant rate, relative to the rates
+};
+
 class GapSearch {
 public:
+    using Parameters = GapSearchParameters;
+    static constexpr Parameters parameters{};
+
     GapSearch(System& system, Stepper& stepper, GapWatch& watch);
 
     // Candidates: gaps that may close in the step. The workspace must be evaluated at the step's end, and stays so.

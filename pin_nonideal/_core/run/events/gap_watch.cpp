@@ -8,16 +8,6 @@
 
 namespace pn {
 
-// Minimum width of a far gap, in travels of one step. Narrower gaps would be rechecked at once.
-constexpr double steps_of_far = 2.0;
-// Factors on the travel since a far gap's last sample, and on the travel in one step. The gap is monitored again if
-// their sum can close it.
-constexpr double asked_again = 2.0, watch_steps_ahead = 2.0;
-// Rounding of a difference of travels, relative to the travel so far.
-constexpr double way_rounding = 1e-15;
-// Minimum time [s] before a blocked gap is retried. Later it is retried after as long as it has been blocked.
-constexpr double least_rest = 1e-4;
-
 GapWatch::GapWatch(System& system, GapState& state)
     : gaps(state), ways(system.p), system_(system), p(system.p), w(system.w) {
     bool round = false;
@@ -37,8 +27,8 @@ void GapWatch::place(int gap) {
     gaps.far[gap] = 0;
     if (pair.unknown) return;
     gaps.apart[gap] = pair.turns ? ways.apart(w.now.terms, gap) : 0.0;
-    const double way = steps_of_far * ways.way_of_step(gaps.ways, gap);
-    const double turn = steps_of_far * gaps.ways.turn_step[pair.second];
+    const double way = parameters.steps_of_far * ways.way_of_step(gaps.ways, gap);
+    const double turn = parameters.steps_of_far * gaps.ways.turn_step[pair.second];
     if (!(gaps.width[gap] > WayBound::change(pair, way, turn, gaps.apart[gap]))) return;
     gaps.near[gap] = 0;
     gaps.far[gap] = 1;
@@ -97,13 +87,13 @@ void GapWatch::ask_far() {
     for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
         if (!gaps.far[i]) continue;
         const WayBound::Pair& pair = ways.pair(i);
-        const double way = ways.way(here, i), come = way - gaps.way[i] + way_rounding * way;
-        const double turn = here.turn[pair.second], turned = turn - gaps.turn[i] + way_rounding * turn;
+        const double way = ways.way(here, i), come = way - gaps.way[i] + parameters.way_rounding * way;
+        const double turn = here.turn[pair.second], turned = turn - gaps.turn[i] + parameters.way_rounding * turn;
         const auto is_open = [&](double times, double steps) {
             return gaps.width[i] > WayBound::change(pair, times * come + steps * ways.way_of_step(here, i),
                                                     times * turned + steps * here.turn_step[pair.second], gaps.apart[i]);
         };
-        if (is_open(asked_again, watch_steps_ahead)) {
+        if (is_open(parameters.asked_again, parameters.steps_ahead)) {
             gaps.ask = std::min(gaps.ask, here.scene + ways.least_way(pair, gaps.width[i] - come));
             continue;
         }
@@ -130,9 +120,9 @@ void GapWatch::step(const VecX& speed, double h) {
     unseen_.clear();
     Ways& here = gaps.ways;
     ways.step(w.now.terms, speed, h, here);
-    if (here.most + watch_steps_ahead * here.most_step < gaps.ask) return;
+    if (here.most + parameters.steps_ahead * here.most_step < gaps.ask) return;
     ways.sum_up(here);
-    if (!(here.scene + watch_steps_ahead * here.scene_step < gaps.ask)) ask_far();
+    if (!(here.scene + parameters.steps_ahead * here.scene_step < gaps.ask)) ask_far();
 }
 
 const std::vector<int>& GapWatch::follow(const VecX& speed, double h) {
@@ -159,7 +149,7 @@ void GapWatch::begin_time_steps(double least) {
 bool GapWatch::stays_open_in_step(int gap) const {
     const WayBound::Pair& pair = ways.pair(gap);
     if (!gaps.ways.summed || pair.unknown || pair.turns) return false;
-    return gaps.width[gap] > WayBound::change(pair, steps_of_far * ways.way_of_step(gaps.ways, gap), 0.0, 0.0);
+    return gaps.width[gap] > WayBound::change(pair, parameters.steps_of_far * ways.way_of_step(gaps.ways, gap), 0.0, 0.0);
 }
 
 const std::vector<int>& GapWatch::come(const VecX& way) {
@@ -182,7 +172,7 @@ void GapState::keep(int gap, const GapLook& look) {
 
 void GapState::ask_in_vain(int gap, double t) {
     if (rests_until[gap] == -HUGE_VAL) vain_since[gap] = t;
-    rests_until[gap] = t + std::max(least_rest, t - vain_since[gap]);
+    rests_until[gap] = t + std::max(GapWatch::parameters.least_rest, t - vain_since[gap]);
 }
 
 void GapState::find_near() {

@@ -48,8 +48,23 @@ struct GapState {
     void ask_anew() { std::fill(rests_until.begin(), rests_until.end(), -HUGE_VAL); }
 };
 
+struct GapWatchParameters {
+    // Minimum width of a far gap, in travels of one step. Narrower gaps would be rechecked at once.
+    double steps_of_far = 2.0;
+    // Factors on the travel since a far gap's last sample, and on the travel in one step. The gap is monitored again if
+    // their sum can close it.
+    double asked_again = 2.0, steps_ahead = 2.0;
+    // Rounding of a difference of travels, relative to the travel so far.
+    double way_rounding = 1e-15;
+    // Minimum time [s] before a blocked gap is retried. Later it is retried after as long as it has been blocked.
+    double least_rest = 1e-4;
+};
+
 class GapWatch {
 public:
+    using Parameters = GapWatchParameters;
+    static constexpr Parameters parameters{};
+
     GapWatch(System& system, GapState& gaps);
 
     // Sample gaps at the state that the system has read and the workspace is evaluated at. `look_at_all` samples all

@@ -15,18 +15,6 @@ namespace pn {
 
 namespace {
 
-// A jump keeps at least this part of a change in one half of each bisected interval. A smooth function keeps less.
-constexpr double kept_bias_change = 0.3;
-// Longest time [s, or relative to the time above 1 s] in which the change of the acceleration is negligible.
-constexpr double steady_time = 1e-12;
-// Time [s, or relative to the time above 1 s] in which features pass each other by more than rounding.
-constexpr double passing_time = 1e-13;
-// Part of the time to a hand-over that is left to the next step, since the acceleration changes on the way.
-constexpr double left_before_hand_over = 1e-3;
-// Width [s, or relative to the time above 1 s] of the interval that contains a hand-over. It is below the spacing of times,
-// so the state after it lies at the feature up to rounding.
-constexpr double hand_over_width = 1e-18;
-
 // Check if a gap belongs to a plane without edges, or to a joint.
 bool has_one_feature(const Program& p, int gap) {
     const Kind& kind = p.blocks[p.gaps[gap].block].kind;
@@ -40,9 +28,11 @@ HandOver::HandOver(System& system, Progress& progress)
     : system_(system), progress_(progress), p(system.p), w(system.w), move_(VecX::Zero(system.nv)),
       y_(VecX::Zero(system.ny)) {}
 
-bool HandOver::is_reached(double time) const { return time <= steady_time * std::max(1.0, std::abs(progress_.t)); }
+bool HandOver::is_reached(double time) const {
+    return time <= parameters.steady_time * std::max(1.0, std::abs(progress_.t));
+}
 
-double HandOver::step_before(double time) { return (1.0 - left_before_hand_over) * time; }
+double HandOver::step_before(double time) { return (1.0 - parameters.left_before) * time; }
 
 // Set y_ to the state after a time.
 void HandOver::move(double time) {
@@ -70,8 +60,8 @@ bool HandOver::find(int gap, double& size) {
     double low = 0.0, high = size, at_low = drift_after(low, gap), at_high = drift_after(high, gap);
     const double acceleration = p.mechanism.gravity.norm() + system_.velocity(progress_.rate).cwiseAbs().maxCoeff();
     const double scale = acceleration + std::abs(at_low);
-    const double least = std::max(kept_bias_change * std::abs(at_high - at_low), min_bias_jump * scale);
-    const double width = hand_over_width * std::max(1.0, std::abs(progress_.t));
+    const double least = std::max(parameters.kept_bias_change * std::abs(at_high - at_low), min_bias_jump * scale);
+    const double width = parameters.width * std::max(1.0, std::abs(progress_.t));
     while (high - low > width) {
         const double middle = 0.5 * (low + high);
         if (!(low < middle && middle < high)) break;
@@ -103,7 +93,7 @@ bool HandOver::is_unloaded(int gap) {
 
 // The state lies a little past the hand-over, so that rounding does not decide if another contact passes it too.
 void HandOver::pass(double time) {
-    const double past = time + passing_time * std::max(1.0, std::abs(progress_.t));
+    const double past = time + parameters.passing_time * std::max(1.0, std::abs(progress_.t));
     move(past);
     progress_.y = y_;
     progress_.t += past;

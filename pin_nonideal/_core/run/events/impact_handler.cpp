@@ -9,15 +9,6 @@
 
 namespace pn {
 
-namespace {
-
-// Energy gain of an impact that counts as rounding, relative to its works.
-constexpr double gain_rounding = 1e-12;
-// Maximum number of consecutive impacts at one instant. An impact can make other contacts approach again.
-constexpr int most_at_once = 100;
-
-}  // namespace
-
 Landing::Landing(System& system, Progress& progress, GapWatch& watch, const Options& options, Output& output,
                  Recording& out)
     : p(system.p), w(system.w), system_(system), progress_(progress), watch_(watch), options_(options), output_(output),
@@ -25,7 +16,7 @@ Landing::Landing(System& system, Progress& progress, GapWatch& watch, const Opti
 
 bool Landing::strike(bool starts) {
     int count = 0;
-    while (count < most_at_once && strike_once(starts)) ++count;
+    while (count < parameters.most_at_once && strike_once(starts)) ++count;
     return count > 0;
 }
 
@@ -39,7 +30,7 @@ bool Landing::strike_once(bool starts) {
     else progress_.numerical_energy += found.work_of_constraints;
     double size = 0.0;
     for (const Event& event : found.events) size += std::abs(event.energy_change);
-    if (!options_.strict || !(found.work > gain_rounding * size)) return true;
+    if (!options_.strict || !(found.work > parameters.gain_rounding * size)) return true;
     std::vector<int> blocks;
     for (const Event& event : found.events) blocks.push_back(event.element);
     throw Failure(Failure::Kind::impact_energy, progress_.t, blocks, found.work);

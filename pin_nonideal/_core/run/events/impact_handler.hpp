@@ -6,8 +6,18 @@
 
 namespace pn {
 
+struct ImpactHandlerParameters {
+    // Energy gain of an impact that counts as rounding, relative to its works.
+    double gain_rounding = 1e-12;
+    // Maximum number of consecutive impacts at one instant. An impact can make other contacts approach again.
+    int most_at_once = 100;
+};
+
 class Landing {
 public:
+    using Parameters = ImpactHandlerParameters;
+    static constexpr Parameters parameters{};
+
     Landing(System& system, Progress& progress, GapWatch& watch, const Options& options, Output& output, Recording& out);
 
     // Apply impacts of contacts that touch and approach each other, until none does. Return true if there was an

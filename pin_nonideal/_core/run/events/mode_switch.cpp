@@ -9,19 +9,22 @@
 
 namespace pn {
 
-// Minimum time between two forced mode switches, in tiny steps.
-static constexpr double leaving_apart = 1e3;
-// Maximum speed [m/s or rad/s] of slip that is about to rest or to begin, relative to 1 + the largest velocity.
-static constexpr double creeping = 1e-8;
-
 static bool of_modes(const Failure& failure) {
     return failure.kind == Failure::Kind::not_converged || failure.kind == Failure::Kind::paradox;
 }
 
 ModeChanges::ModeChanges(System& system, Progress& progress, const Options& options, Torques& torques, Output& output,
                          Landing& landing, Clusters& clusters, Recording& out)
-    : p(system.p), w(system.w), system_(system), progress_(progress), options_(options), torques_(torques), output_(output),
-      landing_(landing), clusters_(clusters), out_(out) {}
+    : p(system.p),
+      w(system.w),
+      system_(system),
+      progress_(progress),
+      options_(options),
+      torques_(torques),
+      output_(output),
+      landing_(landing),
+      clusters_(clusters),
+      out_(out) {}
 
 void ModeChanges::change(FoundEvent event) {
     const RunState before = w.state;
@@ -78,7 +81,7 @@ bool ModeChanges::leads_on(const Failure& failure) {
 
 bool ModeChanges::may_end(const Failure& failure) const {
     return of_modes(failure) && options_.method.adaptive() && system_.ng > 0 &&
-           progress_.t >= progress_.forced_switch_time + leaving_apart * tiny_step_at(progress_.t);
+           progress_.t >= progress_.forced_switch_time + mode_switch_parameters.leaving_apart * tiny_step_at(progress_.t);
 }
 
 bool ModeChanges::leave() {
@@ -130,7 +133,7 @@ bool ModeChanges::step_over(const Failure& failure, bool of_hand_over) {
 
 // Check if all slipping elements are about to rest.
 bool ModeChanges::creeps() const {
-    const double least = creeping * (1.0 + system_.velocity(progress_.y).cwiseAbs().maxCoeff());
+    const double least = mode_switch_parameters.creeping * (1.0 + system_.velocity(progress_.y).cwiseAbs().maxCoeff());
     const std::vector<int>& slipping = w.now.slipping;
     return !slipping.empty() && std::all_of(slipping.begin(), slipping.end(), [&](int e) {
         return slip_velocity(w.now, p.frictions[e]).norm() <= least;

@@ -8,9 +8,18 @@
 
 namespace pn {
 
-// Length of a tiny step, relative to the time, in seconds below 1 s. In shorter steps the motion itself fails.
-constexpr double tiny_step = 1e-10;
-inline double tiny_step_at(double t) { return tiny_step * std::max(1.0, std::abs(t)); }
+struct ModeSwitchParameters {
+    // Minimum time between two forced mode switches, in tiny steps.
+    double leaving_apart = 1e3;
+    // Maximum speed [m/s or rad/s] of slip that is about to rest or to begin, relative to 1 + the largest velocity.
+    double creeping = 1e-8;
+    // Length of a tiny step, relative to the time, in seconds below 1 s. In shorter steps the motion itself fails.
+    double tiny_step = 1e-10;
+};
+
+inline constexpr ModeSwitchParameters mode_switch_parameters{};
+
+inline double tiny_step_at(double t) { return mode_switch_parameters.tiny_step * std::max(1.0, std::abs(t)); }
 
 class ModeChanges {
 public:

@@ -16,13 +16,6 @@ namespace pn {
 
 namespace {
 
-// Maximum height of flights that are too low to be integrated, relative to the scene's size.
-constexpr double low_flight = 4e-12;
-// Number of flights after which the bouncing is judged. It dies out if the second half takes less than `hardly_shorter`
-// of the time of the first half. With a restitution of 1 it does not die out, and contacts that land later come to
-// rest.
-constexpr int most_bounces = 10000;
-constexpr double hardly_shorter = 0.9;
 constexpr double no_landing = std::numeric_limits<double>::infinity();
 
 struct Bouncing {
@@ -90,14 +83,14 @@ std::optional<Rest> bounce_to_rest(System& system, double t, double stop, VecX& 
     Workspace& w = system.w;
     system.read(y);
     const RunState before = w.state;
-    const Bouncing bouncing{system, low_flight * scene_size(p, w)};
+    const Bouncing bouncing{system, rebound_parameters.low_flight * scene_size(p, w)};
     const double before_energy = energy(system), before_work = system.work(y).sum();
     VecX move;
     Rest out{t, {}, 0.0};
     int bounce = 0;
     double halves[2] = {0.0, 0.0};
     bool dies_out = true;
-    for (; bounce < (dies_out ? 1 : 2) * most_bounces; ++bounce) {
+    for (; bounce < (dies_out ? 1 : 2) * rebound_parameters.most_bounces; ++bounce) {
         const Bouncing::Next next = bouncing.next(out.time);
         const double time = next.time();
         if (!next.stays_low() || out.time + time >= stop) break;
@@ -105,8 +98,9 @@ std::optional<Rest> bounce_to_rest(System& system, double t, double stop, VecX& 
         y += time * dy;
         retract(p.mechanism, system.q.data(), move.data(), y.data());
         out.time += time;
-        halves[2 * bounce >= most_bounces] += time;
-        if (bounce + 1 == most_bounces) dies_out = halves[1] < hardly_shorter * halves[0];
+        halves[2 * bounce >= rebound_parameters.most_bounces] += time;
+        if (bounce + 1 == rebound_parameters.most_bounces)
+            dies_out = halves[1] < rebound_parameters.hardly_shorter * halves[0];
         FoundEvent event{FoundEvent::Kind::touch, 0, out.time};
         if (next.rest < next.low && !contacts_land(system, out.time, y))
             event = {FoundEvent::Kind::rest_or_limit, next.element, out.time};

@@ -11,13 +11,6 @@ namespace pn {
 
 namespace {
 
-// Loads above this multiple of their rounding press surely. Contacts near each other amplify the rounding of their loads,
-// by the ratio of the size of the body to their distance.
-constexpr double surely_pressing = 1e6;
-// Maximum difference of accelerations that are the same, relative to all accelerations. Bodies that pass an edge between
-// two others have 1e-11 from rounding.
-constexpr double same_acceleration = 1e-9;
-
 std::vector<int> contacts_of_bodies(const Program& p, const Workspace& w, int gap) {
     std::vector<int> list;
     for (int i : w.now.touching)
@@ -31,7 +24,8 @@ bool needs_no_force(System& system, double t, const std::vector<int>& open, cons
     const Program& p = system.p;
     Workspace& w = system.w;
     const bool rubs = std::any_of(open.begin(), open.end(), [&](int i) { return !p.gaps[i].elements.empty(); });
-    const double least = same_acceleration * (held.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
+    const double least =
+        unloaded_contacts_parameters.same_acceleration * (held.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
     if (rubs && !((w.now.a - held).cwiseAbs().maxCoeff() <= least)) return false;
     return std::all_of(open.begin(), open.end(), [&](int i) {
         evaluate_gap(p, w, t, system.v, i);
@@ -69,7 +63,8 @@ bool is_unloaded(System& system, double t, int gap) {
     const std::vector<int> contacts = contacts_of_bodies(p, w, gap);
     double largest = 0.0;  // load, in its rounding
     for (int i : contacts) largest = std::max(largest, load(p, w, i) / load_rounding(p, w, i));
-    return largest <= 1.0 || (largest <= surely_pressing && moves_without(system, t, contacts));
+    return largest <= 1.0 ||
+           (largest <= unloaded_contacts_parameters.surely_pressing && moves_without(system, t, contacts));
 }
 
 std::vector<int> open_unloaded(System& system, double t) {

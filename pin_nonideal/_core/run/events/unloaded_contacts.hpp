@@ -7,6 +7,17 @@
 
 namespace pn {
 
+struct UnloadedContactsParameters {
+    // Loads above this multiple of their rounding press surely. Contacts near each other amplify the rounding of their
+    // loads, by the ratio of the size of the body to their distance.
+    double surely_pressing = 1e6;
+    // Maximum difference of accelerations that are the same, relative to all accelerations. Bodies that pass an edge
+    // between two others have 1e-11 from rounding.
+    double same_acceleration = 1e-9;
+};
+
+inline constexpr UnloadedContactsParameters unloaded_contacts_parameters{};
+
 // Check if the two bodies of a gap move the same without their contacts, at the state last read.
 bool is_unloaded(System& system, double t, int gap);
 

@@ -11,15 +11,6 @@ namespace pn {
 
 namespace {
 
-constexpr int looks = 5;      // samples of each step
-constexpr int corrections = 12;
-// Tolerance of the corrected end, relative to the step.
-constexpr double value_end_tolerance = 1e-14;
-// Maximum time difference of a friction event and a user event that coincide, relative to the step.
-constexpr double same_part = 1e-12;
-// Shortest step up to an event, in floating-point spacings of the time.
-constexpr double start_spacings = 8.0;
-
 double sign(double x) { return (x > 0.0) - (x < 0.0); }
 
 // Return the dofs with bounded drive effort.
@@ -71,8 +62,8 @@ void ValueEvents::start(double t, const VecX& y) {
 // A value that is zero at the start of a run has no sign. Its first sign is no event.
 double ValueEvents::first_crossing(int k) {
     double before = 0.0;
-    for (int i = 1; i <= looks; ++i) {
-        const double part = static_cast<double>(i) / looks, here = value_inside(k, part);
+    for (int i = 1; i <= parameters.looks; ++i) {
+        const double part = static_cast<double>(i) / parameters.looks, here = value_inside(k, part);
         if (side_[k] != 0 && sign(here) == -side_[k]) {
             if (counts(k)) {
                 const auto margin = [&](double x) { return side_[k] * value_inside(k, x) / std::abs(here); };
@@ -98,15 +89,16 @@ void ValueEvents::end_step_at(double size) {
 // crossing.
 void ValueEvents::step_onto(int k, double part) {
     const double full = stepper_.h, t0 = stepper_.t0;
-    const double least = start_spacings * (std::nextafter(std::abs(t0), HUGE_VAL) - std::abs(t0));
-    const double low = std::max(0.0, part - margin_slope_step), high = std::min(1.0, part + margin_slope_step);
+    const double least = parameters.start_spacings * (std::nextafter(std::abs(t0), HUGE_VAL) - std::abs(t0));
+    const double low = std::max(0.0, part - root_search_parameters.margin_slope_step),
+                 high = std::min(1.0, part + root_search_parameters.margin_slope_step);
     double slope = (value_inside(k, high) - value_inside(k, low)) / ((high - low) * full);
     double size = std::max(part * full, least);
     end_step_at(size);
     double here = value(k, t0 + size, stepper_.y1);
-    for (int i = 0; i < corrections && here != 0.0 && slope != 0.0; ++i) {
+    for (int i = 0; i < parameters.corrections && here != 0.0 && slope != 0.0; ++i) {
         const double next = std::clamp(size - here / slope, least, full), change = next - size, before = here;
-        if (std::abs(change) <= value_end_tolerance * full || t0 + next == t0 + size) break;
+        if (std::abs(change) <= parameters.end_tolerance * full || t0 + next == t0 + size) break;
         end_step_at(size = next);
         here = value(k, t0 + size, stepper_.y1);
         slope = (here - before) / change;
@@ -153,7 +145,7 @@ bool ValueEvents::locate(bool ends_at_event) {
         first = k;
     }
     side_ = side;
-    const bool at_end = ends_at_event && part > 1.0 - same_part;
+    const bool at_end = ends_at_event && part > 1.0 - parameters.same_part;
     if (first >= 0) count(first);
     if (first >= 0 && !at_end) {
         step_onto(first, part);

@@ -13,8 +13,22 @@
 
 namespace pn {
 
+struct ValueEventsParameters {
+    int looks = 5;         // samples of each step
+    int corrections = 12;  // maximum secants for the end of the step
+    // Tolerance of the corrected end, relative to the step.
+    double end_tolerance = 1e-14;
+    // Maximum time difference of a friction event and a user event that coincide, relative to the step.
+    double same_part = 1e-12;
+    // Shortest step up to an event, in floating-point spacings of the time.
+    double start_spacings = 8.0;
+};
+
 class ValueEvents {
 public:
+    using Parameters = ValueEventsParameters;
+    static constexpr Parameters parameters{};
+
     ValueEvents(const std::vector<UserEvent>& asked, System& system, Stepper& stepper, Progress& progress);
 
     bool empty() const { return count_.empty(); }

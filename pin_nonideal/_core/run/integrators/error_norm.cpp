@@ -10,33 +10,6 @@
 
 namespace pn {
 
-namespace {
-
-// Tolerance of the force of a sticking element over a step, relative to its limit.
-constexpr double share_part = 1e-4;
-// Rounding of the force of a sticking element, relative to the largest given force. Far from the loads of a long chain
-// limits are as small as that.
-constexpr double stuck_force_rounding = 64 * std::numeric_limits<double>::epsilon();
-// Shortest step [s] that resolves a load. The error of a load that jumps does not decrease with the step, so shorter
-// steps skip it.
-constexpr double shortest_resolved = 1e-9;
-// Rounding of a velocity, relative to the largest one. A joint that constraints drive slowly beside fast joints has no
-// digits below it at any step size.
-constexpr double velocity_rounding = 64 * std::numeric_limits<double>::epsilon();
-// Residuals below this multiple of the rounding of a projection are no error of a step.
-constexpr double residual_spacings = 8.0;
-// Rounding of the time in a step's stages, in floating-point spacings. It moves prescribed motions.
-constexpr double time_spacings = 4.0;
-
-// First step [Hairer, Norsett, Wanner, sec. II.4]. The move of Euler's rule is bounded relative to the size of the
-// state. The error of the method, estimated from the derivatives, is bounded relative to the tolerance.
-constexpr double first_part = 0.01;
-// Negligible norm of a state or rate, and the trial step [s] for it. Negligible second derivative, and the step for it
-// relative to the trial. Maximum growth over the trial.
-constexpr double nothing = 1e-5, smallest_trial = 1e-6, no_curvature = 1e-15, flat_part = 1e-3, most_growth = 100.0;
-
-}  // namespace
-
 ErrorNorm::ErrorNorm(System& system, double rtol, const VecX& atol, const VecX& rounding)
     : system_(system), rtol_(rtol), atol_(atol), tolerance_(VecX::Zero(2 * system.nv + system.nz)),
       tangent_(tolerance_), rounding_(rounding) {}
@@ -61,7 +34,7 @@ void ErrorNorm::set_tolerances(const VecX& y0, const VecX& y1, double h) {
     magnitude(y0);
     magnitude(y1);
     auto velocities = tolerance_.segment(system_.nv, system_.nv);
-    const double rounding = velocity_rounding * velocities.maxCoeff();
+    const double rounding = parameters.velocity_rounding * velocities.maxCoeff();
     tolerance_ = atol_ + rtol_ * tolerance_;
     velocities = velocities.cwiseMax(rounding);
     limited_ = false;
@@ -73,9 +46,9 @@ void ErrorNorm::set_tolerances(const VecX& y0, const VecX& y1, double h) {
         limited_ |= least > tolerance_[k];
         tolerance_[k] = std::max(tolerance_[k], least);
     }
-    resolves_shares_ = std::abs(h) >= shortest_resolved;
-    share_rounding_ = stuck_force_rounding * std::abs(h) * system_.w.now.F.cwiseAbs().maxCoeff();
-    share_tolerance_ = share_part * std::max(std::abs(h), shortest_resolved);
+    resolves_shares_ = std::abs(h) >= parameters.shortest_resolved;
+    share_rounding_ = parameters.stuck_force_rounding * std::abs(h) * system_.w.now.F.cwiseAbs().maxCoeff();
+    share_tolerance_ = parameters.share_part * std::max(std::abs(h), parameters.shortest_resolved);
 }
 
 void ErrorNorm::to_tangent(const VecX& dy, const VecX& y) {
@@ -123,12 +96,12 @@ double ErrorNorm::of_speed(double speed) const {
 double ErrorNorm::of_projection(const VecX& dy, const VecX& y0, const VecX& y1, double t, double h) {
     to_tangent(dy, y0);
     const int nv = system_.nv, n = system_.on_constraints ? nv : 2 * nv;
-    const double time_rounding = time_spacings * std::numeric_limits<double>::epsilon() * std::abs(t);
+    const double time_rounding = parameters.time_spacings * std::numeric_limits<double>::epsilon() * std::abs(t);
     const double speed = system_.velocity(y1).cwiseAbs().maxCoeff();
     const double acceleration = (system_.velocity(y1) - system_.velocity(y0)).cwiseAbs().maxCoeff() / std::abs(h);
     double sum = 0.0;
     const auto add = [&](int first, double open, double rounding) {
-        if (open < residual_spacings) return;
+        if (open < parameters.residual_spacings) return;
         for (int k = first; k < first + nv; ++k)
             if (std::abs(tangent_[k]) > rounding) sum += std::pow(tangent_[k] / tolerance_[k], 2);
     };
@@ -143,16 +116,17 @@ double ErrorNorm::initial_step(int order, double t, const VecX& y, const VecX& d
     for (const Chart& c : system_.p.mechanism.charts)
         if (c.kind != Chart::Kind::vector) plain.segment(c.iq, 1).setZero();
     const double size = (*this)(plain, y), speed = (*this)(dy, y);
-    double trial = size < nothing || speed < nothing ? smallest_trial : first_part * size / speed;
+    double trial = size < parameters.nothing || speed < parameters.nothing ? parameters.smallest_trial
+                                                                           : parameters.first_part * size / speed;
     trial = std::min(trial, limit);
     probe = y + trial * dy;
     system_.normalize(probe);
     system_.derivative(t + trial, probe, rate);
     rate -= dy;
     const double curvature = (*this)(rate, y) / trial, top = std::max(speed, curvature);
-    const double step = top <= no_curvature ? std::max(smallest_trial, trial * flat_part)
-                                            : std::pow(first_part / top, 1.0 / order);
-    return std::min({most_growth * trial, step, limit});
+    const double step = top <= parameters.no_curvature ? std::max(parameters.smallest_trial, trial * parameters.flat_part)
+                                            : std::pow(parameters.first_part / top, 1.0 / order);
+    return std::min({parameters.most_growth * trial, step, limit});
 }
 
 }  // namespace pn

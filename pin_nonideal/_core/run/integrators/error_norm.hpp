@@ -1,12 +1,41 @@
 // Norm of a state error relative to the tolerances, and size of the first step.
 #pragma once
 
+#include <limits>
+
 #include "run/integrators/system.hpp"
 
 namespace pn {
 
+struct ErrorNormParameters {
+    // Tolerance of the force of a sticking element over a step, relative to its limit.
+    double share_part = 1e-4;
+    // Rounding of the force of a sticking element, relative to the largest given force. Far from the loads of a long
+    // chain limits are as small as that.
+    double stuck_force_rounding = 64 * std::numeric_limits<double>::epsilon();
+    // Shortest step [s] that resolves a load. The error of a load that jumps does not decrease with the step, so
+    // shorter steps skip it.
+    double shortest_resolved = 1e-9;
+    // Rounding of a velocity, relative to the largest one. A joint that constraints drive slowly beside fast joints has
+    // no digits below it at any step size.
+    double velocity_rounding = 64 * std::numeric_limits<double>::epsilon();
+    // Residuals below this multiple of the rounding of a projection are no error of a step.
+    double residual_spacings = 8.0;
+    // Rounding of the time in a step's stages, in floating-point spacings. It moves prescribed motions.
+    double time_spacings = 4.0;
+    // First step [Hairer, Norsett, Wanner, sec. II.4]. The move of Euler's rule is bounded relative to the size of the
+    // state. The error of the method, estimated from the derivatives, is bounded relative to the tolerance.
+    double first_part = 0.01;
+    // Negligible norm of a state or rate, and the trial step [s] for it. Negligible second derivative, and the step for
+    // it relative to the trial. Maximum growth over the trial.
+    double nothing = 1e-5, smallest_trial = 1e-6, no_curvature = 1e-15, flat_part = 1e-3, most_growth = 100.0;
+};
+
 class ErrorNorm {
 public:
+    using Parameters = ErrorNormParameters;
+    static constexpr Parameters parameters{};
+
     // `atol` has one entry per tangent coordinate, velocity and law state. `rounding` of their rates has the same
     // layout and is the floor of the tolerances.
     ErrorNorm(System& system, double rtol, const VecX& atol, const VecX& rounding);

@@ -7,6 +7,7 @@
 #include "dynamics/friction_limit.hpp"
 #include "math/decompositions.hpp"
 #include "math/radau.hpp"
+#include "run/integrators/slip_tangents.hpp"
 #include "run/integrators/step_control.hpp"
 #include "tree/lie_group.hpp"
 
@@ -21,15 +22,6 @@ namespace {
 // Error estimate: defect of the polynomial's rate at the start, times this part of the step. For a smooth motion it is
 // a few times the error of the interpolant.
 constexpr double defect_part = 1.0 / (2 * Collocation::stages + 1);
-
-constexpr int most_iterations = 14;
-constexpr double farthest_turn = 1.5;     // largest turn of a direction in the first iteration, else the step is too long
-// Convergence, relative to the tolerance: sum of the remaining changes, or the first change alone.
-constexpr double solved_part = 0.05, solved_at_once = 0.005;
-constexpr double diverging = 0.9, diverging_first = 3.0;  // ratio of two changes at which the iteration stops
-constexpr double rounding_part = 0.5;  // relative to the tolerance: smaller changes that no longer shrink are rounding
-constexpr double perturbation = 1e-6;  // step of a direction for its response: above the root of the rounding
-constexpr double slip_rank_threshold = 1e-5;  // relative: for turns that slip at rest leaves open, and slip at rest itself
 
 }  // namespace
 
@@ -125,34 +117,17 @@ void Collocation::find_response() {
         for (int k = 0; k < e.dim; ++k) {
             double& component = w.state.last_direction[e.index][k];
             const double before = component;
-            component += perturbation;
+            component += parameters.perturbation;
             solve_dynamics(system_.p, w, end, v);
             component = before;
-            G_.col(e.row + k) = (w.now.a - here) / perturbation;
+            G_.col(e.row + k) = (w.now.a - here) / parameters.perturbation;
         }
-    }
-}
-
-// Unit vectors across the direction of an element. One component of a direction is at most the root of 1/3.
-constexpr double one_third_root = 0.5774;
-static void tangents(const VecX& n, int row, int dim, MatX& T, int column) {
-    if (dim == 2) {
-        T(row, column) = -n[row + 1];
-        T(row + 1, column) = n[row];
-        return;
-    }
-    const Vec3 along(n[row], n[row + 1], n[row + 2]);
-    const Vec3 other = std::abs(along[0]) < one_third_root ? Vec3::UnitX() : Vec3::UnitY();
-    const Vec3 first = along.cross(other).normalized(), second = along.cross(first);
-    for (int k = 0; k < 3; ++k) {
-        T(row + k, column) = first[k];
-        T(row + k, column + 1) = second[k];
     }
 }
 
 void Collocation::add_tangents(int i) {
     T_[i].setZero();
-    for (const Element& e : elements_) tangents(n_[i], e.row, e.dim, T_[i], e.tangent);
+    for (const Element& e : elements_) set_tangents(n_[i], e.row, e.dim, T_[i], e.tangent);
     P_[i].noalias() = T_[i].transpose() * A_[i];
     Q_[i].noalias() = G_ * T_[i];
 }
@@ -174,7 +149,7 @@ void Collocation::solve_turns() {
         u_[i] += A_[i] * moved;
         residual_.segment(i * m, m) = T_[i].transpose() * u_[i];
         for (size_t at = 0; at < elements_.size(); ++at) {
-            at_rest |= std::abs(sigma_(at, i)) <= slip_rank_threshold * fastest[at];
+            at_rest |= std::abs(sigma_(at, i)) <= parameters.rank_threshold * fastest[at];
             for (int k = 0; k < elements_[at].dim - 1; ++k) {
                 const int row = i * m + elements_[at].tangent + k;
                 K_(row, row) -= sigma_(at, i);
@@ -188,7 +163,7 @@ void Collocation::solve_turns() {
         turn_ = -turn_;
         return;
     }
-    turn_ = -least_squares(K_, residual_, slip_rank_threshold);
+    turn_ = -least_squares(K_, residual_, parameters.rank_threshold);
 }
 
 // Turn the directions, and update the accelerations.
@@ -264,16 +239,18 @@ void Collocation::advance() {
     if (again) stretch();
     else go_straight_on();
     double last = HUGE_VAL;
-    for (int it = 0; it < most_iterations; ++it) {
+    for (int it = 0; it < parameters.most_iterations; ++it) {
         evaluate_stages(it == 0);
         if (it == 0 && !again) find_response();
         correct();
         const double now = change(), ratio = now / last;
-        if (!std::isfinite(now) || (it == 0 && turn_.cwiseAbs().maxCoeff() > farthest_turn) ||
-            (it > 0 && ratio > (it > 1 ? diverging : diverging_first) && now > rounding_part))
+        if (!std::isfinite(now) || (it == 0 && turn_.cwiseAbs().maxCoeff() > parameters.farthest_turn) ||
+            (it > 0 && ratio > (it > 1 ? parameters.diverging : parameters.diverging_first) &&
+             now > parameters.rounding_part))
             return;
-        const bool rounding = ratio > diverging && now <= rounding_part;
-        converged_ = now <= solved_at_once || (it > 0 && (rounding || now * ratio <= solved_part * (1.0 - ratio)));
+        const bool rounding = ratio > parameters.diverging && now <= parameters.rounding_part;
+        converged_ = now <= parameters.solved_at_once ||
+                     (it > 0 && (rounding || now * ratio <= parameters.solved_part * (1.0 - ratio)));
         last = now;
         if (converged_) break;
     }
@@ -304,7 +281,7 @@ double Collocation::error() {
             K(row, row) -= std::max(0.0, speed[at]);
         }
     const VecX across = P_[0] * error_.segment(nq, nv);
-    error_.segment(nq, nv) -= part * (Q_[0] * least_squares(K, across, slip_rank_threshold));
+    error_.segment(nq, nv) -= part * (Q_[0] * least_squares(K, across, parameters.rank_threshold));
     norm_.set_tolerances(step_.y0, step_.y1, step_.h);
     return norm_(error_, step_.y0);
 }

@@ -16,8 +16,22 @@
 
 namespace pn {
 
+struct CollocationParameters {
+    int most_iterations = 14;    // maximum iterations of a step, each an evaluation at all stages
+    double farthest_turn = 1.5;  // largest turn of a direction in the first iteration, else the step is too long
+    // Convergence, relative to the tolerance: sum of the remaining changes, or the first change alone.
+    double solved_part = 0.05, solved_at_once = 0.005;
+    double diverging = 0.9, diverging_first = 3.0;  // ratio of two changes at which the iteration stops
+    double rounding_part = 0.5;    // relative to the tolerance: smaller changes that no longer shrink are rounding
+    double perturbation = 1e-6;    // step of a direction for its response: above the root of the rounding
+    double rank_threshold = 1e-5;  // relative: for turns that slip at rest leaves open, and slip at rest itself
+};
+
 class Collocation {
 public:
+    using Parameters = CollocationParameters;
+    static constexpr Parameters parameters{};
+
     static constexpr int stages = 7;
 
     Collocation(Step& step, System& system, ErrorNorm& norm);

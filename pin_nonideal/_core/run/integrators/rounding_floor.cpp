@@ -11,18 +11,9 @@ namespace pn {
 
 namespace {
 
-// Number of steps from which rounding is measured, and steps between two measurements (seven evaluations each). Noise
-// that demands ever shorter steps causes such runs. The measured value is a bound that most runs stay far below, so
-// shorter runs ignore it.
-constexpr long min_measured_steps = 20000, steps_between_measurements = 64;
-// Safety factor on a measurement, which is only a sample. Part of the previous value that bounds the next one from
-// below.
-constexpr double sample_factor = 3.0, lasting_part = 0.5;
 // Generator of changes of the last digits. The sequence is fixed, so that runs repeat. `most_spacings`: maximum change
 // in floating-point spacings.
 constexpr unsigned long long multiplier = 6364136223846793005ULL, increment = 1442695040888963407ULL;
-constexpr double most_spacings = 16.0;
-constexpr int samples = 3;
 const double second_difference = std::sqrt(6.0);  // standard deviation of its rounding, relative to that of a rate
 
 }  // namespace
@@ -34,7 +25,7 @@ RoundingFloor::RoundingFloor(System& system, Stepper& stepper, ErrorNorm& norm, 
     if (!method.E) return;
     double sum = 0.0;
     for (int i = 0; i < method.stages + method.first_same_as_last; ++i) sum += method.E[i] * method.E[i];
-    raised_ = sample_factor * std::sqrt(sum) / StepControl::aim(method);
+    raised_ = parameters.sample_factor * std::sqrt(sum) / StepControl::aim(method);
 }
 
 // Measure the rounding of the rates by changes of the last digits of the state, which alter every rounding on the way.
@@ -47,12 +38,12 @@ void RoundingFloor::measure() {
     const double size = system_.velocity(stepper_.end_rate()).cwiseAbs().maxCoeff();
     unsigned long long draw = 1;
     change_.resize(n), rate_.resize(stepper_.y1.size());
-    progress_.rounding *= lasting_part;
-    for (int sample = 0; sample < samples; ++sample) {
+    progress_.rounding *= parameters.lasting_part;
+    for (int sample = 0; sample < parameters.samples; ++sample) {
         for (int k = 0; k < n; ++k) {
             draw = multiplier * draw + increment;
             const double part = static_cast<double>(static_cast<long long>(draw)) * 0x1p-63;
-            change_[k] = most_spacings * epsilon * part * stepper_.y1[k];  // zero entries stay zero
+            change_[k] = parameters.most_spacings * epsilon * part * stepper_.y1[k];  // zero entries stay zero
         }
         noise_ = -2.0 * stepper_.end_rate();
         for (const double side : {1.0, -1.0}) {
@@ -75,8 +66,10 @@ void RoundingFloor::measure() {
 }
 
 void RoundingFloor::look() {
-    if (raised_ == 0.0 || stepper_.collocates() || out_.steps < std::max(min_measured_steps, progress_.next_look)) return;
-    progress_.next_look = out_.steps + steps_between_measurements;
+    if (raised_ == 0.0 || stepper_.collocates() ||
+        out_.steps < std::max(parameters.min_measured_steps, progress_.next_look))
+        return;
+    progress_.next_look = out_.steps + parameters.steps_between_measurements;
     measure();
 }
 

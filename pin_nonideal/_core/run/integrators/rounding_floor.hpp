@@ -6,8 +6,23 @@
 
 namespace pn {
 
+struct RoundingFloorParameters {
+    // Number of steps from which rounding is measured, and steps between two measurements (seven evaluations each).
+    // Noise that demands ever shorter steps causes such runs. The measured value is a bound that most runs stay far
+    // below, so shorter runs ignore it.
+    long min_measured_steps = 20000, steps_between_measurements = 64;
+    // Safety factor on a measurement, which is only a sample. Part of the previous value that bounds the next one from
+    // below.
+    double sample_factor = 3.0, lasting_part = 0.5;
+    double most_spacings = 16.0;  // maximum change of a state in a sample, in floating-point spacings
+    int samples = 3;              // changed states of a measurement
+};
+
 class RoundingFloor {
 public:
+    using Parameters = RoundingFloorParameters;
+    static constexpr Parameters parameters{};
+
     RoundingFloor(System& system, Stepper& stepper, ErrorNorm& norm, Progress& progress, Recording& out);
 
     // Measure the rounding of the rates at intervals, in runs with many steps. Call it after a step that the error

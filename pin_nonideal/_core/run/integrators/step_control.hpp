@@ -11,8 +11,23 @@ namespace pn {
 // Error norm of a step that could not be evaluated. The next step is then as short as the control allows.
 constexpr double failed_error = 1e4;
 
+struct StepControlParameters {
+    // The next step aims at error = safety^order. The change of the error from step to step then seldom rejects a step.
+    // With 0.9 a third of the steps fails, and smooth motions need a sixth more evaluations for the same error. The
+    // error of a retried step is given, so it aims closer.
+    double safety = 0.65, retry_safety = 0.9;
+    double shrink_limit = 0.2, growth_limit = 10.0;  // least and largest ratio of two successive steps
+    // A step is shortened by `detour` if an evaluation is nearer to a singular position than `clearance` times the
+    // step's way. Its evaluations then lie elsewhere.
+    double clearance = 0.04, detour = 0.85;
+    int detour_limit = 3;  // maximum number of such steps in a row
+};
+
 class StepControl {
 public:
+    using Parameters = StepControlParameters;
+    static constexpr Parameters parameters{};
+
     StepControl(const Method& method, double rtol) : method_(method), rtol_(rtol) {}
 
     // Return the error norm at which the next step has the size of the last.

@@ -62,6 +62,11 @@ void Stepper::take_again(double size) {
     if (collocates_ && !collocation_.is_solved()) throw Failure(Failure::Kind::not_converged, t0);
 }
 
+void Stepper::end_at(double size) {
+    take_again(size);
+    system_.project_and_evaluate(t0 + size, y1, end_rate());
+}
+
 void Stepper::move_end(double dt) {
     h += dt;
     y1 += dt * end_rate();

@@ -23,6 +23,8 @@ public:
     void move_end(double dt);
     // Repeat the step with another length. Throw a Failure if it is not solved.
     void take_again(double size);
+    // Do the same, then project and evaluate its end.
+    void end_at(double size);
     // Follow a step from t that an outside integrator has taken, and evaluate the rates inside.
     void follow(double t, double size, OutsideStep::Interpolant interpolant);
     // Return the norm of the error estimate, 1 at the tolerance, or 0 for methods without one.

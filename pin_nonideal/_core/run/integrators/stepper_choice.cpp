@@ -4,21 +4,11 @@
 
 namespace pn {
 
-namespace {
-
-// Relaxation rate of slip directions, times the step, from which stability limits explicit methods (at 3 to 6).
-// Collocation begins after `stiff_in_a_row` such steps. After collocation ends, the count begins again `patience` steps
-// later.
-constexpr double stiff = 2.5;
-constexpr int stiff_in_a_row = 6, patience = 20;
-
-}  // namespace
-
 StepperChoice::StepperChoice(System& system, Stepper& stepper, Progress& progress, const Options& options)
     : w(system.w), system_(system), stepper_(stepper), progress_(progress), options_(options) {}
 
 void StepperChoice::look() {
-    turns_stiffly_ = options_.method.adaptive() && turning(system_) && stepper_.stiffness() > stiff;
+    turns_stiffly_ = options_.method.adaptive() && turning(system_) && stepper_.stiffness() > parameters.stiff;
 }
 
 void StepperChoice::choose() {
@@ -27,13 +17,13 @@ void StepperChoice::choose() {
     int& turning_steps = progress_.turning_steps;
     const double next = options_.method.adaptive() ? progress_.h : options_.dt;
     if (stepper_.collocates()) {
-        seeks = turning(system_) && (stepper_.h == 0.0 || stepper_.stiffness() * next > stiff * stepper_.h);
-        turning_steps = seeks ? 0 : -patience;
+        seeks = turning(system_) && (stepper_.h == 0.0 || stepper_.stiffness() * next > parameters.stiff * stepper_.h);
+        turning_steps = seeks ? 0 : -parameters.patience;
     } else if (turning_steps < 0) {
         ++turning_steps;
     } else {
         turning_steps = turns_stiffly_ ? turning_steps + 1 : 0;
-        seeks |= turning_steps == stiff_in_a_row;
+        seeks |= turning_steps == parameters.stiff_in_a_row;
     }
 }
 

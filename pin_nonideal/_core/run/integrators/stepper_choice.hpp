@@ -8,8 +8,18 @@
 
 namespace pn {
 
+struct StepperChoiceParameters {
+    // Relaxation rate of slip directions, times the step, from which stability limits explicit methods (at 3 to 6).
+    double stiff = 2.5;
+    int stiff_in_a_row = 6;  // number of such steps after which collocation begins
+    int patience = 20;       // steps after the end of collocation before the count begins again
+};
+
 class StepperChoice {
 public:
+    using Parameters = StepperChoiceParameters;
+    static constexpr Parameters parameters{};
+
     StepperChoice(System& system, Stepper& stepper, Progress& progress, const Options& options);
 
     // Check if stability limited the step just taken, whose end is evaluated.

@@ -8,49 +8,21 @@
 
 namespace pn {
 
-namespace {
-
-// Maximum number of remaining steps of a stiff run if max_steps is not set (some seconds).
-constexpr double usual_steps = 1e5;
-// Steps near the limit of stability until stiffness is checked. `quiet_steps` steps in a row away from the limit reset
-// the count. [Hairer, Wanner, Solving ODEs II, IV.2, checks after 15]
-constexpr long suspicious_steps = 1000, quiet_steps = 6;
-// Fraction of the stability limit beyond which a step counts. Error control keeps a stiff run there on average.
-constexpr double near_border = 0.5;
-// Stability limit of Euler's rule, which time stepping applies to decaying motions.
-constexpr double euler_border = 2.0;
-// Minimum decay of a mode that counts as decaying, relative to its rate. Other modes oscillate, and every method must
-// follow them.
-constexpr double least_damping = 0.1;
-// Relative step of differences, and passes of the power iteration.
-constexpr double difference_step = 1e-8;
-constexpr int power_passes = 20;
-// Shorter relative step, and minimum ratio of the rates by both steps. The rate of a jump, as of a load whose contact
-// point changes, grows as the step shrinks. It vanishes if the step does not reach the jump.
-constexpr double shorter_step = 1e-9, same_rate = 0.5;
-
-// Step count at which the remaining time is first estimated, doubled each time. A run is slow if `long_time` seconds of
-// wall time are left. It vibrates if `many_radians` are left and a step covers more than `part_of_period` radians.
-constexpr long first_look_ahead = 500, no_look_ahead = 1L << 62;
-constexpr double long_time = 3.0, many_radians = 2e4, part_of_period = 0.1;
-
-}  // namespace
-
 StiffnessGuard::StiffnessGuard(System& system, Stepper& stepper, Progress& progress, const Options& options)
     : system_(system), stepper_(stepper), progress_(progress), options_(options),
-      most_steps_(options.max_steps > 0 ? static_cast<double>(options.max_steps) : usual_steps) {
+      most_steps_(options.max_steps > 0 ? static_cast<double>(options.max_steps) : parameters.usual_steps) {
     forget();
 }
 
 void StiffnessGuard::forget() {
     begun_ = Clock::now();
     steps_ = 0;
-    next_look_ahead_ = options_.hint && options_.max_steps == 0 ? first_look_ahead : no_look_ahead;
+    next_look_ahead_ = options_.hint && options_.max_steps == 0 ? parameters.first_look_ahead : parameters.no_look_ahead;
 }
 
 double StiffnessGuard::FastestMode::rate() const { return std::hypot(decay, frequency); }
 
-bool StiffnessGuard::FastestMode::decays() const { return decay > least_damping * rate(); }
+bool StiffnessGuard::FastestMode::decays() const { return decay > parameters.least_damping * rate(); }
 
 // Estimate the change of the rate with the state from two evaluations at the step's end: last stage, and result.
 double StiffnessGuard::stage_rate() const {
@@ -82,7 +54,7 @@ VecX StiffnessGuard::difference(double relative, const VecX& direction, VecX& fo
 StiffnessGuard::FastestMode StiffnessGuard::fastest_mode(double relative) {
     const int n = system_.nq + system_.nv + system_.nz;
     VecX x = VecX::Ones(n).normalized(), force, other_force;
-    for (int pass = 0; pass < power_passes; ++pass) x = difference(relative, x, force).normalized();
+    for (int pass = 0; pass < parameters.power_passes; ++pass) x = difference(relative, x, force).normalized();
     // Largest eigenvalue in the plane of x and its image.
     const VecX image = difference(relative, x, force);
     VecX other = image - x.dot(image) * x;
@@ -108,7 +80,7 @@ StiffnessGuard::FastestMode StiffnessGuard::fastest_mode(double relative) {
 
 StiffnessGuard::FastestMode StiffnessGuard::mode_here() {
     const RunState kept = system_.w.state;
-    const FastestMode mode = fastest_mode(difference_step);
+    const FastestMode mode = fastest_mode(parameters.difference_step);
     system_.w.state = kept;
     system_.read(stepper_.y1);
     system_.read_law_states(stepper_.y1);
@@ -126,15 +98,15 @@ void StiffnessGuard::look() {
 void StiffnessGuard::look_for_border() {
     const double border = stepper_.method.stability, size = stepper_.h, at = stepper_.t0 + size;
     if (!(options_.end() - at > most_steps_ * size)) return;
-    if (size * stage_rate() < near_border * border) {
-        if (++progress_.quiet_steps == quiet_steps) progress_.stiff_steps = 0;
+    if (size * stage_rate() < parameters.near_border * border) {
+        if (++progress_.quiet_steps == parameters.quiet_steps) progress_.stiff_steps = 0;
         return;
     }
     progress_.quiet_steps = 0;
-    if (++progress_.stiff_steps < suspicious_steps) return;
+    if (++progress_.stiff_steps < parameters.suspicious_steps) return;
     progress_.stiff_steps = 0;
     const FastestMode mode = mode_here();
-    if (size * mode.rate() > near_border * border && mode.decays())
+    if (size * mode.rate() > parameters.near_border * border && mode.decays())
         throw Failure(Failure::Kind::stiff, at, {mode.dof}, mode.rate());
 }
 
@@ -142,26 +114,26 @@ void StiffnessGuard::look_ahead() {
     next_look_ahead_ = 2 * steps_;
     const double size = stepper_.h, at = stepper_.t0 + size, left = options_.end() - at;
     const double so_far = std::chrono::duration<double>(Clock::now() - begun_).count();
-    if (so_far / static_cast<double>(steps_) * (left / size) < long_time) return;
+    if (so_far / static_cast<double>(steps_) * (left / size) < parameters.long_time) return;
     const Counters kept = system_.w.counters;  // the instant depends on the clock, so the evaluations are not counted
     const FastestMode mode = mode_here();
     system_.w.counters = kept;
     const double radians = size * mode.rate();
     const bool follows =
-        mode.decays() ? radians > near_border * stepper_.method.stability && left < most_steps_ * size
-                      : radians > part_of_period && mode.rate() * left > many_radians;
+        mode.decays() ? radians > parameters.near_border * stepper_.method.stability && left < most_steps_ * size
+                      : radians > parameters.part_of_period && mode.rate() * left > parameters.many_radians;
     if (!follows) return;
-    next_look_ahead_ = no_look_ahead;
+    next_look_ahead_ = parameters.no_look_ahead;
     options_.hint(at, mode.dof, mode.rate(), mode.decays());
 }
 
 void StiffnessGuard::require_time_steps(double size) {
     // Time stepping solves for slip directions together with the forces, so slow slip may turn arbitrarily fast.
     system_.w.state.seeks_directions = true;
-    const FastestMode mode = fastest_mode(difference_step);
-    if (!(size * mode.rate() > euler_border && mode.decays())) return;
-    const double shorter = fastest_mode(shorter_step).rate();
-    if (shorter < same_rate * mode.rate() || mode.rate() < same_rate * shorter) return;
+    const FastestMode mode = fastest_mode(parameters.difference_step);
+    if (!(size * mode.rate() > parameters.euler_border && mode.decays())) return;
+    const double shorter = fastest_mode(parameters.shorter_step).rate();
+    if (shorter < parameters.same_rate * mode.rate() || mode.rate() < parameters.same_rate * shorter) return;
     throw Failure(Failure::Kind::stiff, stepper_.t0 + stepper_.h, {mode.dof}, mode.rate());
 }
 

@@ -8,8 +8,36 @@
 
 namespace pn {
 
+struct StiffnessGuardParameters {
+    // Maximum number of remaining steps of a stiff run if max_steps is not set (some seconds).
+    double usual_steps = 1e5;
+    // Steps near the limit of stability until stiffness is checked. `quiet_steps` steps in a row away from the limit
+    // reset the count. [Hairer, Wanner, Solving ODEs II, IV.2, checks after 15]
+    long suspicious_steps = 1000, quiet_steps = 6;
+    // Fraction of the stability limit beyond which a step counts. Error control keeps a stiff run there on average.
+    double near_border = 0.5;
+    // Stability limit of Euler's rule, which time stepping applies to decaying motions.
+    double euler_border = 2.0;
+    // Minimum decay of a mode that counts as decaying, relative to its rate. Other modes oscillate, and every method
+    // must follow them.
+    double least_damping = 0.1;
+    double difference_step = 1e-8;  // relative step of differences: root of the unit roundoff
+    int power_passes = 20;          // passes of the power iteration
+    // Shorter relative step, and minimum ratio of the rates by both steps. The rate of a jump, as of a load whose
+    // contact point changes, grows as the step shrinks. It vanishes if the step does not reach the jump.
+    double shorter_step = 1e-9, same_rate = 0.5;
+    // Step count at which the remaining time is first estimated, doubled each time, and a step count past all runs.
+    long first_look_ahead = 500, no_look_ahead = 1L << 62;
+    double long_time = 3.0;  // remaining wall time [s] from which a run is slow
+    // A slow run vibrates if this phase [rad] is left, and if a step covers more than `part_of_period` [rad].
+    double many_radians = 2e4, part_of_period = 0.1;
+};
+
 class StiffnessGuard {
 public:
+    using Parameters = StiffnessGuardParameters;
+    static constexpr Parameters parameters{};
+
     // A stiff run may take as many steps as the options allow, or a default number.
     StiffnessGuard(System& system, Stepper& stepper, Progress& progress, const Options& options);
 

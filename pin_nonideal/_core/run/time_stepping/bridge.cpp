@@ -12,11 +12,6 @@ namespace pn {
 
 namespace {
 
-// Shortest remainder of a step that becomes a step of its own, relative to the step.
-constexpr double min_remainder = 1e-9;
-// Shortest part of a step while edges approach each other, relative to the step.
-constexpr double least_cut = 1e-3;
-
 // Check if another step from the same state may have another result. Reasons are time, user functions, or steps of
 // another method in between.
 bool may_differ(const Program& p, const Options& options) {
@@ -78,7 +73,7 @@ bool TimeStepping::asks_for_motion(double end, double t_end) const {
 void TimeStepping::take_part(double end, double t_end, double least) {
     double& t = progress_.t;
     const double left = end - t, h = std::max(moreau_contacts_.allowed(t, left, progress_.y), least);
-    const bool whole = h >= (1.0 - min_remainder) * left;
+    const bool whole = h >= (1.0 - parameters.min_remainder) * left;
     moreau_contacts_.step(t, whole ? left : h, progress_.y, progress_.numerical_energy, progress_.impact_energy);
     t = whole ? end : t + h;
     const StepForces::LawMiss& relaxed = moreau_contacts_.law_miss();
@@ -98,7 +93,7 @@ void TimeStepping::take_part(double end, double t_end, double least) {
 
 // A step that starts and ends at rest with the same contacts and modes leaves the state unchanged.
 void TimeStepping::take_with_contacts(double end, double t_end) {
-    const double least = least_cut * (end - progress_.t);
+    const double least = parameters.least_cut * (end - progress_.t);
     const bool may_stand = is_autonomous_ && (system_.velocity(progress_.y).array() == 0.0).all();
     if (may_stand) {
         y_from_ = progress_.y;
@@ -163,7 +158,7 @@ void TimeStepping::begin(double size) {
 }
 
 void TimeStepping::step(double size, double stop, double t_end) {
-    rounding_ = std::max(min_remainder * size, same_time(progress_.t));
+    rounding_ = std::max(parameters.min_remainder * size, same_time(progress_.t));
     torques_.enter(progress_.t + rounding_);
     torques_.sample();
     double& t = progress_.t;

@@ -10,8 +10,18 @@
 
 namespace pn {
 
+struct BridgeParameters {
+    // Shortest remainder of a step that becomes a step of its own, relative to the step.
+    double min_remainder = 1e-9;
+    // Shortest part of a step while edges approach each other, relative to the step.
+    double least_cut = 1e-3;
+};
+
 class TimeStepping {
 public:
+    using Parameters = BridgeParameters;
+    static constexpr Parameters parameters{};
+
     TimeStepping(System& system, Progress& progress, GapWatch& watch, const Options& options, Torques& torques,
                  Output& output, Notices& notices, ValueEvents& value_events, Recording& out);
 

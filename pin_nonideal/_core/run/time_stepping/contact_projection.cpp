@@ -11,13 +11,6 @@
 
 namespace pn {
 
-// Past the first moves, an iteration that keeps more than this part of the largest residual has reached rounding, or
-// rows that contradict each other.
-constexpr double contact_stall_ratio = 0.5;
-constexpr int sure_moves = 1, max_projection_moves = 12;
-// Maximum choices of contacts that stay closed.
-constexpr int max_contact_choices = 4;
-
 static void hold_locked(const Program& p, const Workspace& w, VecX& x) {
     for (int dof = 0; dof < p.mechanism.nv; ++dof)
         if (w.now.terms.locked[dof]) x[dof] = 0.0;
@@ -61,10 +54,10 @@ bool ContactProjection::close_gaps(const Program& p, Workspace& w, double t, Vec
     const double floor = projection_floor * scene_size(p, w);
     double last = HUGE_VAL;
     bool moves = false;
-    for (int k = 0; k < max_projection_moves; ++k) {
+    for (int k = 0; k < parameters.max_moves; ++k) {
         for (size_t r = 0; r < rows_.size(); ++r) r_[r] = gap_[r] < 0 ? 0.0 : gap_width(p, w, gap_[r]);
         const double largest = least_.largest(r_);
-        if (k > sure_moves && largest > contact_stall_ratio * last) break;
+        if (k > parameters.sure_moves && largest > parameters.stall_ratio * last) break;
         last = largest;
         if (!least_.find(r_, floor, move_)) break;
         hold_locked(p, w, move_);
@@ -100,7 +93,7 @@ bool ContactProjection::open_held_apart(const Program& p, Workspace& w) {
 void ContactProjection::meet_rates(const Program& p, Workspace& w, VecX& v) {
     double last = HUGE_VAL;
     const double floor = projection_floor * std::max(1.0, v.cwiseAbs().maxCoeff());
-    for (int k = 0; k < max_projection_moves; ++k) {
+    for (int k = 0; k < parameters.max_moves; ++k) {
         for (size_t r = 0; r < rows_.size(); ++r) {
             const StepRow& row = rows_[r];
             const Block& block = p.blocks[row.block];
@@ -108,7 +101,7 @@ void ContactProjection::meet_rates(const Program& p, Workspace& w, VecX& v) {
             r_[r] = w.scratch.r[block.row + row.k] + w.now.values[row.block].phi_t[block.kept[row.k]];
         }
         const double largest = least_.largest(r_);
-        if (k > sure_moves && largest > contact_stall_ratio * last) return;
+        if (k > parameters.sure_moves && largest > parameters.stall_ratio * last) return;
         last = largest;
         if (!least_.find(r_, floor, move_)) return;
         v += move_;
@@ -139,7 +132,7 @@ bool ContactProjection::project(const Program& p, Workspace& w, double t, VecX& 
     };
     const double before = energy ? total() : 0.0;
     bool moves = close_gaps(p, w, t, q, v), posed = true;
-    for (int k = 0; k < max_contact_choices && is_open(p, w); ++k) {
+    for (int k = 0; k < parameters.max_choices && is_open(p, w); ++k) {
         if (k > 0 && !open_held_apart(p, w)) break;
         posed = false;
         if (!pose(p, w, false)) break;  // sticking elements slide by as little as the gaps ask for

@@ -7,8 +7,20 @@
 
 namespace pn {
 
+struct ContactProjectionParameters {
+    // Past the first moves, an iteration that keeps more than this part of the largest residual has reached rounding,
+    // or rows that contradict each other.
+    double stall_ratio = 0.5;
+    int sure_moves = 1, max_moves = 12;  // first moves, which `stall_ratio` does not judge, and maximum number of moves
+    // Maximum choices of contacts that stay closed.
+    int max_choices = 4;
+};
+
 class ContactProjection {
 public:
+    using Parameters = ContactProjectionParameters;
+    static constexpr Parameters parameters{};
+
     explicit ContactProjection(const Program& p);
 
     // Project q and v onto the closed contacts and sticking elements of the workspace: gaps close, and v satisfies

@@ -6,9 +6,6 @@ namespace pn {
 
 namespace {
 
-constexpr int max_flight_newton = 20;    // Newton steps for the angular velocity
-constexpr double turn_rounding = 1e-15;  // change of the angular velocity that counts as rounding, relative to it
-
 using Eigen::Matrix3d;
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
@@ -21,14 +18,14 @@ Matrix3d skew(const Vector3d& x) {
 
 // Solve J (w1 - w0) + h wm x J wm = h tau for w1. Returns false if Newton's method does not converge.
 bool turn(const Matrix3d& J, const Vector3d& w0, const Vector3d& tau, double h, Vector3d& w1) {
-    for (int step = 0; step < max_flight_newton; ++step) {
+    for (int step = 0; step < FreeFlight::parameters.max_newton; ++step) {
         const Vector3d mean = 0.5 * (w0 + w1), momentum = J * mean;
         const Vector3d error = J * (w1 - w0) + h * mean.cross(momentum) - h * tau;
         const Matrix3d slope = J + 0.5 * h * (skew(mean) * J - skew(momentum));
         const Vector3d change = slope.partialPivLu().solve(error);
         w1 -= change;
         if (!w1.allFinite()) return false;
-        if (change.norm() <= turn_rounding * w1.norm()) return true;
+        if (change.norm() <= FreeFlight::parameters.turn_rounding * w1.norm()) return true;
     }
     return false;
 }

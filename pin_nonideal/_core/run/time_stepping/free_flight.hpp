@@ -11,8 +11,16 @@
 
 namespace pn {
 
+struct FreeFlightParameters {
+    int max_newton = 20;           // Newton steps for the angular velocity
+    double turn_rounding = 1e-15;  // change of the angular velocity that counts as rounding, relative to it
+};
+
 class FreeFlight {
 public:
+    using Parameters = FreeFlightParameters;
+    static constexpr Parameters parameters{};
+
     FreeFlight(const Program& p, const JointDrives& drives);
 
     // Mark a body as not free in this step: a force of a contact or of dry friction acts on it.

@@ -5,13 +5,6 @@
 
 namespace pn {
 
-// Change of the configuration in a step [rad or m] that counts as rounding.
-constexpr double configuration_rounding = 1e-13;
-// Change by a further sweep that is not worth it. The second sweep makes the step second order, and fast motion takes
-// more of them, which keep its energy.
-constexpr double configuration_tolerance = 1e-9;
-constexpr int max_sweeps = 4;
-
 void MeanVelocity::FreeFlyer::turn_axes(VecX& v, const Eigen::Vector3d& angle) const {
     const double size = angle.norm();
     if (size == 0.0) return;
@@ -55,8 +48,8 @@ bool MeanVelocity::move() {
     next_ = 0.5 * (start_ + end_);
     double change = 0.0;
     for (int k = 0; k < next_.size(); ++k) change = std::max(change, std::abs(next_[k] - value_[k]));
-    const double allowed = moves_ == 0 ? configuration_rounding : configuration_tolerance;
-    if (moves_ == max_sweeps || h_ * change <= allowed) return false;
+    const double allowed = moves_ == 0 ? parameters.configuration_rounding : parameters.configuration_tolerance;
+    if (moves_ == parameters.max_sweeps || h_ * change <= allowed) return false;
     value_ = next_;
     ++moves_;
     measure();

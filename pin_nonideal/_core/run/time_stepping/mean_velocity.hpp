@@ -7,6 +7,15 @@
 
 namespace pn {
 
+struct MeanVelocityParameters {
+    // Change of the configuration in a step [rad or m] that counts as rounding.
+    double configuration_rounding = 1e-13;
+    // Change by a further sweep that is not worth it. The second sweep makes the step second order, and fast motion
+    // takes more of them, which keep its energy.
+    double configuration_tolerance = 1e-9;
+    int max_sweeps = 4;  // maximum number of sweeps of a step
+};
+
 // The mean of the velocities at the start and at the end of a step depends on the forces. Sweeps find it: the first one
 // takes the forces at the velocity of the start.
 //
@@ -15,6 +24,9 @@ namespace pn {
 // there is the acceleration plus w x u: a body that rolls or flies keeps its speed and momentum while it turns.
 class MeanVelocity {
 public:
+    using Parameters = MeanVelocityParameters;
+    static constexpr Parameters parameters{};
+
     struct FreeFlyer {
         int dof = 0;           // first of its six dofs
         Eigen::Vector3d com;   // center of mass of its body

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <numeric>
 
-#include "contact/impact.hpp"
 #include "dynamics/evaluation.hpp"
 #include "dynamics/power.hpp"
 #include "dynamics/friction_limit.hpp"
@@ -12,17 +11,12 @@
 #include "dynamics/step_start.hpp"
 #include "complementarity/socp_mode_newton.hpp"
 #include "friction/stick_slip.hpp"
+#include "run/time_stepping/end_modes.hpp"
 #include "tree/lie_group.hpp"
 
 namespace pn {
 
 namespace {
-
-constexpr double element_load_tolerance = 1e-13;  // change of limits that counts as rounding, relative to the largest limit
-// Change of limits that counts as rounding if it no longer falls by half a pass: loads of long chains have more rounding.
-constexpr double stalled_load_tolerance = 1e-9, min_load_decrease = 0.5;
-constexpr double box_force_rounding = 1e-12;  // distance of a force at its limit, relative to the limit
-constexpr double slip_rest_rounding = 1e-9;    // slip at the end that counts as none, relative to that without friction
 
 // Return all elements of a scene without unilateral contacts, else none. MoreauContacts treats other scenes.
 std::vector<int> all_elements(const System& system) {
@@ -145,46 +139,47 @@ double Moreau::update_limits(double t) {
 void Moreau::solve_friction(double t) {
     int at = 0;  // warm start from forces of the last step, whose modes usually persist
     for (const Friction& friction : p.frictions)
-        for (int k = 0; k < friction.dim; ++k) initial_force_[at++] = w.state.percussion[p.blocks[friction.block].row + k];
+        for (int k = 0; k < friction.dim; ++k)
+            initial_force_[at++] = w.state.percussion[p.blocks[friction.block].row + k];
     force_.setZero(problem_.rows);
     double last_change = HUGE_VAL;
-    for (int pass = 0; pass < max_load_passes; ++pass) {
+    for (int pass = 0; pass < parameters.max_load_passes; ++pass) {
         // Limits that depend on no load need no motion.
         if (pass == 0 || p.needs_reactions) apply_forces();
         const double change = update_limits(t);
         const double largest = system_.ne > 0 ? std::max(0.0, limit_.size.maxCoeff()) : 0.0;
-        const bool stalls = change > min_load_decrease * last_change && change <= stalled_load_tolerance * largest;
+        const bool stalls = change > parameters.min_load_decrease * last_change &&
+                            change <= parameters.stalled_load_tolerance * largest;
         last_change = change;
-        if (pass > 0 && (change <= element_load_tolerance * largest || stalls || !p.needs_reactions)) return;
+        if (pass > 0 && (change <= parameters.element_load_tolerance * largest || stalls || !p.needs_reactions)) return;
         if (!symmetric_limits_) force_ = friction_program(problem_.W, problem_.alpha0, problem_.dims, limit_);
-        else if (problem_.rows > 0 && boxes_) box_.solve(problem_.W, problem_.alpha0, limit_.size, &initial_force_, force_);
+        else if (problem_.rows > 0 && boxes_)
+            box_.solve(problem_.W, problem_.alpha0, limit_.size, &initial_force_, force_);
         else force_ = friction_program(problem_.W, problem_.alpha0, problem_.dims, limit_.size, &initial_force_);
         initial_force_ = force_;
         force_limit_ = limit_;
-        if (pass + 1 == max_load_passes) throw Failure(Failure::Kind::not_converged, t, problem_.elements);
+        if (pass + 1 == parameters.max_load_passes) throw Failure(Failure::Kind::not_converged, t, problem_.elements);
     }
 }
 
-// Compute the velocity and the modes at the step's end. Elements below their limit
-// stick, and those whose slip is zero.
+// Compute the velocity and the modes at the step's end. A force below its limit holds its element.
 void Moreau::end_velocity() {
     alpha_ = problem_.alpha0;
     alpha_.noalias() += problem_.W * force_;
     problem_.acceleration(p, w, force_, a_friction_);
     a_friction_ += a_free_;
     mean_.end(a_friction_, v1_);
-    const double still = rest_rate(v1_), rounding = slip_rest_rounding * problem_.alpha0.lpNorm<Eigen::Infinity>();
+    const EndModes end(v1_);
+    const double rounding = parameters.slip_rest_rounding * problem_.alpha0.lpNorm<Eigen::Infinity>();
     for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e) {
         const int dim = problem_.dims[e];
         w.state.percussion.segment(p.blocks[p.frictions[e].block].row, dim) = force_.segment(at, dim);
         shifted_ = force_.segment(at, dim);
         if (dim == 1) shifted_[0] -= force_limit_.middle[at];
         const double slip = alpha_.segment(at, dim).norm();
-        const bool rests = h_ * slip <= still && slip <= rounding;
-        const bool sticks = shifted_.norm() < force_limit_[e] * (1.0 - box_force_rounding) || rests;
-        modes_[e] = sticks ? sticking : dim > 1 || alpha_[at] > 0.0 ? slip_plus : slip_minus;
-        const Block& block = p.blocks[p.frictions[e].block];
-        if (sticks && block.dof >= 0) v1_.segment(block.dof, block.total).setZero();
+        const bool rests = end.is_rest(h_ * slip) && slip <= rounding;
+        const bool holds = shifted_.norm() < force_limit_[e] * (1.0 - parameters.box_force_rounding);
+        modes_[e] = EndModes::settle(holds || rests, dim > 1 || alpha_[at] > 0.0, p.blocks[p.frictions[e].block], v1_);
     }
 }
 

@@ -18,11 +18,22 @@
 
 namespace pn {
 
-// Maximum passes for load-dependent limits.
-constexpr int max_load_passes = 60;
+struct MoreauParameters {
+    double element_load_tolerance = 1e-13;  // change of limits that counts as rounding, relative to the largest limit
+    // Change of limits that counts as rounding if it no longer falls by half a pass: loads of long chains have more
+    // rounding.
+    double stalled_load_tolerance = 1e-9, min_load_decrease = 0.5;
+    double box_force_rounding = 1e-12;  // distance of a force at its limit, relative to the limit
+    double slip_rest_rounding = 1e-9;   // slip at the end that counts as none, relative to that without friction
+    // Maximum passes for load-dependent limits.
+    int max_load_passes = 60;
+};
 
 class Moreau {
 public:
+    using Parameters = MoreauParameters;
+    static constexpr Parameters parameters{};
+
     explicit Moreau(System& system);
 
     // Take one step of size h from y at t. The energy added by the scheme itself is added to numerical_energy. The modes

@@ -4,26 +4,18 @@
 #include <cmath>
 
 #include "contact/queries.hpp"
-#include "contact/impact.hpp"
 #include "dynamics/evaluation.hpp"
 #include "dynamics/power.hpp"
 #include "dynamics/projection.hpp"
 #include "dynamics/acceleration.hpp"
 #include "dynamics/step_start.hpp"
 #include "friction/stick_slip.hpp"
+#include "run/time_stepping/end_modes.hpp"
 #include "run/time_stepping/moreau.hpp"
 #include "tree/lie_group.hpp"
 #include "tree/terms.hpp"
-#include "math/tolerances.hpp"
 
 namespace pn {
-
-namespace {
-
-constexpr double most_stopped = 1e-6;  // slip of an element that stops, relative to 1 + the largest velocity
-constexpr double width_rounding = 1e-12;  // uncertainty of a gap at rest, relative to the scene's size
-
-}  // namespace
 
 MoreauContacts::MoreauContacts(System& system, GapWatch& watch)
     : system_(system), p(system.p), w(system.w), mean_(p), drives_(p), flight_(p, drives_), watch_(watch),
@@ -74,7 +66,7 @@ void MoreauContacts::step(double t, double h, VecX& y, double& numerical_energy,
     forces_.clear_miss();
     if (watch_.gaps.current || q_sampled_.size() == 0) {
         q_sampled_ = y.head(system_.nq);
-        watch_.begin_time_steps(width_rounding * scene_size(p, w));
+        watch_.begin_time_steps(parameters.width_rounding * scene_size(p, w));
     }
     t0_ = t;
     q0_ = y.head(system_.nq);
@@ -182,7 +174,7 @@ void MoreauContacts::find_touching(double t) {
         const double width = gap_width(p, w, i);
         const bool touches = was_closed_[i] || (width <= 0.0 && tells_way_out(i, width));
         if (touches) touching_.push_back(i);
-        watch_.gaps.width[i] = touches ? 0.0 : width - width_rounding * scene_size(p, w);  // guaranteed width
+        watch_.gaps.width[i] = touches ? 0.0 : width - parameters.width_rounding * scene_size(p, w);  // guaranteed width
     }
     watch_.leave_far();
     for (int i : touching_) {
@@ -234,20 +226,22 @@ bool MoreauContacts::rest_within_limits(double t) {
     apply();
     forces_.measure_end();
     const auto end = forces_.end_rows.head(static_cast<Eigen::Index>(elements_.rows.size()));
-    const bool stops = h_ * end.cwiseAbs().maxCoeff() <= most_stopped * (1.0 + v0_.cwiseAbs().maxCoeff());
-    return stops && elements_.limits_hold(p, w, t, mean_, forces_.f);
+    return EndModes(v0_).is_stopped(h_ * end.cwiseAbs().maxCoeff()) &&
+           elements_.limits_hold(p, w, t, mean_, forces_.f);
 }
 
 void MoreauContacts::solve(double t) {
     const int n = static_cast<int>(elements_.rows.size());
-    const bool loads = n > 0 && elements_.cones.back().is(ConeElement::Kind::box);  // limits that may depend on the motion
+    const bool loads =
+        n > 0 && elements_.cones.back().is(ConeElement::Kind::box);  // limits that may depend on the motion
     elements_.begin_passes();
     for (int pass = 0; n > 0; ++pass) {
         if (loads || pass > 0) apply();
-        const double allowed = most_miss * forces_.f.head(n).cwiseAbs().maxCoeff();
+        const double allowed = StepForces::parameters.most_miss * forces_.f.head(n).cwiseAbs().maxCoeff();
         if (elements_.limits_settle(p, w, t, mean_, allowed) && pass > 0) break;
-        if (pass == max_load_passes && rest_within_limits(t)) break;
-        if (pass == max_load_passes || !forces_.solve(h_, q0_, v0_)) throw Failure(Failure::Kind::not_converged, t);
+        if (pass == Moreau::parameters.max_load_passes && rest_within_limits(t)) break;
+        if (pass == Moreau::parameters.max_load_passes || !forces_.solve(h_, q0_, v0_))
+            throw Failure(Failure::Kind::not_converged, t);
         ++w.counters.iterations;
     }
     if (n == 0) apply();
@@ -264,8 +258,9 @@ void MoreauContacts::solve(double t) {
     w.counters.dissipation = std::max(w.counters.dissipation, r.dissipation);
 }
 
-// Compute the velocity, the closed contacts and the modes at the step's end. An element sticks if its force stays below
-// its limit, or if its slip is zero. If a solution meets neither condition, the one with the smaller miss holds.
+// Compute the velocity, the closed contacts and the modes at the step's end. A force below
+// its limit holds an element whose slip stops. If a solution meets neither condition, the one with the smaller miss
+// decides.
 void MoreauContacts::end_velocity() {
     const auto& parts = elements_.parts;
     const auto& cones = elements_.cones;
@@ -279,23 +274,23 @@ void MoreauContacts::end_velocity() {
         std::fill(modes_.begin(), modes_.end(), unloaded);
     }
     if (n == 0) return;
-    const double still = rest_rate(v1_), fastest = 1.0 + v1_.cwiseAbs().maxCoeff();
-    const double clear = cone_force_rounding * f.head(n).cwiseAbs().maxCoeff();
+    const EndModes rule(v1_);
+    const double clear = StepForces::parameters.cone_force_rounding * f.head(n).cwiseAbs().maxCoeff();
     end.head(n) *= h_;
     for (size_t e = 0, at = 0; e < parts.size(); at += cones[e].dim, ++e) {
         const StepElements::Part& part = parts[e];
         const int head = part.gap >= 0, dim = cones[e].dim - head;
-        if (head) closed_[part.gap] = end[at] - part.approach <= still;
+        if (head) closed_[part.gap] = rule.is_rest(end[at] - part.approach);
         if (part.element < 0 || (head && !closed_[part.gap])) continue;
         const double limit = cones[e].bound * (head ? f[at] : 1.0);
         const double size = dim == 1 ? std::abs(f[at + head] - part.middle) : f.segment(at + head, dim).norm();
         const double slip = end.segment(at + head, dim).norm();
-        const bool stops = slip <= most_stopped * fastest || slip * limit <= (limit - size) * fastest;
-        const bool sticks = (limit - size > clear && stops) || slip <= still;
+        const bool holds =
+            limit - size > clear && (rule.is_stopped(slip) || rule.is_nearer_to_rest(slip, size, limit));
         const bool forward = dim > 1 || (dim > 0 && end[at + head] > 0.0);
-        modes_[part.element] = sticks && dim > 0 ? sticking : forward ? slip_plus : slip_minus;
         const Block& block = p.blocks[p.frictions[part.element].block];
-        if (sticks && block.dof >= 0) v1_.segment(block.dof, block.total).setZero();
+        const Mode mode = EndModes::settle(holds || rule.is_rest(slip), forward, block, v1_);
+        modes_[part.element] = dim > 0 ? mode : slip_minus;
     }
     forces_.stop_resting_trees(h_, v0_, v1_);
     const auto rest = [&](int e) {  // elements held by the constraints stick

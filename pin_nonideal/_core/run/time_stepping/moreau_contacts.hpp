@@ -15,11 +15,17 @@
 
 namespace pn {
 
-// Maximum penetration of edges and rims with a defined normal, relative to their rounding.
-constexpr double nearly_all = 0.999;
+struct MoreauContactsParameters {
+    double width_rounding = 1e-12;  // uncertainty of a gap at rest, relative to the scene's size
+    // Maximum penetration of edges and rims with a defined normal, relative to their rounding.
+    double nearly_all = 0.999;
+};
 
 class MoreauContacts {
 public:
+    using Parameters = MoreauContactsParameters;
+    static constexpr Parameters parameters{};
+
     MoreauContacts(System& system, GapWatch& watch);
 
     // Forget the gaps and the rest of earlier steps.
@@ -43,7 +49,9 @@ public:
     const StepForces::LawMiss& law_miss() const { return forces_.law_miss(); }
 
 private:
-    bool tells_way_out(int gap, double width) const { return width > -nearly_all * rounded_by_[gap]; }
+    bool tells_way_out(int gap, double width) const {
+        return width > -MoreauContacts::parameters.nearly_all * rounded_by_[gap];
+    }
     void select(const std::vector<char>& closed, const std::vector<Mode>& modes, bool flies);
     void sweep(double t, JointDrives::Step& drives, bool first);
     bool correct(double t, JointDrives::Step& drives);

@@ -11,17 +11,6 @@
 
 namespace pn {
 
-namespace {
-
-constexpr double contact_load_tolerance = 1e-12;  // change of limits that counts as rounding, relative to the largest limit
-// Maximum ratio of two changes of limits from passes that converge. Slower limits follow force components that the
-// cones leave open, such as the direction of slow slip.
-constexpr double max_load_contraction = 0.5;
-// Part of the limits that elements at rest use if their limits do not converge.
-constexpr double kept_limit = 0.9;
-
-}  // namespace
-
 StepElements::StepElements(const Program& p) {
     for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e)
         if (p.frictions[e].gap < 0) outside_contacts_.push_back(e);
@@ -105,15 +94,15 @@ bool StepElements::limits_settle(const Program& p, Workspace& w, double t, const
         cones[e].bound = std::max(0.0, limit);
         parts[e].middle = now.middle();
     }
-    const bool settles = change <= contact_load_tolerance * largest ||
-                         (change > max_load_contraction * last_change_ && change <= allowed);
+    const bool settles = change <= parameters.load_tolerance * largest ||
+                         (change > parameters.max_load_contraction * last_change_ && change <= allowed);
     last_change_ = change;
     return settles;
 }
 
 void StepElements::reduce_limits() {
     for (ConeElement& cone : cones)
-        if (cone.is(ConeElement::Kind::box)) cone.bound *= kept_limit;
+        if (cone.is(ConeElement::Kind::box)) cone.bound *= parameters.kept_limit;
 }
 
 bool StepElements::limits_hold(const Program& p, Workspace& w, double t, const MeanVelocity& mean, const VecX& f) {

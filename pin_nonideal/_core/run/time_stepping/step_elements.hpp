@@ -12,8 +12,20 @@
 
 namespace pn {
 
+struct StepElementsParameters {
+    double load_tolerance = 1e-12;  // change of limits that counts as rounding, relative to the largest limit
+    // Maximum ratio of two changes of limits from passes that converge. Slower limits follow force components that the
+    // cones leave open, such as the direction of slow slip.
+    double max_load_contraction = 0.5;
+    // Part of the limits that elements at rest use if their limits do not converge.
+    double kept_limit = 0.9;
+};
+
 class StepElements {
 public:
+    using Parameters = StepElementsParameters;
+    static constexpr Parameters parameters{};
+
     struct Part {
         int gap = -1;          // gap of a contact, -1 if none
         int element = -1;      // friction element: sliding of the contact, or a box

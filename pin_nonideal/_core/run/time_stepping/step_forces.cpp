@@ -7,18 +7,10 @@
 
 namespace pn {
 
-namespace {
-
-// Largest error of the laws that a step may have, relative to an element's forces, if no forces meet them. An event
-// reports it.
-constexpr double most_relaxed = 1e-2;
-
-}  // namespace
-
 StepForces::StepForces(const Program& program, Workspace& workspace, const StepElements& elements)
     : f(VecX::Zero(program.layout.rows)), end_rows(f), p(program), w(workspace), elements_(elements), trees_(program),
       responses_(program), free_rows_(f), offset_(f), middle_(f), a_(VecX::Zero(program.mechanism.nv)) {
-    solver_.take_misses(most_miss);
+    solver_.take_misses(parameters.most_miss);
 }
 
 void StepForces::pose(const MeanVelocity& mean, double h, const VecX& a_free, bool anew) {
@@ -77,7 +69,7 @@ bool StepForces::solve(double h, const VecX& q0, const VecX& v0) {
     elements_.middles(middle_);
     guess_ = f.head(n);
     const double error = separate_ ? trees_.solve(elements_.cones, middle_, f) : HUGE_VAL;
-    bool solved = error <= most_miss;
+    bool solved = error <= parameters.most_miss;
     const bool starts = v0.cwiseAbs().maxCoeff() <= rest_speed && !(q_without_rest_.size() > 0 && q_without_rest_ == q0);
     if (solved && !(starts && moves())) return true;
     responses_.find(p, w, elements_.rows);
@@ -89,11 +81,12 @@ bool StepForces::solve(double h, const VecX& q0, const VecX& v0) {
     f.head(n) -= middle_.head(n);
     end_rows.head(n) = free_rows_.head(n);
     end_rows.head(n).noalias() += W * middle_.head(n);
-    solver_.search_briefly(error <= most_relaxed);
-    if (!solved) solved = solver_.solve(W, end_rows.head(n), elements_.cones, true, f.head(n), true) == ConeStatus::solved;
+    solver_.search_briefly(error <= parameters.most_relaxed);
+    if (!solved)
+        solved = solver_.solve(W, end_rows.head(n), elements_.cones, true, f.head(n), true) == ConeStatus::solved;
     if (starts) solved = keep_rest(solved, q0) || solved;
     f.head(n) += middle_.head(n);
-    if (!solved && error <= most_relaxed) {
+    if (!solved && error <= parameters.most_relaxed) {
         f.head(n) = best_f_;
         relax(h);
         return true;
@@ -119,7 +112,8 @@ bool StepForces::moves() {
     const int n = static_cast<int>(elements_.rows.size());
     measure_end();
     if (separate_) return !trees_.rests(a_);
-    return end_rows.head(n).cwiseAbs().maxCoeff() > cone_force_rounding * free_rows_.head(n).cwiseAbs().maxCoeff();
+    return end_rows.head(n).cwiseAbs().maxCoeff() >
+           parameters.cone_force_rounding * free_rows_.head(n).cwiseAbs().maxCoeff();
 }
 
 // Check if forces within all cones hold a rest, and set f to them then. The rows without forces are in end_rows.
@@ -127,7 +121,7 @@ bool StepForces::keep_rest(bool solved, const VecX& q0) {
     const int n = static_cast<int>(elements_.rows.size());
     const auto W = responses_.matrix(n);
     const bool moves = (end_rows.head(n) + W * f.head(n)).cwiseAbs().maxCoeff() >
-                       cone_force_rounding * end_rows.head(n).cwiseAbs().maxCoeff();
+                       parameters.cone_force_rounding * end_rows.head(n).cwiseAbs().maxCoeff();
     if (solved && !moves) return false;
     const bool holds = solver_.hold(W, end_rows.head(n), elements_.cones, f.head(n));
     if (!holds) q_without_rest_ = q0;  // the next sweeps and the step after the start need not ask again
@@ -140,7 +134,7 @@ ConeResiduals StepForces::residuals() {
     const auto W = responses_.matrix(n);
     end_rows.head(n) = free_rows_.head(n);
     end_rows.head(n).noalias() += W * middle_.head(n);
-    return ConeComplementarity::residuals(W, end_rows.head(n), elements_.cones, f.head(n) - middle_.head(n));
+    return cone_residuals(W, end_rows.head(n), elements_.cones, f.head(n) - middle_.head(n));
 }
 
 }  // namespace pn

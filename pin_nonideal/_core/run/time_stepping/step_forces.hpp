@@ -11,14 +11,22 @@
 
 namespace pn {
 
-// Distance of a force at its limit, relative to the limit.
-constexpr double cone_force_rounding = 1e-9;
-// Accepted residual relative to the velocities. A step of a turning body can have no exact solution if corners share
-// its load. Also the accepted error of a limit, relative to the forces. The statistics report both.
-constexpr double most_miss = 1e-7;
+struct StepForcesParameters {
+    // Largest error of the laws that a step may have, relative to an element's forces, if no forces meet them. An event
+    // reports it.
+    double most_relaxed = 1e-2;
+    // Distance of a force at its limit, relative to the limit.
+    double cone_force_rounding = 1e-9;
+    // Accepted residual relative to the velocities. A step of a turning body can have no exact solution if corners
+    // share its load. Also the accepted error of a limit, relative to the forces. The statistics report both.
+    double most_miss = 1e-7;
+};
 
 class StepForces {
 public:
+    using Parameters = StepForcesParameters;
+    static constexpr Parameters parameters{};
+
     VecX f;         // force of each row, the percussion over the step's length
     VecX end_rows;  // rows at the step's end under the forces, over the step's length
 

@@ -1,0 +1,27 @@
+// Thresholds of the choice of independent rows: their lengths, pivots and factors.
+#pragma once
+
+namespace pn {
+
+struct RankParameters {
+    // Part of a largest squared length, or of a largest pivot, below which a new choice of rows is due.
+    double faded_part = 0.1;
+    // Smallest trusted pivot of the Cholesky factor of the unit-diagonal B B^T. The relative error of the factor stays
+    // below the machine precision divided by this value. Below it the orthogonal factorization of B^T is used.
+    double min_schur_pivot = 1e-5;
+    // Part of the squared length of the longest row of a block below which a row is rounding.
+    double vanishing_square = 1e-28;
+    // Relative difference of squared lengths below which two columns tie. The earlier column then goes first, so that
+    // rounding does not choose among equal rows.
+    double tie = 1e-12;
+    // Part of the length of a force that moves all mass, below which the length of a row may be rounding. For example,
+    // a force through the only pin of a body moves nothing at any position of the pin.
+    double min_length_part = 1e-4;
+    // Lower bound on the length of a row of a user's function, as a part of the longest row. Rounding of a direction
+    // without freedom is far shorter, and rows in other units are longer.
+    double min_function_length_part = 1e-4;
+};
+
+inline constexpr RankParameters rank_parameters{};
+
+}  // namespace pn

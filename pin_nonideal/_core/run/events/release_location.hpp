@@ -1,0 +1,49 @@
+// Location of events that no single margin shows: redundant elements that begin to slip together, and redundant contacts
+// that lift off together. They hold as long as some forces within all limits and cones do.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "friction/mode_question.hpp"
+#include "run/events/found_event.hpp"
+#include "run/integrators/stepper.hpp"
+
+namespace pn {
+
+struct ReleaseLocationParameters {
+    double width = 1e-12;         // tolerance of the instant, relative to the step or the time
+    double least_fall = 0.7;      // maximum ratio of two rates for which their secant is used
+    double short_of_root = 1e-2;  // distance kept from the root of the secant, relative to the distance to it
+    // Extension of a repeated step that does not show the release of its interpolant. The first extension is relative
+    // to the step, and each further one is longer by a factor.
+    double least_later = 1e-11, further_part = 10.0;
+    int places_inside = 8;  // parts of a step at rest, at whose ends sticking elements are checked
+};
+
+class ReleaseLocator {
+public:
+    using Parameters = ReleaseLocationParameters;
+    static constexpr Parameters parameters{};
+
+    ReleaseLocator(System& system, Stepper& stepper) : system_(system), stepper_(stepper), p(system.p), w(system.w) {}
+
+    // End the step just taken at the release of redundant sticking elements, if they slip at its end.
+    std::optional<FoundEvent> release_together();
+    // End the step just taken at the lift-off of redundant contacts, if no nonnegative loads exist at its end.
+    std::optional<FoundEvent> lift_together();
+
+private:
+    std::optional<double> release_rate(double t, const VecX& y, const std::vector<Mode>& modes, ModeQuestion& asked);
+    std::optional<double> release_rate_at_end(const std::vector<Mode>& modes, ModeQuestion& asked);
+    double release_part(double rate, const std::vector<Mode>& modes, ModeQuestion& asked);
+    std::optional<double> release_rate_inside(const std::vector<Mode>& modes, ModeQuestion& asked);
+    bool all_press();
+
+    System& system_;
+    Stepper& stepper_;
+    const Program& p;
+    Workspace& w;
+};
+
+}  // namespace pn
