@@ -103,6 +103,21 @@ def test_friction_stays_within_the_limit_that_is_drawn(belt: Any) -> None:
     assert np.abs(y[~sliding]).max() > 6.0  # it sticks up to 8 N
 
 
+@pytest.mark.parametrize("what", ["friction bearing", "load bearing"])
+def test_the_drawn_limit_has_the_viscous_part_of_the_law(what: str) -> None:
+    """While the joint slips, the friction of the law is its dry limit plus the viscous part."""
+    law = pn.JointFriction("j0", coulomb=0.1, mu=0.2, radius=0.01, viscous=0.3, name="bearing")
+    scene = pn.Scene(jointed(pin.JointModelRY()), laws=[law])
+    run = pn.simulate(scene, 1.0, v=[2.0], output_dt=0.01, record=("laws", "reactions"))
+    slips = run.law("bearing").mode != 0
+    assert slips.sum() > 50
+    axes = plot(run, what=what).axes[0]
+    limit = next(line for line in axes.lines if line.get_marker() == ".").get_ydata()
+    friction = np.abs(run.law("bearing").force[:, 0])
+    np.testing.assert_allclose(friction[slips], limit[slips], rtol=1e-9)
+    assert (friction <= limit * (1.0 + 1e-9)).all()
+
+
 def test_friction_over_load_grows_as_the_law_says(arm: Any) -> None:
     law = next(x for x in arm.scene.laws if x.joint == "panda_joint2")
     name = law.name or f"JointFriction({law.joint})"

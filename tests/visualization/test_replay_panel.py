@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -156,6 +157,23 @@ def test_one_quantity_over_another_is_plotted_and_seeks(loop: Watched) -> None:
     assert loop.run("() => replay.time") > 0.0
     row(loop, "relations", "phase rocker").locator("input").uncheck()
     assert page.locator(".plot").count() == before
+
+
+@pytest.mark.parametrize("law", ["bearing", "crank friction"])
+def test_headings_of_friction_name_it_once(law: str, browser: Any, tmp_path: Path) -> None:
+    hinge = pn.JointFriction("crank_joint", mu=0.2, radius=0.01, viscous=0.3, name=law)
+    scene = pn.load("four_bar").replace(laws=[hinge])
+    run = pn.simulate(scene, 0.2, output_dt=0.01, record=("forces", "reactions"))
+    kinds = ["friction", f"friction {law}", f"load {law}"]
+    page = Watched(browser, pn.replay(run, tmp_path / "crank.html", plots=kinds))
+    headings = [heading.inner_text() for heading in page.page.locator(".plot h2").all()]
+    page.close()
+    of_law = f"{law.removesuffix(' friction')} friction [N m]"
+    assert headings == [
+        "Friction [N m] over velocity [rad/s], dots: the limit",
+        f"{of_law} over velocity [rad/s], dots: the limit",
+        f"{of_law} over load across the axis [N], dots: the limit",
+    ]
 
 
 SIZES = [(1400, 900), (900, 500), (420, 800)]

@@ -55,11 +55,12 @@ def _stored(payload: Payload, run: Trajectory, name: str, relation: Relation, po
     curves = [_curve(payload, run, label, *pair, points) for label, pair in relation.curves.items()]
     one_side = relation.x.startswith("load")
     bounds = [_bound(payload, label, *pair, one_side) for label, pair in relation.bounds.items()]
+    quantity, _, unit = relation.y.partition(" ")
     return {
         "name": name,
-        "title": relation.title if name in ("phase", "friction", "load") else name,
+        "title": relation.title,
         "x": relation.x,
-        "y": relation.y,
+        "y": unit if quantity in relation.title.lower() else relation.y,
         "note": relation.note,
         "curves": curves,
         "bounds": bounds,
