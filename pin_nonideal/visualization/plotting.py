@@ -211,10 +211,7 @@ def _draw_relation(axes: Axes, parts: Sequence[Relation], labels: Sequence[str],
             line = look.line(index, len(x), number, len(parts))
             axes.plot(x, y, label=name, **line)
             if label in item.bounds:
-                at, most = item.bounds[label]
-                both = [most] if item.x.startswith("load") else [most, -most]
-                for bound in both:
-                    axes.plot(at, bound, ls="", marker=".", ms=2.0, color=line["color"], alpha=0.35)
+                axes.plot(*item.bounds[label], ls="", marker=".", ms=2.0, color=line["color"], alpha=0.35)
     if any(item.bounds for item in parts):
         axes.plot([], [], ls="", marker=".", ms=3.0, color="#64748b", label="limit of the law")
     axes.set_xlabel(parts[0].x)

@@ -30,8 +30,8 @@ class Relation:
         x: label of the horizontal axis, with its unit.
         y: label of the vertical axis, with its unit.
         curves: pairs (x, y) by label, (nt,) each.
-        bounds: limits of the law at the samples with its viscous part, pairs (x, largest |y|) by label,
-            (nt,) each.
+        bounds: points of the law at the samples, pairs (x, y) by label, (n,) each: both limits of a sticking
+            joint, and the limit with the viscous part against the motion of a slipping joint.
         note: note on the selection of the curves.
     """
 
@@ -152,8 +152,16 @@ def _frictions(run: Trajectory, name: str, over_load: bool) -> list[Relation]:
         place.curves[law] = _broken(x, np.abs(force) if over_load else force, record.mode)
         if record.limit is not None and record.limit.ndim == 1:
             speed = np.abs(run.v[:, run.scene.model.joints[known[law]].idx_v])
-            place.bounds[law] = (x, record.limit + _viscous(run, law) * speed)
+            most = record.limit + _viscous(run, law) * speed
+            place.bounds[law] = (x, most) if over_load else _opposed(x, most, record.mode)
     return list(by_unit.values())
+
+
+def _opposed(x: Array, most: Array, mode: Any) -> tuple[Array, Array]:
+    """Return the largest friction of slipping samples against their motion, and of the others both ways."""
+    slips = np.zeros(len(x), dtype=int) if mode is None else np.sign(np.asarray(mode, dtype=int))
+    forth, back = slips >= 0, slips <= 0
+    return np.concatenate([x[forth], x[back]]), np.concatenate([-most[forth], most[back]])
 
 
 def _viscous(run: Trajectory, name: str) -> float:
