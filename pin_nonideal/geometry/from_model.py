@@ -139,6 +139,8 @@ def geometry_contacts(
                 pairs.addCollisionPair(pin.CollisionPair(i, j))
     if srdf is not None:
         path = file_path("geometry_contacts: srdf", srdf)
+        if not path.is_file():
+            raise LoadingError(f'geometry_contacts: srdf: no file "{path}"; give a path that exists')
         try:
             pin.removeCollisionPairs(model, pairs, str(path), False)
         except Exception as error:  # errors of Pinocchio and of its XML reader

@@ -15,7 +15,18 @@ from pin_nonideal.errors import InputError
 from pin_nonideal.scene.evaluation import SEVERAL
 from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.types import Array
-from pin_nonideal.validation import array, choice, count, flag, label, nonnegative, number, positive, sequence
+from pin_nonideal.validation import (
+    array,
+    choice,
+    count,
+    flag,
+    label,
+    nonnegative,
+    number,
+    positive,
+    relative_tolerance,
+    sequence,
+)
 
 # Integration methods by name, with a flag for adaptive steps.
 METHODS = {method.name: method.adaptive for method in core.methods()}
@@ -30,10 +41,7 @@ MIN_SPACINGS = 100.0
 NO_LIMIT = 2**62  # steps of a run without limit
 MAX_CACHED = 32  # maximum number of cached options of a scene
 MAX_SAMPLES = 1e8  # some gigabytes for a small robot
-# Smallest tolerances: no step meets rtol below rounding, and the square of error / atol must not overflow.
-MIN_RTOL, MIN_ATOL = 1e-14, 1e-100
-# Largest relative tolerance: a step that changes a coordinate by more than a tenth of it follows nothing.
-MAX_RTOL = 0.1
+MIN_ATOL = 1e-100  # smallest absolute tolerance: the square of error / atol must not overflow
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,13 +281,7 @@ def _relative(rtol: float | None) -> float:
     """
     if rtol is None:
         return DEFAULT_RTOL
-    relative = nonnegative("simulate: rtol", rtol)
-    if relative and not MIN_RTOL <= relative <= MAX_RTOL:
-        raise InputError(
-            f"simulate: rtol must be from {MIN_RTOL:g} (rounding) to {MAX_RTOL:g}, or zero for atol alone"
-            f"; got {relative:g}"
-        )
-    return relative
+    return relative_tolerance("simulate: rtol", rtol)
 
 
 def _lengths(dt: float | None, output_dt: float | None) -> dict[str, float]:

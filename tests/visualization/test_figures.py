@@ -169,6 +169,16 @@ def test_several_runs_share_their_axes_and_are_told_apart() -> None:
     assert "crank, run 2" in lines(plot([one, other], what="q"))
 
 
+def test_runs_with_and_without_friction_are_compared(belt: Any) -> None:
+    """Default plots are those that all runs have; only runs with friction elements have bands of modes."""
+    smooth = pn.simulate(belt.scene.replace(laws=[]), 0.1, record="energy")
+    figure = plot([belt, smooth], names=["rough", "smooth"])
+    assert [label.split("\n")[0] for label in (axes.get_ylabel() for axes in figure.axes)] == [
+        *("Position", "Velocity", "Energy", "Constraint violation", "")
+    ]
+    assert len(plot([smooth, belt], what="modes").axes) == 1
+
+
 def test_a_cloud_of_events_is_drawn_by_its_density() -> None:
     run = panda()
     times = np.linspace(0.0, 0.25, MAX_EVENT_LINES + 1)
