@@ -271,12 +271,45 @@ def test_the_address_brings_back_what_was_seen(browser: Any, loop: Watched, tmp_
     assert again.run("() => replay.time") == pytest.approx(0.4321, abs=1e-6)
     assert again.run("() => replay.speed") == 0.5
     assert again.run("() => replay.playing") is False
-    camera = [float(x) for x in address.split("cam=")[1].split("&")[0].split(",")]
-    now = again.run("() => replay.address").split("cam=")[1].split("&")[0].split(",")
-    np.testing.assert_allclose([float(x) for x in now], camera, rtol=1e-5, atol=1e-9)
+    assert numbers_in(again.run("() => replay.address"), "view") == numbers_in(address, "view")
+    assert numbers_in(address, "view")[2] > 0.99
     again.page.wait_for_function("() => location.hash.includes('t=0.4321')")
     again.close()
     loop.page.locator("#views button", has_text="usual").click()
+
+
+def numbers_in(address: str, key: str) -> list[float]:
+    return [float(x) for x in address.split(f"{key}=")[1].split("&")[0].split(",")]
+
+
+def pivots(page: Watched) -> Any:
+    """Positions of the pivots of the four-bar in the window, in pixels."""
+    return page.run("() => [[0, 0, 0], [0.9, 0, 0]].map((place) => replay.onScreen(place))")
+
+
+def test_a_link_frames_the_motion_for_the_window_that_opens_it(browser: Any, tmp_path: Path) -> None:
+    """A copied link of a large window moves the robot out of no small one; a view moved by hand is kept."""
+    path = pn.replay(four_bar(), tmp_path / "linked.html")
+    addresses = []
+    wide = Watched(browser, path)
+    wide.page.set_viewport_size({"width": 1400, "height": 900})
+    wide.run("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    addresses.append(wide.run("() => replay.address"))
+    wide.page.mouse.move(500, 200)
+    wide.page.mouse.wheel(0, 120)
+    wide.page.wait_for_function("() => replay.address.includes('cam=')")
+    addresses.append(wide.run("() => replay.address"))
+    wide.close()
+    places = []
+    for address in ("paused", *addresses):
+        small = Watched(browser, path, fragment=address)
+        small.page.set_viewport_size({"width": 420, "height": 800})
+        small.run("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        places.append(pivots(small))
+        kept = small.run("() => replay.address")
+        small.close()
+    np.testing.assert_allclose(places[1], places[0], atol=0.5)
+    np.testing.assert_allclose(numbers_in(kept, "cam"), numbers_in(addresses[1], "cam"), rtol=1e-5, atol=1e-9)
 
 
 def test_escape_closes_the_panel_and_every_control_has_a_name(loop: Watched) -> None:
