@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -196,6 +197,68 @@ def test_panels_cover_no_control_and_curves_are_tall(loop: Watched, size: tuple[
     assert covered == []
     assert min(heights) >= 100
     assert list_height > 60
+
+
+@pytest.fixture(scope="module")
+def feet(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """A quadruped on its feet: torques, friction and contacts with long names, eight curves in a plot."""
+    scene = pn.load("solo12_dropped")
+    contacts = [replace(c, name=f"{c.name} on the rough ground {k}") for k, c in enumerate(scene.contacts)]
+    friction = pn.JointFriction.for_joints(scene, coulomb=0.01)
+    run = pn.simulate(
+        scene.replace(contacts=contacts, laws=friction),
+        0.3,
+        method="moreau",
+        dt=1e-3,
+        record=("forces", "energy"),
+    )
+    watched = Watched(browser, pn.replay(run, tmp_path_factory.mktemp("feet") / "feet.html"))
+    watched.run("() => replay.seek(0.25)")
+    yield watched
+    watched.close()
+
+
+LAYOUT = """() => {
+  const box = (e) => e.getBoundingClientRect(), scroll = document.querySelector("#forces .scroll");
+  const names = [...scroll.querySelectorAll("tbody td:first-child")];
+  return {
+    cut: scroll.scrollWidth - scroll.clientWidth,
+    ends: [...scroll.querySelectorAll("tr")].map((row) => box(row).bottom - box(scroll).bottom),
+    names: new Set(names.map((e) => e.textContent)).size, titles: new Set(names.map((e) => e.title)).size,
+    legends: [...document.querySelectorAll(".plot ul")].map((e) => e.scrollHeight - e.clientHeight),
+    rows: [...document.querySelectorAll("#legend span")].map((e) => box(e).top),
+    heading: ["subtitle", "gap"].map((name) => box(document.getElementById(name)).left),
+    subtitle: document.querySelector("#subtitle").textContent,
+  };
+}"""
+
+
+@pytest.mark.parametrize("size", SIZES, ids=str)
+def test_tables_and_legends_are_whole(feet: Watched, size: tuple[int, int]) -> None:
+    feet.page.set_viewport_size({"width": size[0], "height": size[1]})
+    feet.run("() => { replay.showForces(true); dispatchEvent(new Event('resize')); }")
+    feet.run("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    found = feet.run(LAYOUT)
+    assert found["cut"] <= (1 if size[0] > 640 else 60)
+    assert min(abs(end) for end in found["ends"]) < 1.0  # a row ends where the table ends
+    assert found["names"] == found["titles"] > 10
+    assert max(found["legends"]) <= 1
+    assert found["subtitle"].startswith("13 joints · 4 contacts · ")
+    assert len(set(found["rows"])) <= 2
+
+
+def test_the_gap_of_a_loop_begins_its_line_where_the_line_above_begins(loop: Watched) -> None:
+    loop.page.set_viewport_size({"width": 420, "height": 800})
+    lefts = loop.run(LAYOUT)["heading"]
+    loop.page.set_viewport_size({"width": 1000, "height": 720})
+    assert len(lefts) == 2
+    assert lefts[0] == lefts[1]
+
+
+def test_zero_among_powers_of_ten_has_a_short_label(loop: Watched) -> None:
+    """A label of nine decimals would be cut at the edge of the plot."""
+    steps = "() => [stepLabel(0, 5e-11), stepLabel(5e-11, 5e-11), stepLabel(0, 0.5), stepLabel(0, 2e6)]"
+    assert loop.run(steps) == ["0", "5e-11", "0.0", "0"]
 
 
 COVERED = """() => {
