@@ -225,6 +225,7 @@ LAYOUT = """() => {
     cut: scroll.scrollWidth - scroll.clientWidth,
     ends: [...scroll.querySelectorAll("tr")].map((row) => box(row).bottom - box(scroll).bottom),
     names: new Set(names.map((e) => e.textContent)).size, titles: new Set(names.map((e) => e.title)).size,
+    titles_cut: [...document.querySelectorAll(".plot h2")].map((e) => e.scrollWidth - e.clientWidth),
     legends: [...document.querySelectorAll(".plot ul")].map((e) => e.scrollHeight - e.clientHeight),
     rows: [...document.querySelectorAll("#legend span")].map((e) => box(e).top),
     heading: ["subtitle", "gap"].map((name) => box(document.getElementById(name)).left),
@@ -243,6 +244,7 @@ def test_tables_and_legends_are_whole(feet: Watched, size: tuple[int, int]) -> N
     assert min(abs(end) for end in found["ends"]) < 1.0  # a row ends where the table ends
     assert found["names"] == found["titles"] > 10
     assert max(found["legends"]) <= 1
+    assert max(found["titles_cut"]) <= 0
     assert found["subtitle"].startswith("13 joints · 4 contacts · ")
     assert len(set(found["rows"])) <= 2
 
