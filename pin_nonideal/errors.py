@@ -226,7 +226,7 @@ def nearest(name: str, names: Iterable[str]) -> str:
     """
     import difflib
 
-    known = list(names)
+    known = list(dict.fromkeys(names))
     if len(name) <= NAME_MAX:
         for close in difflib.get_close_matches(name, known, n=3, cutoff=0.5):
             if _is_close(name, close):

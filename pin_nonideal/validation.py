@@ -91,6 +91,26 @@ def positive(what: str, value: object) -> float:
     return result
 
 
+# Bounds of relative tolerances: no step meets one below rounding, and a step that changes a coordinate by
+# more than a tenth of it follows nothing.
+MIN_RTOL, MAX_RTOL = 1e-14, 0.1
+
+
+def relative_tolerance(what: str, value: object) -> float:
+    """Return a relative tolerance within its bounds, or 0.
+
+    Raises:
+        InputError: `value` is no number, or outside the bounds.
+    """
+    relative = nonnegative(what, value)
+    if relative and not MIN_RTOL <= relative <= MAX_RTOL:
+        raise InputError(
+            f"{what} must be from {MIN_RTOL:g} (rounding) to {MAX_RTOL:g}, or zero for atol alone; "
+            f"got {relative:g}"
+        )
+    return relative
+
+
 def fraction(what: str, value: object) -> float:
     """Return a number from 0 to 1.
 
@@ -188,9 +208,11 @@ def floats(
     """Return a copy as floats, and the index of its first entry that is not finite, or None.
 
     The copy is None unless the dtype kind of `value` is in `kinds`, by default the real numbers. Without
-    `copy`, an array of floats is not copied.
+    `copy`, an array of floats is not copied. Masked entries of a masked array are NaN.
     """
     try:
+        if isinstance(value, np.ma.MaskedArray):
+            value = np.ma.filled(value.astype(float), np.nan)
         source = np.asarray(value)
         result = np.array(source, dtype=float, copy=copy or None) if source.dtype.kind in kinds else None
     except (TypeError, ValueError):  # rows of unequal length, or objects that are no numbers
@@ -222,7 +244,8 @@ def array(what: str, value: object, shape: Sequence[int | None], copy: bool = Tr
         return result
     expected = str(tuple("n" if s is None else s for s in shape)).replace("'", "")
     if result is None:
-        raise InputError(f"{what} must be an array of numbers of shape {expected}; got {short_repr(value)}")
+        form = f"an array of numbers of shape {expected}" if shape else "a number or an array of numbers"
+        raise InputError(f"{what} must be {form}; got {short_repr(value)}")
     if result.ndim != len(shape) or any(s not in (None, n) for s, n in zip(shape, result.shape, strict=True)):
         raise InputError(f"{what} must have shape {expected}; got shape {result.shape}")
     if where is not None:

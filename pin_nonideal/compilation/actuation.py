@@ -38,7 +38,9 @@ from .torques import (
 )
 
 
-def lower_actuation(u: object, out: core.Builder, resolver: Resolver, spec: SceneSpec) -> None:
+def lower_actuation(
+    u: object, out: core.Builder, resolver: Resolver, spec: SceneSpec
+) -> list[Callable[[], object]]:
     """Set the actuation of the scene.
 
     Args:
@@ -47,13 +49,16 @@ def lower_actuation(u: object, out: core.Builder, resolver: Resolver, spec: Scen
         resolver: frames and joints by name.
         spec: descriptions of the scene.
 
+    Returns:
+        Functions that runs call before their first step, see `BoundDrive`.
+
     Raises:
         InputError: shapes do not fit the model, two drives command the same joint, or drives cannot be added.
         UnknownNameError: a joint does not exist.
     """
     model, drives = resolver.model, requesting_drives(u)
     if not drives:
-        return
+        return []
     lowered = _lowered_drives(drives, resolver, spec)
     if len(drives) > 1:
         _require_separate(model, drives, [acts for _, acts in lowered])
@@ -62,6 +67,8 @@ def lower_actuation(u: object, out: core.Builder, resolver: Resolver, spec: Scen
     limits = effort_limits(u, model, [acts for _, acts in lowered])
     if limits is not None:
         out.limit_effort(least=limits[0], most=limits[1])
+    parts = [part for part, _ in lowered]
+    return [part.prepare for part in parts if isinstance(part, Called) and part.prepare is not None]
 
 
 def _lowered_drives(drives: Sequence[object], resolver: Resolver, spec: SceneSpec) -> list[tuple[Part, Mask]]:
@@ -106,8 +113,9 @@ def _lowered(u: object, resolver: Resolver, spec: SceneSpec, who: str) -> tuple[
             return Called(lambda t, q, v: initial, u.period), acts
         return Called(sampled_torque(u, model), u.period), acts
     if isinstance(u, SceneDrive):
-        function, acts, breaks = u.bound(model, resolver.q0, spec)
-        return Called(_Identified(checked(function, words(u), (model.nv,)), u), u.period, breaks), acts
+        function, acts, breaks, prepare = u.bound(model, resolver.q0, spec)
+        torques = _Identified(checked(function, words(u), (model.nv,)), u)
+        return Called(torques, u.period, breaks, prepare=prepare), acts
     if isinstance(u, HoldPosition):
         q = resolver.q0 if u.q is None else named_configuration(model, u.q, resolver.q0, f"{words(u)}: q")
         kp, kd = (gains_of(model, getattr(u, key), f"{words(u)}: {key}") for key in ("kp", "kd"))

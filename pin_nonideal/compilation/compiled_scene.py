@@ -69,7 +69,7 @@ class CompiledScene:
         except ValueError as error:
             raise InputError(str(error)) from None
         resolver = Resolver(model, q0)
-        described = lower(spec, builder, resolver)
+        described, self._prepare = lower(spec, builder, resolver)
         self.program = builder.finish()
         self.slices = row_slices(self.program)
         constraints = len(spec.constraints)  # contacts follow
@@ -117,16 +117,20 @@ class CompiledScene:
     ) -> tuple[core.Program, DelayedTorque | None]:
         """Return the program of a new run, and its delayed torques or None without a delay.
 
-        Delayed torques belong to one run, so a scene with a delay needs a program per run.
+        Drives are prepared for the run. Delayed torques belong to one run, so a scene with a delay needs a
+        program per run.
 
         Args:
             t0: start time of the run [s].
             by_thread: whether the program serves runs in several threads, each run in one thread.
 
         Raises:
-            InputError: a held table beside a sampled control changes between samples.
+            InputError: a held table beside a sampled control changes between samples, or a drive does not fit
+                the constraints.
         """
         require_samples(self.spec.actuation, t0)
+        for prepare in self._prepare:
+            prepare()
         if self._delayed is None:
             return self.program, None
         control, resolver, builder = self._delayed

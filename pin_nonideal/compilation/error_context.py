@@ -46,6 +46,23 @@ def opened(name: str, gaps: dict[str, float], t: float, after: str = "") -> Loop
     )
 
 
+def singular_position(names: Sequence[str], t: float) -> StepSizeError:
+    """Return the exception of a run whose constraints have become dependent.
+
+    Args:
+        names: constraints with dependent rows.
+        t: time [s].
+    """
+    who = f"constraint {_listed(names)} is" if len(names) == 1 else f"constraints {_listed(names)} are"
+    rows = "its rows" if len(names) == 1 else "their rows"
+    return StepSizeError(
+        f"{who} in a singular position at t = {t:.6g} s, such as full stretch or a dead point, where {rows} "
+        "become dependent and the motion ends or is not determined; drive another joint, or stay away from "
+        "the position",
+        time=t,
+    )
+
+
 class Circumstances(NamedTuple):
     """Parts of a scene that errors of its runs refer to.
 

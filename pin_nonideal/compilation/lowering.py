@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -31,15 +31,29 @@ class LoweredItem(NamedTuple):
         name: unique among its kind.
         description: the description.
         relower: function of (description, builder) that adds a replacement of the description.
+        prepare: functions of drives that runs call before their first step, see `BoundDrive`.
     """
 
     kind: str
     name: str
     description: Any
     relower: Callable[[object, Any], object]
+    prepare: Sequence[Callable[[], object]] = ()
 
 
-def lower(spec: SceneSpec, builder: core.Builder, resolver: Resolver) -> dict[str, Constraint | Contact]:
+class LoweredScene(NamedTuple):
+    """A scene that has been added to the builder.
+
+    Attributes:
+        described: constraints and contacts by their unique names.
+        prepare: functions of drives that runs call before their first step, see `BoundDrive`.
+    """
+
+    described: dict[str, Constraint | Contact]
+    prepare: list[Callable[[], object]]
+
+
+def lower(spec: SceneSpec, builder: core.Builder, resolver: Resolver) -> LoweredScene:
     """Add one scene to the core's builder.
 
     Args:
@@ -47,14 +61,12 @@ def lower(spec: SceneSpec, builder: core.Builder, resolver: Resolver) -> dict[st
         builder: the core's program under construction, still empty.
         resolver: frames and joints by name.
 
-    Returns:
-        Constraints and contacts by their unique names.
-
     Raises:
         InputError, UnknownNameError: a frame, joint or constraint does not exist or does not fit.
     """
-    items = lowered(spec, builder, resolver)
-    return {each.name: each.description for each in items if each.kind in ("constraint", "contact")}
+    items = list(lowered(spec, builder, resolver))
+    described = {each.name: each.description for each in items if each.kind in ("constraint", "contact")}
+    return LoweredScene(described, [prepare for each in items for prepare in each.prepare])
 
 
 def lowered(spec: SceneSpec, builder: core.Builder, resolver: Resolver) -> Iterator[LoweredItem]:
@@ -97,9 +109,9 @@ def lowered(spec: SceneSpec, builder: core.Builder, resolver: Resolver) -> Itera
     for name, f in zip(unique_names(spec.forces, set()), spec.forces, strict=True):
         lower_force(f, builder, resolver)
         yield LoweredItem("force", name, f, lambda f, out: lower_force(f, out, resolver))
-    lower_actuation(spec.actuation, builder, resolver, spec)
+    prepare = lower_actuation(spec.actuation, builder, resolver, spec)
     relower = partial(_relower_actuation, resolver, spec)
-    yield LoweredItem("actuation", "actuation", spec.actuation, relower)
+    yield LoweredItem("actuation", "actuation", spec.actuation, relower, prepare)
     builder.set_impact(core.ImpactLaw[spec.impact])  # last, since it belongs to no description
 
 

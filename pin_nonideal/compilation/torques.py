@@ -43,13 +43,14 @@ class Called(NamedTuple):
     """Torques of a function (t, q, v) -> tau, held between samples of `period` [s] if it is not None.
 
     Steps end at the times `breaks` [s], (n,), where torques that are not held may jump. The torques of the
-    table `beside` add to held torques.
+    table `beside` add to held torques. Runs call `prepare` before their first step, see `BoundDrive`.
     """
 
     function: Callable[..., Any]
     period: float | None
     breaks: Array = np.zeros(0)
     beside: Timed | None = None
+    prepare: Callable[[], object] | None = None
 
 
 Part = Constant | Timed | Spring | Called

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from dataclasses import fields as dataclass_fields
 
 from pin_nonideal.description.constraints import is_mimic
-from pin_nonideal.errors import InputError, UnknownNameError, nearest
+from pin_nonideal.errors import InputError, UnknownNameError, nearest, short_repr
 from pin_nonideal.types import Model
 from pin_nonideal.validation import (
     choice,
@@ -16,6 +17,7 @@ from pin_nonideal.validation import (
     number,
     optional_text,
     positive,
+    sequence,
     text,
 )
 
@@ -141,20 +143,24 @@ class JointFriction:
             InputError: a coefficient is invalid, or all coefficients of a joint are zero.
             UnknownNameError: there is no such joint.
         """
+        who = "JointFriction.for_joints"
         model: Model = getattr(scene, "model", scene)
+        if not (hasattr(model, "names") and hasattr(model, "joints")):
+            raise InputError(f"{who}: scene must be a Scene or a pinocchio.Model; got {short_repr(scene)}")
         known = [str(name) for name in model.names][1:]
         if joints is None:
             mimics = {c.joint1 for c in getattr(scene, "constraints", ()) if is_mimic(c)}
             single = [name for name, j in zip(known, list(model.joints)[1:], strict=True) if j.nv == 1]
             joints = [name for name in single if name not in mimics]
-        table = joints if isinstance(joints, Mapping) else {name: {} for name in joints}
-        laws = []
+        table = joints if isinstance(joints, Mapping) else {n: {} for n in sequence(f"{who}: joints", joints)}
+        laws, fields_of_law = [], [entry.name for entry in dataclass_fields(cls) if entry.name != "joint"]
         for joint, fields in table.items():
             if joint not in known:
-                raise UnknownNameError(
-                    f'JointFriction.for_joints: no joint "{joint}"{nearest(str(joint), known)}'
-                )
+                raise UnknownNameError(f'{who}: no joint "{joint}"{nearest(str(joint), known)}')
             own = fields if isinstance(fields, Mapping) else {"coulomb": fields}
+            for key in [*coefficients, *own]:
+                if key not in fields_of_law:
+                    raise UnknownNameError(f'{who}: no coefficient "{key}"{nearest(str(key), fields_of_law)}')
             laws.append(cls(joint, **{"name": f"{joint} friction", **coefficients, **own}))  # type: ignore[arg-type]
         return laws
 

@@ -21,11 +21,14 @@ class BoundDrive(NamedTuple):
         function: function (t, q, v) -> tau, (nv,).
         acts: mask of the degrees of freedom that it drives, (nv,).
         breaks: times at which the torque or its rate jumps [s], ascending, (n,). Steps end there.
+        prepare: function that runs call before their first step, or None. It raises an InputError if the
+            drive does not fit the constraints.
     """
 
     function: Callable[[float, Array, Array], Array]
     acts: NDArray[np.bool_]
     breaks: Array
+    prepare: Callable[[], object] | None = None
 
 
 class SceneDrive(ABC):

@@ -139,6 +139,8 @@ def geometry_contacts(
                 pairs.addCollisionPair(pin.CollisionPair(i, j))
     if srdf is not None:
         path = file_path("geometry_contacts: srdf", srdf)
+        if not path.is_file():
+            raise LoadingError(f'geometry_contacts: srdf: no file "{path}"; give a path that exists')
         try:
             pin.removeCollisionPairs(model, pairs, str(path), False)
         except Exception as error:  # errors of Pinocchio and of its XML reader
@@ -215,7 +217,10 @@ def _check_models(who: str, model: object, collision_model: object) -> None:
         ("collision_model", collision_model, pin.GeometryModel),
     ):
         if not isinstance(value, kind):
-            raise InputError(f"{who}: {what} must be a pinocchio.{kind.__name__}; got {short_repr(value)}")
+            own = f"; pass scene.{what}" if hasattr(value, what) else ""
+            raise InputError(
+                f"{who}: {what} must be a pinocchio.{kind.__name__}; got {short_repr(value)}{own}"
+            )
 
 
 def _rubbing(who: str, mu: object, static_ratio: object, restitution: object) -> dict[str, Any]:
@@ -244,12 +249,21 @@ def _shapes_of_links(
         if not own and link not in known:
             raise UnknownNameError(f'{who}: no link or joint "{link}" in the model{nearest(link, known)}')
         if not own:
-            shaped = sorted(set().union(*carriers) - {"universe"})
             raise InputError(
-                f'{who}: link "{link}" has no shape in the collision model{nearest(link, shaped)}'
+                f'{who}: link "{link}" has no shape in the collision model{_shaped(link, model, carriers)}'
             )
         link_of_shape |= {i: link for i in own if i not in link_of_shape}
     return link_of_shape
+
+
+def _shaped(link: str, model: Model, carriers: Sequence[set[str]]) -> str:
+    """Return words on the links with shapes that move with a link, or on links of similar names."""
+    own_frames = [frame for frame in model.frames if frame.name == link]
+    joint = str(model.names[own_frames[0].parentJoint]) if own_frames else link
+    own = sorted(set().union(*(names for names in carriers if joint in names)) - {joint})
+    if joint != "universe" and own:
+        return f'; name "{own[0]}", which moves with it'
+    return nearest(link, sorted(set().union(*carriers) - {"universe"}))
 
 
 def _carriers(model: Model, item: GeometryObject) -> Iterator[str]:

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Literal, overload
 
+import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from pin_nonideal.compilation.report import report
 from pin_nonideal.compilation.summary import Description, describe
 from pin_nonideal.equation import Solution
+from pin_nonideal.errors import InputError, short_repr
 from pin_nonideal.states.report import ProjectionReport
 from pin_nonideal.types import Array, State
 from pin_nonideal.validation import choice, number
@@ -337,3 +339,20 @@ class Scene(EditableScene):
         """Return a text with joints, constraints, rows, rank, mobility and removed rows of the scene."""
         rank = self._evaluator.rank(*self.initial_state())
         return report(self._compiled, self.name, rank, notes_of(self, self._states.start_notes()))
+
+
+def require_scene(who: str, scene: object) -> None:
+    """Check that an argument is a scene.
+
+    Args:
+        who: name of the function, for messages.
+        scene: the argument.
+
+    Raises:
+        InputError: it is something else; the message tells how a name or a model becomes a scene.
+    """
+    if isinstance(scene, Scene):
+        return
+    remedy = f"; pass pn.load({short_repr(scene)})" if isinstance(scene, str) else ""
+    remedy = "; pass pn.Scene(model)" if isinstance(scene, pin.Model) else remedy
+    raise InputError(f"{who}: scene must be a Scene; got {type(scene).__name__}{remedy}")

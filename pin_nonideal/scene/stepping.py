@@ -13,7 +13,7 @@ from pin_nonideal.core_loader import core
 from pin_nonideal.errors import InputError
 from pin_nonideal.states.parsing import named_joint_values
 from pin_nonideal.types import Array, State
-from pin_nonideal.validation import array, choice, nonnegative, number, positive
+from pin_nonideal.validation import array, choice, nonnegative, number, positive, relative_tolerance
 
 from .evaluation import Evaluator
 from .state import SceneStates
@@ -187,7 +187,7 @@ class SceneStepper:
                 f"stepper: period must be a whole number of steps; got {length:g} s and dt = {size:g} s"
             )
         tolerances = (
-            RTOL if rtol is None else positive("stepper: rtol", rtol),
+            RTOL if rtol is None else relative_tolerance("stepper: rtol", positive("stepper: rtol", rtol)),
             ATOL if atol is None else nonnegative("stepper: atol", atol),
         )
         begin = number("stepper: t0", t0)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from pin_nonideal.description.drive_kinds import sampled_drives
 from pin_nonideal.errors import InputError
 from pin_nonideal.scene.scene import Scene
-from pin_nonideal.validation import choice, count, label, nonnegative, positive, sequence
+from pin_nonideal.validation import choice, count, label, positive, relative_tolerance, sequence
 
 from .methods import METHODS, SCIPY
 
@@ -20,10 +20,7 @@ FIELDS = {"F_ideal": "forces", "F_nonideal": "forces", "lam": "forces", "lam_ide
 MIN_SPACINGS = 100.0
 NO_LIMIT = 2**62  # steps of a run without limit
 MAX_SAMPLES = 1e8  # some gigabytes for a small robot
-# Smallest tolerances: no step meets rtol below rounding, and the square of error / atol must not overflow.
-MIN_RTOL, MIN_ATOL = 1e-14, 1e-100
-# Largest relative tolerance: a step that changes a coordinate by more than a tenth of it follows nothing.
-MAX_RTOL = 0.1
+MIN_ATOL = 1e-100  # smallest absolute tolerance: the square of error / atol must not overflow
 DEFAULT_RTOL = 1e-8  # relative tolerance of a run without one
 
 
@@ -52,7 +49,7 @@ def check_method(method: str, rtol: float | None, atol: ArrayLike | None, dt: fl
         raise InputError(f'simulate: method "{method}" chooses its own steps; leave dt out, or set output_dt')
 
 
-def relative_tolerance(rtol: float | None) -> float:
+def run_tolerance(rtol: float | None) -> float:
     """Return the relative tolerance, 0 for none.
 
     Args:
@@ -63,13 +60,7 @@ def relative_tolerance(rtol: float | None) -> float:
     """
     if rtol is None:
         return DEFAULT_RTOL
-    relative = nonnegative("simulate: rtol", rtol)
-    if relative and not MIN_RTOL <= relative <= MAX_RTOL:
-        raise InputError(
-            f"simulate: rtol must be from {MIN_RTOL:g} (rounding) to {MAX_RTOL:g}, or zero for atol alone"
-            f"; got {relative:g}"
-        )
-    return relative
+    return relative_tolerance("simulate: rtol", rtol)
 
 
 def step_lengths(dt: float | None, output_dt: float | None) -> dict[str, float]:

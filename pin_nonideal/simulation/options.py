@@ -21,7 +21,7 @@ from .option_checks import (
     check_method,
     check_opening,
     record_groups,
-    relative_tolerance,
+    run_tolerance,
     step_lengths,
     step_limit,
     wall_limit,
@@ -136,7 +136,7 @@ def run_options(
             tolerance[2 * nv :] = tolerance[: 2 * nv].min()
             if (tolerance < 0.0).any():
                 raise InputError(f"simulate: atol must not be negative; got {tolerance.min():g}")
-    relative = relative_tolerance(rtol)
+    relative = run_tolerance(rtol)
     if relative == 0.0 and not (tolerance > 0.0).all():
         raise InputError("simulate: rtol and atol must not both be zero; set one of them")
     begin, length = number("simulate: t0", t0), positive("simulate: duration", duration)
@@ -210,7 +210,7 @@ def check_values(
     """
     del others
     check_method(method, rtol, atol, dt)
-    relative_tolerance(rtol)
+    run_tolerance(rtol)
     step_lengths(dt, output_dt)
     record_groups(record)
     step_limit(max_steps)

@@ -7,8 +7,9 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
-from pin_nonideal.compilation.error_context import opened
+from pin_nonideal.compilation.error_context import opened, singular_position
 from pin_nonideal.core_loader import core
 from pin_nonideal.errors import (
     LoopClosureError,
@@ -16,16 +17,17 @@ from pin_nonideal.errors import (
     OutputError,
     RunError,
     RunInterrupted,
+    StepSizeError,
     UserFunctionError,
 )
 from pin_nonideal.scene.scene import Scene, compiled_scene
-from pin_nonideal.states.rows import gap_rows, rows_at
+from pin_nonideal.states.rows import DEPENDENT, gap_rows, holonomic_rows, metric_rows, row_slices, rows_at
 from pin_nonideal.trajectory.dense_output import dense_output
 from pin_nonideal.trajectory.fields import with_defaults
 from pin_nonideal.trajectory.outcome import outcome_fields, outcome_stats
 from pin_nonideal.trajectory.records import UserEventRecord
 from pin_nonideal.trajectory.trajectory import Trajectory
-from pin_nonideal.types import Table
+from pin_nonideal.types import Array, Table
 
 from .events import exact_grid, grid_of
 from .options import RunOptions
@@ -33,6 +35,9 @@ from .options import RunOptions
 # Largest residual of a sample on the constraints [m or rad]. Projection after each step reduces residuals to
 # rounding, or to the square root of rounding in singular positions.
 LEFT = 1e-6
+# Smallest singular value of the rows over that at the start below which a position is singular, and the part
+# of a constraint in the dependence above which an error names it.
+SINGULAR, DEPENDENT_SHARE = 1e-4, 0.1
 TRAJECTORY_HINT = "the trajectory up to there is in error.trajectory"
 
 
@@ -79,7 +84,11 @@ def finish(
     trajectory = shaped()
     last = float(trajectory.t[-1]) if len(trajectory) else options.t0
     cause: BaseException | None = None
-    if isinstance(stopped, core.CoreFailure):
+    singular = _singular(scene, trajectory, stopped)
+    if singular is not None:
+        error = singular
+        error.args = (f"{error}; {TRAJECTORY_HINT}",)
+    elif isinstance(stopped, core.CoreFailure):
         error = compiled_scene(scene).named(stopped)
         error.args = (f"{error}{_overflow_hint(error, options)}; {TRAJECTORY_HINT}", *error.args[1:])
     elif isinstance(stopped, KeyboardInterrupt):
@@ -124,6 +133,34 @@ def _opened(scene: Scene, trajectory: Trajectory) -> LoopClosureError:
     stopped = opened(max(gaps, key=lambda key: gaps[key]), gaps, t, f"; {TRAJECTORY_HINT}")
     stopped.trajectory = _stopped(trajectory.first(k), stopped)
     return stopped
+
+
+def _singular(scene: Scene, trajectory: Trajectory, stopped: BaseException) -> RunError | None:
+    """Return the error of a run whose steps end in a singular position of its constraints, or None."""
+    of_core = isinstance(stopped, core.CoreFailure) and stopped.kind is core.FailureKind.step_size
+    if not (of_core or type(stopped) is StepSizeError) or len(trajectory) < 2:
+        return None
+    compiled = compiled_scene(scene)
+    runner, rows = compiled.program.runner(), holonomic_rows(compiled.program)
+    (first, _), (last, shares) = (
+        _independence(runner, scene, trajectory, k, rows) for k in (0, len(trajectory) - 1)
+    )
+    rank = int((first > DEPENDENT).sum())
+    if not rank or last[rank - 1] > SINGULAR * first[rank - 1]:
+        return None
+    weights = np.zeros(len(rows))
+    weights[rows] = np.abs(shares[:, rank - 1])
+    names = [n for n, part in row_slices(compiled.program).items() if weights[part].max() > DEPENDENT_SHARE]
+    return singular_position(names, float(trajectory.t[-1]))
+
+
+def _independence(
+    runner: core.Runner, scene: Scene, run: Trajectory, k: int, rows: NDArray[np.bool_]
+) -> tuple[Array, Array]:
+    """Return the singular values of the rows of positions at a sample, and the left singular vectors."""
+    M = scene.mass_matrix(run.q[k])
+    left, values, _ = np.linalg.svd(metric_rows(runner, M, run.q[k], run.v[k], float(run.t[k]))[rows])
+    return values, left
 
 
 def _overflow_hint(error: RunError, options: RunOptions) -> str:

@@ -8,7 +8,7 @@ import time
 from pin_nonideal.atomic_files import file_path
 from pin_nonideal.errors import InputError, LoadingError
 from pin_nonideal.loading.load import load
-from pin_nonideal.scene.scene import Scene, compiled_scene
+from pin_nonideal.scene.scene import Scene, compiled_scene, require_scene
 from pin_nonideal.trajectory.trajectory import Trajectory
 from pin_nonideal.validation import choice, nonnegative
 
@@ -53,8 +53,8 @@ def resume(
     choice("resume: progress", progress, (True, False, None))
     if checkpoint_interval is not None:
         nonnegative("resume: checkpoint_interval", checkpoint_interval)
-    if not (scene is None or isinstance(scene, Scene)):
-        raise InputError(f"resume: scene must be a Scene; got {type(scene).__name__}")
+    if scene is not None:
+        require_scene("resume", scene)
     held = read_checkpoint(source)
     if scene is None:
         if held.origin is None:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from pin_nonideal.compilation.parameter_overrides import ParameterOverrides, parse_overrides
 from pin_nonideal.core_loader import core
 from pin_nonideal.errors import InputError, PinNonidealError, RunError, RunInterrupted, short_repr
-from pin_nonideal.scene.scene import Scene, compiled_scene, scene_states
+from pin_nonideal.scene.scene import Scene, compiled_scene, require_scene, scene_states
 from pin_nonideal.states.joint_layout import require_resolved
 from pin_nonideal.types import Array
 from pin_nonideal.validation import array, choice, count
@@ -94,8 +94,7 @@ def rollout(
             `trajectory` has its samples, and `results` holds the trajectories and errors of all runs.
         RunInterrupted: Ctrl-C ended all runs; the attributes are those of RunError.
     """
-    if not isinstance(scene, Scene):
-        raise InputError(f"rollout: scene must be a Scene; got {type(scene).__name__}")
+    require_scene("rollout", scene)
     threads = _threads(jobs)
     keep = choice("rollout: failures", failures, ("raise", "keep")) == "keep"
     starts_q, starts_v = _starts(scene, q, v, parameters)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from pin_nonideal.atomic_files import check_writable, file_path
 from pin_nonideal.compilation.error_context import stiff_hint
 from pin_nonideal.errors import InputError
-from pin_nonideal.scene.scene import Scene, compiled_scene, scene_states
+from pin_nonideal.scene.scene import Scene, compiled_scene, require_scene, scene_states
 from pin_nonideal.trajectory.trajectory import Trajectory
 from pin_nonideal.types import State
 from pin_nonideal.validation import choice, nonnegative
@@ -114,8 +114,7 @@ def simulate(
         RunInterrupted: Ctrl-C was pressed; its `trajectory` holds the samples before the stop. It is empty if
             decoupled mechanisms ran one after another.
     """
-    if not isinstance(scene, Scene):
-        raise InputError(f"simulate: scene must be a Scene; got {type(scene).__name__}")
+    require_scene("simulate", scene)
     requests, between = parse_events(events), parse_callback(callback, scene.model.nv)
     choice("simulate: progress", progress, (True, False, None))
     steps = (method, rtol, atol, dt, output_dt, max_steps)

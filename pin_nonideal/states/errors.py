@@ -25,16 +25,18 @@ def deepest_contact(phi: Array, program: core.Program) -> tuple[str, float]:
     return name, depths.get(name, 0.0)
 
 
-def largest_loop_gap(phi: Array, program: core.Program) -> float:
-    """Return the largest residual of the holonomic bilateral constraints.
+def widest_loop(phi: Array, program: core.Program) -> tuple[str, float]:
+    """Return the holonomic bilateral constraint with the largest residual, or ("", 0.0) without any.
 
     Args:
-        phi: residuals of all rows, (m,).
+        phi: residuals or rates of all rows, (m,).
         program: the core's program.
     """
     slices = row_slices(program)
-    loops = [phi[slices[c.name]] for c in program.constraints[: program.first_gap] if all(c.holonomic)]
-    return max((float(np.abs(part).max(initial=0.0)) for part in loops), default=0.0)
+    loops = [c.name for c in program.constraints[: program.first_gap] if all(c.holonomic)]
+    gaps = {name: _largest(phi[slices[name]]) for name in loops}
+    name = max(gaps, key=lambda key: gaps[key], default="")
+    return name, gaps.get(name, 0.0)
 
 
 def refuse_deep_starts(phi: Array, program: core.Program, allowed: float, t: float) -> None:
@@ -49,7 +51,7 @@ def refuse_deep_starts(phi: Array, program: core.Program, allowed: float, t: flo
     Raises:
         InputError: a contact penetrates deeper.
     """
-    if largest_loop_gap(phi, program) > allowed:
+    if widest_loop(phi, program)[1] > allowed:
         return
     name, depth = deepest_contact(phi, program)
     if name and depth > allowed:

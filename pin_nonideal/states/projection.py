@@ -15,7 +15,7 @@ from pin_nonideal.errors import InputError, PinNonidealError
 from pin_nonideal.types import Array, Model
 
 from .closure_search import ClosureSearch, mass_function, metric
-from .errors import largest_loop_gap, open_loops, penetration_error, refuse_deep_starts, velocity_error
+from .errors import open_loops, penetration_error, refuse_deep_starts, velocity_error, widest_loop
 from .held import (
     NOTHING_HELD,
     Held,
@@ -224,7 +224,7 @@ class Projection:
             InputError: the loops are closed at q, but no short displacement removes the penetration.
         """
         phi, now = self._residuals(runner, q, t), self._residuals(runner, projected, t)
-        inside = not self._is_outside(q, phi) and largest_loop_gap(phi, self.program) <= self._closed
+        inside = not self._is_outside(q, phi) and widest_loop(phi, self.program)[1] <= self._closed
         far = (np.abs(pin.difference(self.model, q, projected)) > FAR * self.unit).any()
         if inside and (not met or (far and not nearest)):
             raise penetration_error(phi, self.program, t)

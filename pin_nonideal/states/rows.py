@@ -86,6 +86,26 @@ def row_lengths(runner: core.Runner, q: Array, v: Array, t: float, *, own: bool 
 DEPENDENT = 1e-9
 
 
+def metric_rows(runner: core.Runner, M: Array, q: Array, v: Array, t: float) -> Array:
+    """Compute all rows over their greatest possible lengths in the metric of M^-1, (m, nv).
+
+    Args:
+        runner: a workspace of the core; its friction elements are unloaded afterwards.
+        M: mass matrix, (nv, nv).
+        q: configuration, (nq,).
+        v: velocity, (nv,).
+        t: time [s].
+
+    Returns:
+        The rows in axes in which M is the identity; rows of greatest length zero are zero.
+    """
+    A = rows_at(runner, q, v, t)[0]
+    lengths = row_lengths(runner, q, v, t)[: len(A), None]
+    rows = np.linalg.solve(np.linalg.cholesky(M), A.T).T
+    scaled: Array = np.divide(rows, lengths, out=np.zeros_like(rows), where=lengths > 0.0)
+    return scaled
+
+
 def shortest(scaled: Array, y: Array, lengths: Array) -> Array:
     """Solve min |scaled diag(lengths) x - y| for the x of least norm, (n,).
 

@@ -7,8 +7,9 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from pin_nonideal.description.scene_spec import SceneSpec
-from pin_nonideal.errors import InputError
+from pin_nonideal.errors import InputError, PinNonidealError
 from pin_nonideal.scene.scene import Scene, compiled_scene
+from pin_nonideal.states.errors import widest_loop
 from pin_nonideal.states.held import Held, settled
 from pin_nonideal.states.reference_motion import TIME_ROUNDING, ReferenceMotion
 from pin_nonideal.states.rows import DEPENDENT, holonomic_rows, rows_at
@@ -23,7 +24,10 @@ Mask = NDArray[np.bool_]
 # Velocities of a coordinate below this part of the admitted ones depend on the coordinates chosen before.
 INDEPENDENT = 1e-6
 LONGEST = 0.1  # move of a given coordinate between two closures, in rad or relative to the scene's length
-LOG_ROUNDING = 1e-3  # largest move of a named coordinate, in rad or relative to the scene's length
+LOG_ROUNDING = 1e-3  # largest move of a given coordinate, in rad or relative to the scene's length
+# Largest change of a given velocity over the largest given velocity. Differences of logged positions stay
+# below it.
+RATE_ROUNDING = 0.1
 CLOSED = 1e-9  # residual of a reference on the constraints, relative to the scene's length or 1 m
 
 
@@ -42,12 +46,11 @@ class ClosedReference:
         driven: names of the driven joints.
         dofs: mask of their degrees of freedom, (nv,).
         who: words for messages.
-        by_name: whether the coordinates are given by name; projection then holds all of them up to rounding.
         rounding: rounding of times at the ends, see `ReferenceMotion`.
 
     Raises:
-        InputError: the given coordinates do not determine the motion, or no configuration on the constraints
-            has them.
+        InputError: the given coordinates do not determine the motion, no configuration on the constraints has
+            them, or given coordinates or velocities violate the constraints.
     """
 
     def __init__(
@@ -60,15 +63,19 @@ class ClosedReference:
         driven: list[str],
         dofs: Mask,
         who: str,
-        by_name: bool = True,
         rounding: float = TIME_ROUNDING,
     ) -> None:
         self._scene, self._driven, self._who = scene, driven, who
         compiled = compiled_scene(scene)
-        self._runner, self._rows = compiled.program.runner(), holonomic_rows(compiled.program)
+        self._program = compiled.program
+        self._runner, self._rows = self._program.runner(), holonomic_rows(self._program)
         self._allowed = CLOSED * max(1.0, compiled.projection.length)
         still = np.zeros(scene.model.nv)
-        start = compiled.project(q[0], still, float(times[0]), Held(q=stated & dofs))[0]
+        try:
+            start = compiled.project(q[0], still, float(times[0]), Held(q=stated & dofs))[0]
+        except PinNonidealError:
+            self._free = ~(stated & dofs)
+            start = self._settled(q[0], float(times[0]))  # raises an error that names the loop
         basis = AtRest(scene, still, float(times[0]), start).free(start)
         self._free = ~self._independent(basis, [stated & dofs, stated])
         on = np.array(q)
@@ -76,12 +83,12 @@ class ClosedReference:
         unit = np.where(slides(scene.model), compiled.projection.length or 1.0, 1.0)
         for k in range(1, len(on)):
             on[k] = self._followed(on[k - 1], q[k], stated, times[k - 1 : k + 1], unit)
-        if by_name:
-            self._require_reference(on, q, times, stated, unit)
+        self._require_reference(on, q, times, stated, unit)
         on_rates = None if v is None else np.array(v)
-        if on_rates is not None:
+        if v is not None and on_rates is not None:
             for k, t in enumerate(times.tolist()):
                 on_rates[k] = self._velocity(on[k], on_rates[k], t)
+            self._require_rates(on, on_rates, v, times, stated, unit)
         self._motion = ReferenceMotion(scene.model, times, on, on_rates, rounding)
 
     def __call__(self, t: float) -> tuple[Array, Array, Array]:
@@ -125,16 +132,46 @@ class ClosedReference:
         Raises:
             InputError: a given coordinate has moved farther.
         """
-        model = self._scene.model
+        model, still = self._scene.model, np.zeros(self._scene.model.nv)
         for t, now, reference in zip(times.tolist(), on, q, strict=True):
-            away = np.where(stated, np.abs(pin.difference(model, reference, now)) / unit, 0.0)
-            worst = int(np.argmax(away))
-            if away[worst] > LOG_ROUNDING:
-                raise InputError(
-                    f'{self._who}: q of "{coordinate(model, worst)}" cannot be kept together with the other '
-                    f"named joints at t = {t:g} s, since the constraints move it by {away[worst]:.2g}; name "
-                    "as many joints as the constraints leave free, or give consistent values"
-                )
+            away = np.where(stated, pin.difference(model, now, reference), 0.0)
+            if np.abs(away / unit).max(initial=0.0) > LOG_ROUNDING:
+                given = pin.integrate(model, now, away)
+                phi = rows_at(self._runner, given, still, t)[2]
+                raise self._open(f"q at t = {t:g} s", "(m or rad)", phi, away, unit)
+
+    def _require_rates(
+        self, on: Array, on_rates: Array, v: Array, times: Array, stated: Mask, unit: Array
+    ) -> None:
+        """Check that given velocities keep their values, up to the errors of differences.
+
+        Raises:
+            InputError: a given velocity has changed more.
+        """
+        allowed = LOG_ROUNDING + RATE_ROUNDING * float(np.abs(v[:, stated] / unit[stated]).max(initial=0.0))
+        for t, q, now, reference in zip(times.tolist(), on, on_rates, v, strict=True):
+            away = np.where(stated, reference - now, 0.0)
+            if np.abs(away / unit).max(initial=0.0) > allowed:
+                rate = rows_at(self._runner, q, now + away, t)[3]
+                raise self._open(f"v at t = {t:g} s", "(m/s or rad/s)", rate, away, unit)
+
+    def _open(self, what: str, unit: str, rows: Array, away: Array, scale: Array) -> InputError:
+        """Return the error of a sample that violates the constraints.
+
+        Args:
+            what: words on the sample.
+            unit: unit of residuals or rates.
+            rows: residuals or rates of the sample, (m,).
+            away: difference of the sample from the one on the constraints, (nv,).
+            scale: unit displacement of each coordinate, (nv,).
+        """
+        name, gap = widest_loop(rows, self._program)
+        worst = int(np.argmax(np.abs(away / scale)))
+        return InputError(
+            f'{self._who}: {what} opens "{name}" by {gap:.2g} {unit}, and the constraints change '
+            f'"{coordinate(self._scene.model, worst)}" by {abs(away[worst]):.2g}; give samples that satisfy '
+            f"the constraints, or only as many joints by name as these leave free, {np.sum(~self._free)} here"
+        )
 
     def _independent(self, basis: Array, groups: list[Mask]) -> Mask:
         """Return the mask of coordinates that determine the motion, (nv,), from the first groups first."""
@@ -159,11 +196,12 @@ class ClosedReference:
     def _settled(self, q: Array, t: float) -> Array:
         """Return the configuration on the constraints with the independent coordinates of q, (nq,)."""
         on = settled(self._scene.model, self._runner, q, self._free, self._rows, t)
-        residual = rows_at(self._runner, on, np.zeros(len(self._free)), t)[2][self._rows]
-        if not np.abs(residual).max(initial=0.0) <= self._allowed:
+        phi = rows_at(self._runner, on, np.zeros(len(self._free)), t)[2]
+        if not np.abs(phi[self._rows]).max(initial=0.0) <= self._allowed:
+            name, gap = widest_loop(phi, self._program)
             raise InputError(
-                f"{self._who}: no configuration on the constraints has the reference at t = {t:g} s; the "
-                f"loops stay open by {np.abs(residual).max():.2g} (m or rad)"
+                f"{self._who}: no configuration on the constraints has the reference at t = {t:g} s: "
+                f'"{name}" stays open by {gap:.2g} (m or rad); give q within the reach of the constraints'
             )
         return on
 

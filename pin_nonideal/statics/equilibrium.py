@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pin_nonideal.errors import EquilibriumError, InputError, LoopClosureError
 from pin_nonideal.html_tables import numbers, table
-from pin_nonideal.scene.scene import Scene
+from pin_nonideal.scene.scene import Scene, require_scene
 from pin_nonideal.states.parsing import named_velocity
 from pin_nonideal.types import Array, Model, State
 from pin_nonideal.validation import choice, count, number
@@ -102,8 +102,7 @@ def equilibrium(
         LoopClosureError: the loops cannot be closed.
         EquilibriumError: no equilibrium is found.
     """
-    if not isinstance(scene, Scene):
-        raise InputError(f"equilibrium: scene must be a Scene; got {type(scene).__name__}")
+    require_scene("equilibrium", scene)
     downhill = choice("equilibrium: stable", stable, (True, False))
     still = np.zeros(scene.model.nv)
     torque = None if tau is None else named_velocity(scene.model, tau, still, "equilibrium: tau")

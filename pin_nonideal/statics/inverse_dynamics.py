@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pin_nonideal.core_loader import core
 from pin_nonideal.errors import FrictionConvergenceError, InputError, short_repr
-from pin_nonideal.scene.scene import Scene
+from pin_nonideal.scene.scene import Scene, require_scene
 from pin_nonideal.states.parsing import (
     joint_named,
     named_configuration,
@@ -105,8 +105,7 @@ def inverse_dynamics(
         UnknownNameError: a joint does not exist.
         FrictionConvergenceError: the iteration for load-dependent friction did not converge.
     """
-    if not isinstance(scene, Scene):
-        raise InputError(f"inverse_dynamics: scene must be a Scene; got {type(scene).__name__}")
+    require_scene("inverse_dynamics", scene)
     model, still = scene.model, np.zeros(scene.model.nv)
     at = named_configuration(model, q, scene.q0, "inverse_dynamics: q")
     speed = named_velocity(model, v, scene.v0, "inverse_dynamics: v")

@@ -8,9 +8,8 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from pin_nonideal.errors import InputError
 from pin_nonideal.html_tables import NAMES_MAX, numbers, table
-from pin_nonideal.scene.scene import Scene, compiled_scene
+from pin_nonideal.scene.scene import Scene, compiled_scene, require_scene
 from pin_nonideal.states.parsing import named_velocity
 from pin_nonideal.types import Array, Model, State, Table
 from pin_nonideal.validation import number
@@ -89,8 +88,7 @@ def rest(scene: Scene, q: State | None = None, tau: State | None = None, *, t: f
     Raises:
         InputError: an argument does not fit.
     """
-    if not isinstance(scene, Scene):
-        raise InputError(f"rest: scene must be a Scene; got {type(scene).__name__}")
+    require_scene("rest", scene)
     still = np.zeros(scene.model.nv)
     torque = None if tau is None else named_velocity(scene.model, tau, still, "rest: tau")
     time = number("rest: t", t)

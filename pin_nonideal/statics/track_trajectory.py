@@ -56,9 +56,11 @@ class TrackTrajectory(SceneDrive):
     - "constrained": torques by which the driven joints move the mechanism along the reference, by
       `inverse_dynamics` with the constraints, laws and forces of the scene, without its contacts. The
       reference is put onto the constraints: it keeps as many coordinates as these leave free, driven ones
-      first, and the others follow, also the joints that q does not name. Named coordinates beyond this
-      number must agree with the constraints up to rounding (1e-3 rad). The constraints must hold positions.
-      Forces that the driven joints cannot supply are left out in the sense of least squares.
+      first, and the others follow, also the joints that q does not name. Given coordinates beyond this
+      number must agree with the constraints: q up to 1e-3 rad, or 1e-3 of the scene's length, and v up to a
+      tenth of the largest given velocity. Otherwise `simulate` raises an InputError before its first step.
+      The constraints must hold positions. Forces that the driven joints cannot supply are left out in the
+      sense of least squares.
 
     Args:
         times: increasing times [s], shape (nt,) with nt >= 1.
@@ -135,10 +137,10 @@ class TrackTrajectory(SceneDrive):
         names = [place.name for place in joint_places(model) if driven[place.v_first]]
 
         def reference() -> ClosedReference:
-            named = by_name(self.q) is not None
-            return ClosedReference(scene, times, q, v, stated, names, driven, who, named, rounding)
+            return ClosedReference(scene, times, q, v, stated, names, driven, who, rounding)
 
-        return BoundDrive(_ConstrainedTracking(model, reference, kp, kd), driven, breaks)
+        constrained = _ConstrainedTracking(model, reference, kp, kd)
+        return BoundDrive(constrained, driven, breaks, constrained.prepare)
 
     def _driven(self, model: Model, stated: Mask, gains: Sequence[Array], who: str) -> Mask:
         """Return the mask of the degrees of freedom that are driven, (nv,).
@@ -271,8 +273,8 @@ class _ConstrainedTracking:
 
     Args:
         model: pinocchio.Model.
-        make: function that returns the reference. It is called at the first torque, since functions of users
-            are called in runs only.
+        make: function that returns the reference. It is called before a run or at the first torque, since
+            functions of users are called in runs only.
         kp: stiffness, (nv,).
         kd: damping, (nv,).
     """
@@ -282,13 +284,22 @@ class _ConstrainedTracking:
         self._reference: ClosedReference | None = None
         self._last: tuple[float, Array, Array, Array] | None = None
 
-    def __call__(self, t: float, q: Array, v: Array) -> Array:
-        """Return the torques, (nv,)."""
+    def prepare(self) -> ClosedReference:
+        """Return the reference on the constraints, computed once.
+
+        Raises:
+            InputError: the reference does not fit the constraints.
+        """
         if self._reference is None:
             self._reference = self._make()
+        return self._reference
+
+    def __call__(self, t: float, q: Array, v: Array) -> Array:
+        """Return the torques, (nv,)."""
         last = self._last
         if last is None or last[0] != t:
-            q_r, v_r, a_r = self._reference(t)
-            self._last = last = t, q_r, v_r, self._reference.torques(q_r, v_r, a_r, t)
+            reference = self.prepare()
+            q_r, v_r, a_r = reference(t)
+            self._last = last = t, q_r, v_r, reference.torques(q_r, v_r, a_r, t)
         _, q_r, v_r, forces = last
         return np.asarray(self._kp * pin.difference(self._model, q, q_r) + self._kd * (v_r - v) + forces)

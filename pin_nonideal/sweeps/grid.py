@@ -59,6 +59,12 @@ def sweep_samples(
     if not ranges:
         raise InputError("sweep_samples needs the range of a parameter, such as mu=(0.1, 0.5)")
     bounds = np.array([array(f"sweep_samples: {name}", pair, (2,)) for name, pair in ranges.items()])
+    for name, (least, largest) in zip(ranges, bounds.tolist(), strict=True):
+        if least > largest:
+            raise InputError(
+                f"sweep_samples: {name} must be (minimum, maximum); got ({least:g}, {largest:g}); exchange "
+                "the two"
+            )
     from scipy.stats import qmc
 
     d = len(ranges)

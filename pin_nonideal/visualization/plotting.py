@@ -99,12 +99,18 @@ def plot(
 
 
 def default_plots(runs: Sequence[Trajectory]) -> list[str]:
-    """Return the default plots of a scene for which its runs have recorded fields.
+    """Return the default plots of runs: those that all of them have, and the modes of any.
 
     Args:
-        runs: runs of one scene.
+        runs: the runs.
     """
-    first = runs[0]
+    first, *others = [_default_plots(run) for run in runs]
+    common = [kind for kind in first if all(kind in other for other in others)]
+    return common + (["modes"] if any(bands_of(run) for run in runs) else [])
+
+
+def _default_plots(first: Trajectory) -> list[str]:
+    """Return the default plots of a scene for which its run has recorded fields."""
     kinds = ["q", "v", *(["energy"] if first.energy else [])]
     if first.scene.contacts and first.lam is not None:
         kinds.append("contacts")
@@ -114,7 +120,7 @@ def default_plots(runs: Sequence[Trajectory]) -> list[str]:
         kinds.append("violation")
     if getattr(first, "law_forces", None) and friction_joints(first):
         kinds.append("friction")
-    return kinds + (["modes"] if bands_of(first) else [])
+    return kinds
 
 
 Drawn = tuple[str, list[Any]]
@@ -128,11 +134,12 @@ def _requested_plots(runs: Sequence[Trajectory], what: Any) -> list[Drawn]:
     drawn: list[Drawn] = []
     for item in items:
         if item == "modes":
-            if not bands_of(runs[0]):
+            banded = [run for run in runs if bands_of(run)]
+            if not banded:
                 raise InputError(
                     'plot "modes" needs an element that sticks or slips, and this scene has none'
                 )
-            drawn += [("modes", [run]) for run in runs]
+            drawn += [("modes", [run]) for run in banded]
             continue
         over = is_relation(item) and item not in [str(name) for name in runs[0].scene.model.names]
         each = [relations_of(run, item) if over else plots_of(run, [item]) for run in runs]
@@ -211,10 +218,7 @@ def _draw_relation(axes: Axes, parts: Sequence[Relation], labels: Sequence[str],
             line = look.line(index, len(x), number, len(parts))
             axes.plot(x, y, label=name, **line)
             if label in item.bounds:
-                at, most = item.bounds[label]
-                both = [most] if item.x.startswith("load") else [most, -most]
-                for bound in both:
-                    axes.plot(at, bound, ls="", marker=".", ms=2.0, color=line["color"], alpha=0.35)
+                axes.plot(*item.bounds[label], ls="", marker=".", ms=2.0, color=line["color"], alpha=0.35)
     if any(item.bounds for item in parts):
         axes.plot([], [], ls="", marker=".", ms=3.0, color="#64748b", label="limit of the law")
     axes.set_xlabel(parts[0].x)

@@ -16,7 +16,7 @@ from pathlib import Path
 from pin_nonideal.atomic_files import check_writable, file_path, whole_file
 from pin_nonideal.errors import InputError, OutputError
 from pin_nonideal.trajectory.trajectory import Trajectory
-from pin_nonideal.validation import count, number, positive
+from pin_nonideal.validation import choice, count, number, positive
 
 from .headless_browser import open_page
 from .replay import ReplayPage, replay
@@ -93,6 +93,7 @@ def render(
         raise InputError(
             f"render: time must lie in the run, from {start:g} to {start + length:g} s; got {time:g}"
         )
+    choice("render: forces", forces, (True, False))
     if fps < MIN_FPS:
         raise InputError(f"render: fps must be at least {MIN_FPS}; got {fps:g}")
     if seconds * fps > MAX_PICTURES:

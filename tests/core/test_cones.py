@@ -233,7 +233,7 @@ class TestRefusals:
                 {"limits": [-1.0]},
                 "limits must be at least 0, one a row, got [-1.]; correct the negative ones",
             ),
-            ({"dims": {}}, "dims must be an array of numbers of shape (); got {}"),
+            ({"dims": {}}, "dims must be a number or an array of numbers; got {}"),
             ({"dims": 2.5}, "dims must be 1, 2 or 3 a contact and add up to the 3 rows"),
             ({"dims": 2}, "dims must be 1, 2 or 3 a contact and add up to the 3 rows"),
         ],

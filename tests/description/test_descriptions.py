@@ -337,7 +337,7 @@ REFUSED = {
     "gain nan": (lambda: HoldPosition(NAN, 0), "HoldPosition: kp must be finite; got nan"),
     "gain as text": (
         lambda: HoldPosition("3", 0),
-        "HoldPosition: kp must be an array of numbers of shape (); got '3'",
+        "HoldPosition: kp must be a number or an array of numbers; got '3'",
     ),
     "table not increasing": (
         lambda: Table([0, 2, 1], np.zeros((3, 1))),

@@ -294,3 +294,15 @@ def test_names_that_are_wrong(quadruped):
     moving = shapes.geometryObjects[0]
     with refuses("GeometryContact: geometry2 as an object must be fixed to the world", pn.InputError):
         pn.GeometryContact("a", moving)
+
+
+def test_models_of_a_scene_and_links_without_shapes_are_named() -> None:
+    """A scene in place of its models, and a sole that is a frame of the foot, are usual slips."""
+    talos = pn.load("talos")
+    got = 'got <Scene "talos": nv 38, 0 constraints, 20 laws, 0 contacts>; pass scene.model'
+    with refuses(f"ground_contacts: model must be a pinocchio.Model; {got}", pn.InputError):
+        pn.ground_contacts(talos, talos)
+    message = 'ground_contacts: link "left_sole_link" has no shape in the collision model; '
+    message += 'name "leg_left_6_link", which moves with it'
+    with refuses(message, pn.InputError):
+        pn.ground_contacts(talos.model, talos.collision_model, ["left_sole_link"])

@@ -131,7 +131,7 @@ class TestGeometry:
         with pytest.raises(pn.InputError, match='"thing" must span a solid: four that lie in no plane'):
             pn.Scene(model, contacts=[contact], collision_model=geometry)
 
-    def test_what_does_not_touch_is_refused(self):
+    def test_what_does_not_touch_is_refused(self, tmp_path):
         model, geometry, contact = self.scene(coal.Plane(np.array([0.0, 0.0, 1.0]), 0.0), None)
         with pytest.raises(pn.InputError, match='geometry "thing" is a Plane; spheres, capsules, boxes, cyl'):
             pn.Scene(model, contacts=[contact], collision_model=geometry)
@@ -145,8 +145,12 @@ class TestGeometry:
             pn.geometry_contacts(3, geometry)
         with refuses("geometry_contacts: mu must not be negative; got -1", pn.InputError):
             pn.geometry_contacts(model, geometry, mu=-1.0)
-        with refuses('geometry_contacts: srdf "none.srdf" must be an SRDF file: ', pn.LoadingError):
+        with refuses('geometry_contacts: srdf: no file "none.srdf"; give a path', pn.LoadingError):
             pn.geometry_contacts(model, geometry, "none.srdf")
+        text = tmp_path / "text.srdf"
+        text.write_text("hello")
+        with refuses(f'geometry_contacts: srdf "{text}" must be an SRDF file: ', pn.LoadingError):
+            pn.geometry_contacts(model, geometry, text)
 
 
 def test_a_box_needs_edges():

@@ -6,9 +6,12 @@ import os
 import pickle
 import re
 import zipfile
+from dataclasses import replace
 from types import SimpleNamespace
 
+import coal
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
@@ -27,6 +30,13 @@ MANY = [{"crank_joint": float(k)} for k in range(4000)]
 
 def never_made(**parameters):
     raise AssertionError("a scene was made")
+
+
+def terminal_by_word(t, q, v):
+    return 1.0
+
+
+terminal_by_word.terminal = "yes"
 
 
 # Each case: the argument that the message names, and a call with the scene, its state and a run in `g`.
@@ -58,6 +68,17 @@ SCENES = {
     "actuation of another length": ("actuation", lambda g: pn.Scene(g.model, actuation=[1.0])),
     "description to remove": ("remove", lambda g: g.scene.replace(remove="loop")),
     "unknown description to remove": ("nope", lambda g: g.scene.replace(remove=["nope"])),
+    "model without data": ("model", lambda g: pn.Scene(pin.Data())),
+    "table of constraints": ("constraints", lambda g: pn.Scene(g.model, constraints={"loop": None})),
+    "law among contacts": ("contact", lambda g: pn.Scene(g.model, contacts=[g.scene.laws[0]])),
+    "notes": ("notes", lambda g: pn.Scene(g.model, notes="hello")),
+    "ground below no base": ("put_on_ground", lambda g: g.scene.put_on_ground()),
+    "rows of nothing": ("nope", lambda g: g.scene.jacobian("nope")),
+    "masked angle": ("q", lambda g: g.scene.mass_matrix(np.ma.masked_array([1.0, 2.0, 3.0], [0, 1, 0]))),
+    "tolerance of a stepper": ("rtol", lambda g: g.scene.stepper(0.1, method="dop853", rtol=5.0)),
+    "steps beyond the period": ("period", lambda g: g.scene.stepper(0.01, dt=1.0)),
+    "directories of packages": ("package_dirs", lambda g: pn.load("four_bar", package_dirs=3)),
+    "bytes for a name": ("name", lambda g: pn.load(b"four_bar")),
 }  # fmt: skip
 LAWS = {
     "joint of a law": ("joint", lambda g: pn.JointFriction(3, coulomb=0.1)),
@@ -80,6 +101,29 @@ LAWS = {
     "times of a spline": ("times", lambda g: pn.spline([1.0, 0.0], [0.0, 1.0])),
     "constant": ("value", lambda g: pn.constant(INF)),
     "mass matrix": ("F", lambda g: pn.solve(np.eye(2), np.ones(3))),
+    "friction of nothing": ("scene", lambda g: pn.JointFriction.for_joints("four_bar", coulomb=1.0)),
+    "number of joints": ("joints", lambda g: pn.JointFriction.for_joints(g.scene, 3, coulomb=1.0)),
+    "misspelt coefficient": ("coulmb", lambda g: pn.JointFriction.for_joints(g.scene, coulmb=1.0)),
+    "misspelt coefficient of a joint": (
+        "viscos",
+        lambda g: pn.JointFriction.for_joints(g.scene, {"crank_joint": {"viscos": 1.0}}),
+    ),
+    "angle in degrees": ("lead_angle", lambda g: pn.JointFriction("a", mu=0.1, lead_angle=90.0)),
+    "efficiency above one": ("efficiency", lambda g: pn.JointFriction("a", efficiency=1.5)),
+    "stiction below kinetic friction": ("stiction", lambda g: pn.LuGre("a", 1e4, 1.0, 1.0, stiction=0.5)),
+    "three numbers of a wrench": ("value", lambda g: pn.Wrench("coupler_tip", [1.0, 2.0, 3.0])),
+    "couple of a joint with itself": (
+        "joint1",
+        lambda g: pn.Scene(g.model, constraints=[pn.JointCoupling("crank_joint", "crank_joint", 2.0)]),
+    ),
+    "axis of no length": ("axis", lambda g: pn.HingeAnchor("a", "b", axis=[0.0, 0.0, 0.0])),
+    "rate that is no derivative": (
+        "rate",
+        lambda g: pn.Scene(
+            g.model, constraints=[pn.PrescribedMotion("crank_joint", lambda t: (3 * t, 0.0, 0.0))]
+        ),
+    ),
+    "ends of a spline": ("ends", lambda g: pn.spline([0, 1, 2], [0, 1, 0], ends="open")),
     "cones": ("W", lambda g: pn.cone_complementarity(np.eye(3), np.ones(2), 0.5)),
 }  # fmt: skip
 CONTACTS = {
@@ -92,6 +136,22 @@ CONTACTS = {
     "points of a hull": ("points", lambda g: pn.HullContact("coupler_tip", "universe", [[NAN] * 3], 0.1)),
     "bounds of a joint": ("lower", lambda g: pn.JointLimit("crank_joint", lower=NAN)),
     "collision model": ("collision_model", lambda g: pn.geometry_contacts(g.model, "shapes")),
+    "scene for a model": ("scene.model", lambda g: pn.ground_contacts(g.scene, g.scene)),
+    "missing srdf": ("none.srdf", lambda g: pn.geometry_contacts(g.model, pin.GeometryModel(), "none.srdf")),
+    "stops that cross": ("lower", lambda g: pn.JointLimit("crank_joint", lower=1.0, upper=0.0)),
+    "semiaxes": ("semiaxes", lambda g: pn.EllipsoidContact("coupler_tip", (1.0, 1.0))),
+    "points of no rim": ("points", lambda g: pn.RimContact("coupler_tip", "universe", (), 0.1, 0.1)),
+    "normal": ("normal", lambda g: pn.PointContact("coupler_tip", normal="up")),
+    "negative edge": ("size", lambda g: pn.box_contacts("coupler_tip", [1.0, -2.0, 1.0])),
+    "shapes without a model": (
+        "collision_model",
+        lambda g: pn.Scene(g.model, contacts=[pn.GeometryContact("a", "b")]),
+    ),
+    "height of the ground": ("height", lambda g: pn.ground(height="sea level")),
+    "mass and density": (
+        "density",
+        lambda g: pn.free_body(pin.Model(), "a", coal.Box(1, 1, 1), 1.0, mass=1.0),
+    ),
 }  # fmt: skip
 RUNS = {
     "scene": ("scene", lambda g: pn.simulate("four_bar", 1.0)),
@@ -139,6 +199,22 @@ RUNS = {
     "step": ("dt", lambda g: g.scene.step(g.q, g.v, None, -1.0)),
     "torques": ("tau", lambda g: g.scene.solve(g.q, g.v, tau=[1.0])),
     "modes": ("modes", lambda g: g.scene.solve(g.q, g.v, modes=[7])),
+    "name of a robot for a scene": ("pn.load('four_bar')", lambda g: pn.simulate("four_bar", 1.0)),
+    "model for a scene": ("pn.Scene(model)", lambda g: pn.simulate(g.model, 1.0)),
+    "complex duration": ("duration", lambda g: pn.simulate(g.scene, 1.0 + 0.0j)),
+    "flag for a number": ("rtol", lambda g: pn.simulate(g.scene, 1.0, rtol=True)),
+    "generator of angles": ("q", lambda g: pn.simulate(g.scene, 1.0, q=(x for x in [1.0, 2.0, 3.0]))),
+    "angles that open the loop": ("rocker_joint", lambda g: pn.simulate(g.scene, 1.0, {"rocker_joint": 0.0})),
+    "coarse clock": ("duration", lambda g: pn.simulate(g.scene, 1e-12, t0=1e6)),
+    "terminal": ("terminal", lambda g: pn.simulate(g.scene, 1.0, events=terminal_by_word)),
+    "numbers of each run": (
+        "main bearing",
+        lambda g: pn.rollout(g.scene, [g.q] * 2, [g.v] * 2, 1.0, parameters={"main bearing": {"mu": [0.1]}}),
+    ),
+    "field of a law": (
+        "mue",
+        lambda g: pn.rollout(g.scene, [g.q], [g.v], 1.0, parameters={"main bearing": {"mue": [0.1]}}),
+    ),
     "state to project": ("v", lambda g: g.scene.project(g.q, "fast")),
 }  # fmt: skip
 ACTUATION = {
@@ -175,6 +251,22 @@ ACTUATION = {
     ),
     "limits without torques": ("actuation", lambda g: pn.EffortLimits(None, 1.0)),
     "effort": ("effort", lambda g: pn.EffortLimits([1.0, 1.0, 1.0], -1.0)),
+    "gain as text": ("kp", lambda g: pn.HoldPosition("stiff", 1.0)),
+    "torque as text": ("crank_joint", lambda g: pn.Scene(g.model, actuation={"crank_joint": "strong"})),
+    "masked log": ("values", lambda g: pn.Table([0.0, 1.0], np.ma.masked_equal([[1.0], [-9.0]], -9.0))),
+    "two delays": ("delay", lambda g: pn.SampledControl(never_made, 0.01, delay=0.01, delay_samples=2)),
+    "interpolation": ("interpolation", lambda g: pn.Table([0.0], [[1.0]], interpolation="cubic")),
+    "reference that opens the loop": (
+        "loop",
+        lambda g: pn.simulate(
+            g.scene.replace(
+                actuation=pn.TrackTrajectory(
+                    [0.0, 0.1], [g.q, g.q + 0.1], kp=1.0, kd=1.0, feedforward="constrained"
+                )
+            ),
+            0.1,
+        ),
+    ),
 }  # fmt: skip
 SWEEPS = {
     "make": ("make", lambda g: pn.sweep("four_bar", [{}], 1.0)),
@@ -194,6 +286,7 @@ SWEEPS = {
     "folder of a sweep": ("folder", lambda g: pn.Sweep(3)),
     "grid": ("mu", lambda g: pn.sweep_grid(mu=0.3)),
     "kind of samples": ("kind", lambda g: pn.sweep_samples(4, kind="sobel", mu=(0.1, 0.5))),
+    "reversed range": ("mu", lambda g: pn.sweep_samples(4, mu=(1.0, 0.0))),
     "range of samples": ("mu", lambda g: pn.sweep_samples(4, mu=0.3)),
 }  # fmt: skip
 STATICS = {
@@ -271,6 +364,9 @@ PICTURES = {
     "width": ("width", lambda g: pn.render(g.run, "a.png", width=0)),
     "time outside": ("time", lambda g: pn.render(g.run, "a.png", time=9.0)),
     "rate": ("fps", lambda g: pn.render(g.run, "a.gif", fps=INF)),
+    "forces as text": ("render: forces", lambda g: pn.render(g.run, "a.png", forces="no")),
+    "run without its scene": ("scene", lambda g: pn.plot(replace(g.run, scene=None), "a.png")),
+    "curve of another length": ("Own [m]", lambda g: pn.plot(g.run, "a.png", [("Own [m]", {"a": [1.0]})])),
 }  # fmt: skip
 CASES = {
     f"{group}: {name}": case
@@ -359,7 +455,7 @@ def listed(folder):
 
 
 def test_there_are_enough_cases():
-    assert len(CASES) + len(COMMANDS) >= 200
+    assert len(CASES) + len(COMMANDS) >= 250
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -405,6 +501,7 @@ def test_values_in_messages_are_short():
         ("j9", ["j1", "elbow"], '; nearest: "j1"'),
         ("x" * 100_000, ["x"], '; known: "x"'),
         ("a", [], "; there is none"),
+        ("motor", ["x", "y", "x"], '; known: "x", "y"'),
     ],
 )
 def test_names_are_suggested_where_they_are_near(name, known, hint):

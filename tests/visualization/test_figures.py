@@ -89,18 +89,41 @@ def test_a_phase_plane_is_velocity_over_position() -> None:
     assert set(lines(plot(run, what="phase"))) == {"crank", "coupler", "rocker"}
 
 
+def limit_dots(figure: Any) -> Any:
+    """Positions and values of the dots that mark what the law allows."""
+    return next(line for line in figure.axes[0].lines if line.get_marker() == ".").get_data()
+
+
 def test_friction_stays_within_the_limit_that_is_drawn(belt: Any) -> None:
     figure = plot(belt, what="friction")
-    curve, bounds = lines(figure)["rubbing"], [x for x in figure.axes[0].lines if x.get_marker() == "."]
+    curve, dots = lines(figure)["rubbing"], limit_dots(figure)
     joint = belt.scene.model.joints[belt.scene.model.getJointId("slip")].idx_v
     x, y = curve.get_xdata(), curve.get_ydata()
     assert np.isnan(x).sum() == len(belt.events)  # nothing leads from one mode into another
     x, y = x[np.isfinite(x)], y[np.isfinite(x)]
     np.testing.assert_array_equal(x, belt.v[:, joint])
-    assert (np.abs(y) <= bounds[0].get_ydata() * (1.0 + 1e-9)).all()
+    for at, friction in zip(x, y, strict=True):
+        own = dots[1][dots[0] == at]
+        assert own.min() - 1e-9 <= friction <= own.max() + 1e-9
+    np.testing.assert_allclose([dots[1].min(), dots[1].max()], [-8.0, 8.0], rtol=1e-9)
     sliding = np.abs(x) > 1e-6
     np.testing.assert_allclose(np.abs(y[sliding]), 5.0, rtol=1e-6)  # mu m g
     assert np.abs(y[~sliding]).max() > 6.0  # it sticks up to 8 N
+
+
+@pytest.mark.parametrize("what", ["friction bearing", "load bearing"])
+def test_the_drawn_limit_has_the_viscous_part_of_the_law(what: str) -> None:
+    """While the joint slips, the friction of the law is its dry limit plus the viscous part."""
+    law = pn.JointFriction("j0", coulomb=0.1, mu=0.2, radius=0.01, viscous=0.3, name="bearing")
+    scene = pn.Scene(jointed(pin.JointModelRY()), laws=[law])
+    run = pn.simulate(scene, 1.0, v=[2.0], output_dt=0.01, record=("laws", "reactions"))
+    slips = run.law("bearing").mode != 0
+    assert slips.sum() > 50
+    x, y = lines(plot(run, what=what))["bearing"].get_data()
+    drawn = np.isfinite(x)
+    dots = dict(zip(*limit_dots(plot(run, what=what)), strict=True))
+    law = [dots[at] for at in x[drawn][slips]]
+    np.testing.assert_allclose(y[drawn][slips], law, rtol=1e-9)  # and the dots oppose the motion
 
 
 def test_friction_over_load_grows_as_the_law_says(arm: Any) -> None:
@@ -144,6 +167,16 @@ def test_several_runs_share_their_axes_and_are_told_apart() -> None:
     assert drawn["crank, stiff"].get_color() == drawn["crank, soft"].get_color()
     assert drawn["crank, stiff"].get_linestyle() != drawn["crank, soft"].get_linestyle()
     assert "crank, run 2" in lines(plot([one, other], what="q"))
+
+
+def test_runs_with_and_without_friction_are_compared(belt: Any) -> None:
+    """Default plots are those that all runs have; only runs with friction elements have bands of modes."""
+    smooth = pn.simulate(belt.scene.replace(laws=[]), 0.1, record="energy")
+    figure = plot([belt, smooth], names=["rough", "smooth"])
+    assert [label.split("\n")[0] for label in (axes.get_ylabel() for axes in figure.axes)] == [
+        *("Position", "Velocity", "Energy", "Constraint violation", "")
+    ]
+    assert len(plot([smooth, belt], what="modes").axes) == 1
 
 
 def test_a_cloud_of_events_is_drawn_by_its_density() -> None:

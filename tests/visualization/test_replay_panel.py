@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -158,6 +160,23 @@ def test_one_quantity_over_another_is_plotted_and_seeks(loop: Watched) -> None:
     assert page.locator(".plot").count() == before
 
 
+@pytest.mark.parametrize("law", ["bearing", "crank friction"])
+def test_headings_of_friction_name_it_once(law: str, browser: Any, tmp_path: Path) -> None:
+    hinge = pn.JointFriction("crank_joint", mu=0.2, radius=0.01, viscous=0.3, name=law)
+    scene = pn.load("four_bar").replace(laws=[hinge])
+    run = pn.simulate(scene, 0.2, output_dt=0.01, record=("forces", "reactions"))
+    kinds = ["friction", f"friction {law}", f"load {law}"]
+    page = Watched(browser, pn.replay(run, tmp_path / "crank.html", plots=kinds))
+    headings = [heading.inner_text() for heading in page.page.locator(".plot h2").all()]
+    page.close()
+    of_law = f"{law.removesuffix(' friction')} friction [N m]"
+    assert headings == [
+        "Friction [N m] over velocity [rad/s], dots: the limit",
+        f"{of_law} over velocity [rad/s], dots: the limit",
+        f"{of_law} over load across the axis [N], dots: the limit",
+    ]
+
+
 SIZES = [(1400, 900), (900, 500), (420, 800)]
 
 
@@ -178,6 +197,70 @@ def test_panels_cover_no_control_and_curves_are_tall(loop: Watched, size: tuple[
     assert covered == []
     assert min(heights) >= 100
     assert list_height > 60
+
+
+@pytest.fixture(scope="module")
+def feet(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """A quadruped on its feet: torques, friction and contacts with long names, eight curves in a plot."""
+    scene = pn.load("solo12_dropped")
+    contacts = [replace(c, name=f"{c.name} on the rough ground {k}") for k, c in enumerate(scene.contacts)]
+    friction = pn.JointFriction.for_joints(scene, coulomb=0.01)
+    run = pn.simulate(
+        scene.replace(contacts=contacts, laws=friction),
+        0.3,
+        method="moreau",
+        dt=1e-3,
+        record=("forces", "energy"),
+    )
+    watched = Watched(browser, pn.replay(run, tmp_path_factory.mktemp("feet") / "feet.html"))
+    watched.run("() => replay.seek(0.25)")
+    yield watched
+    watched.close()
+
+
+LAYOUT = """() => {
+  const box = (e) => e.getBoundingClientRect(), scroll = document.querySelector("#forces .scroll");
+  const names = [...scroll.querySelectorAll("tbody td:first-child")];
+  return {
+    cut: scroll.scrollWidth - scroll.clientWidth,
+    ends: [...scroll.querySelectorAll("tr")].map((row) => box(row).bottom - box(scroll).bottom),
+    names: new Set(names.map((e) => e.textContent)).size, titles: new Set(names.map((e) => e.title)).size,
+    titles_cut: [...document.querySelectorAll(".plot h2")].map((e) => e.scrollWidth - e.clientWidth),
+    legends: [...document.querySelectorAll(".plot ul")].map((e) => e.scrollHeight - e.clientHeight),
+    rows: [...document.querySelectorAll("#legend span")].map((e) => box(e).top),
+    heading: ["subtitle", "gap"].map((name) => box(document.getElementById(name)).left),
+    subtitle: document.querySelector("#subtitle").textContent,
+  };
+}"""
+
+
+@pytest.mark.parametrize("size", SIZES, ids=str)
+def test_tables_and_legends_are_whole(feet: Watched, size: tuple[int, int]) -> None:
+    feet.page.set_viewport_size({"width": size[0], "height": size[1]})
+    feet.run("() => { replay.showForces(true); dispatchEvent(new Event('resize')); }")
+    feet.run("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    found = feet.run(LAYOUT)
+    assert found["cut"] <= (1 if size[0] > 640 else 60)
+    assert min(abs(end) for end in found["ends"]) < 1.0  # a row ends where the table ends
+    assert found["names"] == found["titles"] > 10
+    assert max(found["legends"]) <= 1
+    assert max(found["titles_cut"]) <= 0
+    assert found["subtitle"].startswith("13 joints · 4 contacts · ")
+    assert len(set(found["rows"])) <= 2
+
+
+def test_the_gap_of_a_loop_begins_its_line_where_the_line_above_begins(loop: Watched) -> None:
+    loop.page.set_viewport_size({"width": 420, "height": 800})
+    lefts = loop.run(LAYOUT)["heading"]
+    loop.page.set_viewport_size({"width": 1000, "height": 720})
+    assert len(lefts) == 2
+    assert lefts[0] == lefts[1]
+
+
+def test_zero_among_powers_of_ten_has_a_short_label(loop: Watched) -> None:
+    """A label of nine decimals would be cut at the edge of the plot."""
+    steps = "() => [stepLabel(0, 5e-11), stepLabel(5e-11, 5e-11), stepLabel(0, 0.5), stepLabel(0, 2e6)]"
+    assert loop.run(steps) == ["0", "5e-11", "0.0", "0"]
 
 
 COVERED = """() => {
@@ -253,12 +336,45 @@ def test_the_address_brings_back_what_was_seen(browser: Any, loop: Watched, tmp_
     assert again.run("() => replay.time") == pytest.approx(0.4321, abs=1e-6)
     assert again.run("() => replay.speed") == 0.5
     assert again.run("() => replay.playing") is False
-    camera = [float(x) for x in address.split("cam=")[1].split("&")[0].split(",")]
-    now = again.run("() => replay.address").split("cam=")[1].split("&")[0].split(",")
-    np.testing.assert_allclose([float(x) for x in now], camera, rtol=1e-5, atol=1e-9)
+    assert numbers_in(again.run("() => replay.address"), "view") == numbers_in(address, "view")
+    assert numbers_in(address, "view")[2] > 0.99
     again.page.wait_for_function("() => location.hash.includes('t=0.4321')")
     again.close()
     loop.page.locator("#views button", has_text="usual").click()
+
+
+def numbers_in(address: str, key: str) -> list[float]:
+    return [float(x) for x in address.split(f"{key}=")[1].split("&")[0].split(",")]
+
+
+def pivots(page: Watched) -> Any:
+    """Positions of the pivots of the four-bar in the window, in pixels."""
+    return page.run("() => [[0, 0, 0], [0.9, 0, 0]].map((place) => replay.onScreen(place))")
+
+
+def test_a_link_frames_the_motion_for_the_window_that_opens_it(browser: Any, tmp_path: Path) -> None:
+    """A copied link of a large window moves the robot out of no small one; a view moved by hand is kept."""
+    path = pn.replay(four_bar(), tmp_path / "linked.html")
+    addresses = []
+    wide = Watched(browser, path)
+    wide.page.set_viewport_size({"width": 1400, "height": 900})
+    wide.run("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    addresses.append(wide.run("() => replay.address"))
+    wide.page.mouse.move(500, 200)
+    wide.page.mouse.wheel(0, 120)
+    wide.page.wait_for_function("() => replay.address.includes('cam=')")
+    addresses.append(wide.run("() => replay.address"))
+    wide.close()
+    places = []
+    for address in ("paused", *addresses):
+        small = Watched(browser, path, fragment=address)
+        small.page.set_viewport_size({"width": 420, "height": 800})
+        small.run("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        places.append(pivots(small))
+        kept = small.run("() => replay.address")
+        small.close()
+    np.testing.assert_allclose(places[1], places[0], atol=0.5)
+    np.testing.assert_allclose(numbers_in(kept, "cam"), numbers_in(addresses[1], "cam"), rtol=1e-5, atol=1e-9)
 
 
 def test_escape_closes_the_panel_and_every_control_has_a_name(loop: Watched) -> None:

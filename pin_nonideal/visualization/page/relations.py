@@ -53,13 +53,13 @@ def stored_relations(
 
 def _stored(payload: Payload, run: Trajectory, name: str, relation: Relation, points: int) -> Table:
     curves = [_curve(payload, run, label, *pair, points) for label, pair in relation.curves.items()]
-    one_side = relation.x.startswith("load")
-    bounds = [_bound(payload, label, *pair, one_side) for label, pair in relation.bounds.items()]
+    bounds = [_bound(payload, label, *pair) for label, pair in relation.bounds.items()]
+    quantity, _, unit = relation.y.partition(" ")
     return {
         "name": name,
-        "title": relation.title if name in ("phase", "friction", "load") else name,
+        "title": relation.title,
         "x": relation.x,
-        "y": relation.y,
+        "y": unit if quantity in relation.title.lower() else relation.y,
         "note": relation.note,
         "curves": curves,
         "bounds": bounds,
@@ -77,11 +77,11 @@ def _curve(payload: Payload, run: Trajectory, label: str, x: Array, y: Array, po
     return {"label": label, "t": payload.add(thin.t, "f8")} | {k: payload.curve(v) for k, v in values.items()}
 
 
-def _bound(payload: Payload, label: str, x: Array, y: Array, one_side: bool) -> Table:
-    """What a law allows, in the order of x."""
+def _bound(payload: Payload, label: str, x: Array, y: Array) -> Table:
+    """Points of a law, in the order of x."""
     chosen = np.unique(np.linspace(0, len(x) - 1, BOUNDS).astype(int))
     order = chosen[np.argsort(x[chosen], kind="stable")]
-    return {"label": label, "x": payload.add(x[order]), "y": payload.add(y[order]), "both": not one_side}
+    return {"label": label, "x": payload.add(x[order]), "y": payload.add(y[order])}
 
 
 def _largest(values: Array) -> float:

@@ -14,15 +14,18 @@ if TYPE_CHECKING:
 
 
 def subtitle_of(run: Trajectory) -> str:
-    """Return the numbers of joints and constraints of a run, and the bound of its violation.
+    """Return the numbers of joints, constraints and contacts of a run, and the bound of its violation.
 
     Args:
         run: a run.
     """
     model = run.scene.model
-    count = len(run.scene.constraint_slices)
-    words = [_counted(model.njoints - 1, "joint"), _counted(count, "constraint")]
-    if count:
+    contacts = sum(is_contact for _, _, is_contact in run.rows.values())
+    constraints = len(run.rows) - contacts
+    words = [_counted(model.njoints - 1, "joint")]
+    words += [_counted(constraints, "constraint")] if constraints or not contacts else []
+    words += [_counted(contacts, "contact")] if contacts else []
+    if run.rows:
         words.append(f"violation below {_above(float(np.max(run.violation)))}")
     return " · ".join(words)
 

@@ -30,7 +30,8 @@ class Relation:
         x: label of the horizontal axis, with its unit.
         y: label of the vertical axis, with its unit.
         curves: pairs (x, y) by label, (nt,) each.
-        bounds: limits of the law at the samples, pairs (x, largest |y|) by label, (nt,) each.
+        bounds: points of the law at the samples, pairs (x, y) by label, (n,) each: both limits of a sticking
+            joint, and the limit with the viscous part against the motion of a slipping joint.
         note: note on the selection of the curves.
     """
 
@@ -102,7 +103,7 @@ def _phases(run: Trajectory, name: str) -> list[Relation]:
     for unit, curves in by_unit.items():
         rank = sorted(curves, key=lambda label: -float(np.ptp(curves[label][0])))[:MAX_CURVES]
         drawn = {label: pair for label, pair in curves.items() if label in rank}
-        title = "Phase plane" if len(drawn) > 1 else next(iter(drawn))
+        title = "Phase plane" if len(drawn) > 1 else f"phase {next(iter(drawn))}"
         relations.append(
             Relation(
                 title, f"position [{unit}]", f"velocity [{unit}/s]", drawn, note=omission_note(len(curves))
@@ -147,11 +148,26 @@ def _frictions(run: Trajectory, name: str, over_load: bool) -> list[Relation]:
         unit, x, label = _abscissa(run, known[law], over_load)
         record = run.law(law)
         force = np.asarray(record.force)[:, run.scene.model.joints[known[law]].idx_v]
-        place = by_unit.setdefault(unit, Relation("Friction", label, f"friction [{unit}]", {}, {}))
+        place = by_unit.setdefault(unit, Relation(name or "Friction", label, f"friction [{unit}]", {}, {}))
         place.curves[law] = _broken(x, np.abs(force) if over_load else force, record.mode)
         if record.limit is not None and record.limit.ndim == 1:
-            place.bounds[law] = (x, record.limit)
+            speed = np.abs(run.v[:, run.scene.model.joints[known[law]].idx_v])
+            most = record.limit + _viscous(run, law) * speed
+            place.bounds[law] = (x, most) if over_load else _opposed(x, most, record.mode)
     return list(by_unit.values())
+
+
+def _opposed(x: Array, most: Array, mode: Any) -> tuple[Array, Array]:
+    """Return the largest friction of slipping samples against their motion, and of the others both ways."""
+    slips = np.zeros(len(x), dtype=int) if mode is None else np.sign(np.asarray(mode, dtype=int))
+    forth, back = slips >= 0, slips <= 0
+    return np.concatenate([x[forth], x[back]]), np.concatenate([-most[forth], most[back]])
+
+
+def _viscous(run: Trajectory, name: str) -> float:
+    """Return the viscous coefficient of a law in a joint, 0 for laws without one."""
+    index = run.law_names.index(name)
+    return float(getattr(run.scene.laws[index], "viscous", 0.0))
 
 
 def _broken(x: Array, y: Array, mode: Any) -> tuple[Array, Array]:

@@ -10,7 +10,7 @@ function roundSteps(low, high, count) {
 
 function stepLabel(x, step) {
   const size = Math.max(Math.abs(x), step);
-  if (x !== 0 && (size >= 1e5 || size < 1e-3)) return x.toExponential(Math.max(0, Math.floor(Math.log10(Math.abs(x)) + 1e-9) - Math.floor(Math.log10(step) + 1e-9)));
+  if (size >= 1e5 || size < 1e-3) return x === 0 ? "0" : x.toExponential(Math.max(0, Math.floor(Math.log10(Math.abs(x)) + 1e-9) - Math.floor(Math.log10(step) + 1e-9)));
   return x.toFixed(Math.max(0, Math.min(9, -Math.floor(Math.log10(step) + 1e-9))));
 }
 

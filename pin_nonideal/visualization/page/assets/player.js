@@ -295,6 +295,7 @@ class Player {
       right: folded || narrow ? 0 : Math.min(taken(box, "offsetWidth", 12) / Math.max(width, 1), 0.4),
       top: Math.min(taken(element("heading"), "offsetHeight", 14) / Math.max(height, 1), 0.35), bottom: Math.min(below / Math.max(height, 1), 0.3),
     };
+    this.table.fit();
     this.stage.resize();
     this.fitPlots();
     this.resizePlots();

@@ -45,7 +45,7 @@ class Relation extends Plot {
     };
     const shown = this.curves.filter((curve) => curve.shown), bounds = this.shownBounds();
     [this.from, this.to] = range([...shown.map((curve) => curve.x), ...bounds.map((bound) => bound.x)]);
-    [this.low, this.high] = range([...shown.map((curve) => curve.y), ...bounds.map((bound) => bound.y), ...bounds.filter((bound) => bound.both).map((bound) => bound.y.map((value) => -value))]);
+    [this.low, this.high] = range([...shown.map((curve) => curve.y), ...bounds.map((bound) => bound.y)]);
   }
 
   shownBounds() { return this.bounds.filter((bound) => this.curves.some((curve) => curve.shown && curve.label === bound.label)); }
@@ -73,8 +73,7 @@ class Relation extends Plot {
   drawCurve(c, curve) {
     for (const bound of this.bounds.filter(({ label }) => label === curve.label)) {
       c.fillStyle = ink("soft");
-      for (let i = 0; i < bound.x.length; i++)
-        for (const side of bound.both ? [1, -1] : [1]) c.fillRect(this.across(bound.x[i]) - 0.8, this.y(side * bound.y[i]) - 0.8, 1.6, 1.6);
+      for (let i = 0; i < bound.x.length; i++) c.fillRect(this.across(bound.x[i]) - 0.8, this.y(bound.y[i]) - 0.8, 1.6, 1.6);
     }
     c.strokeStyle = onPaper(curve.color); c.setLineDash(curve.dash); c.globalAlpha = 0.75;
     this.path(c, curve, curve.t.length);

@@ -31,6 +31,20 @@ class ForceTable {
     }
   }
 
+  /** Shortens names in their middle, since their ends differ, and ends the visible part below a whole row. */
+  fit() {
+    const scroll = this.box.querySelector(".scroll"), names = [...this.box.querySelectorAll("tbody td:first-child")];
+    if (!names.length || !scroll.clientWidth) return;
+    const style = getComputedStyle(names[0]), c = document.createElement("canvas").getContext("2d");
+    c.font = `${style.fontSize} ${style.fontFamily}`;
+    for (const cell of names) cell.textContent = shortened(c, cell.title, parseFloat(style.maxWidth) - 2);
+    scroll.style.maxHeight = "";
+    if (scroll.scrollHeight <= scroll.clientHeight + 1) return;
+    const top = scroll.getBoundingClientRect().top, ends = [...scroll.querySelectorAll("tr")].map((row) => row.getBoundingClientRect().bottom - top + scroll.scrollTop);
+    const last = ends.filter((end) => end <= scroll.clientHeight + 0.5).pop();
+    if (last) scroll.style.maxHeight = `${last}px`;
+  }
+
   update() {
     for (const [arrow, cell] of this.cells) {
       const text = `${steady(arrow.value)} ${arrow.unit}`, parts = arrow.axis ? "" : `(${arrow.vector.toArray().map((x) => readable(Math.abs(x) < 1e-9 * arrow.value ? 0 : x)).join(", ")})`;

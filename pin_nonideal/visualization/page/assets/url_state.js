@@ -1,4 +1,6 @@
-// State of the page in its address: #t=1.5&cam=azimuth,elevation,distance,x,y,z&speed=0.1&span=0,2
+// State of the page in its address: #t=1.5&view=x,y,z&speed=0.1&span=0,2. A view that frames the motion has the
+// direction from which it is seen, so that other windows frame it too; a view moved by hand or a camera that follows
+// has cam=azimuth,elevation,distance,x,y,z.
 
 class UrlState {
   constructor(player) {
@@ -14,10 +16,11 @@ class UrlState {
       const found = (given.get(key) || "").split(",").map(Number);
       return found.length === count && found.every(Number.isFinite) && given.has(key) ? found : null;
     };
-    const camera = numbers("cam", 6), time = numbers("t", 1), speed = numbers("speed", 1), span = numbers("span", 2);
+    const camera = numbers("cam", 6), view = numbers("view", 3), time = numbers("t", 1), speed = numbers("speed", 1), span = numbers("span", 2);
     if (speed && SPEEDS.includes(speed[0])) { [player.speed] = speed; element("speed").value = player.speed; }
     if (span && span[1] > span[0]) player.span.set(...span);
     if (time) player.seekByHand(time[0]);
+    if (view && Math.hypot(...view) > 0) player.stage.resetView(view);
     if (!camera) return;
     const { orbit } = player.stage;
     [orbit.azimuth, orbit.elevation, orbit.distance] = camera;
@@ -28,10 +31,11 @@ class UrlState {
 
   /** State for a reload or a copied link; it is not written during playback. */
   text() {
-    const { player } = this, { orbit } = player.stage, digits = (x) => Number(x.toPrecision(6));
-    const camera = [orbit.azimuth, orbit.elevation, orbit.distance, ...orbit.target.toArray()].map(digits).join();
+    const { player } = this, { orbit, following } = player.stage, digits = (x) => Number(x.toPrecision(6));
+    const byHand = orbit.moved || following || !orbit.away;
+    const camera = byHand ? `cam=${[orbit.azimuth, orbit.elevation, orbit.distance, ...orbit.target.toArray()].map(digits).join()}` : `view=${orbit.away.toArray().map(digits).join()}`;
     const zoomed = player.span.start !== player.span.full[0] || player.span.end !== player.span.full[1];
-    return `paused&t=${digits(player.time)}&cam=${camera}&speed=${player.speed}${zoomed ? `&span=${digits(player.span.start)},${digits(player.span.end)}` : ""}`;
+    return `paused&t=${digits(player.time)}&${camera}&speed=${player.speed}${zoomed ? `&span=${digits(player.span.start)},${digits(player.span.end)}` : ""}`;
   }
 
   write() {
