@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -118,7 +117,7 @@ def stored_guide(payload: Payload, guide: Guide) -> Table:
     return stored
 
 
-def plain_fields(item: Any, apart: Sequence[str] = ()) -> Table:
+def plain_fields(item: object, apart: Sequence[str] = ()) -> Table:
     """Return the fields of a dataclass, with arrays as lists, except those that are stored apart.
 
     Args:
