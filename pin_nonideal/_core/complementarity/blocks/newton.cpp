@@ -257,6 +257,36 @@ bool BlockNewton::shorten(const BlockProblem& p, const Island& island, const Vec
     return false;
 }
 
+// Compute the unit of an island, and evaluate the forces f.
+double BlockNewton::begin(const BlockProblem& p, const Island& island, const VecX& f, VecX& x, VecX& w, double& merit) {
+    unit_ = 0.0;
+    for (int i : island.elements) {
+        const BlockElement& e = p.elements[i];
+        p.respond(e, p.free, w);
+        for (int r = e.row; r < e.row + e.dim(); ++r) unit_ = std::max(unit_, root_rho_[r] * std::abs(w[r] + p.offset[r]));
+    }
+    move(p, island, f, x, w);
+    return evaluate(p, island, f, w, merit);
+}
+
+double BlockNewton::error(const BlockProblem& p, const Island& island, const VecX& f, VecX& x, VecX& w) {
+    double merit;
+    compliance_ = 0.0;
+    return begin(p, island, f, x, w, merit);
+}
+
+// Check if an element left the linear piece of the last factor.
+bool BlockNewton::has_changed_piece(const Island& island) const {
+    return std::any_of(island.elements.begin(), island.elements.end(), [&](int i) { return there_[i].piece != piece_[i]; });
+}
+
+double BlockNewton::stiffen(const BlockProblem& p, const Island& island, BlockFactor& factor, VecX& f, VecX& x, VecX& w) {
+    keeps_factor_ = true;
+    const double error = solve(p, island, factor, Search::bold, 0.0, f, x, w);
+    keeps_factor_ = false;
+    return error;
+}
+
 double BlockNewton::solve(const BlockProblem& p, const Island& island, BlockFactor& factor, Search search,
                           double compliance, VecX& f, VecX& x, VecX& w) {
     compliance_ = compliance;
@@ -265,26 +295,27 @@ double BlockNewton::solve(const BlockProblem& p, const Island& island, BlockFact
         for (int i : island.elements)
             for (int r = p.elements[i].row; r < p.elements[i].row + p.elements[i].dim(); ++r) act(r);
     };
-    unit_ = 0.0;
-    for (int i : island.elements) p.respond(p.elements[i], p.free, w);
-    each_row([&](int r) { unit_ = std::max(unit_, root_rho_[r] * std::abs(w[r] + p.offset[r])); });
-    move(p, island, f, x, w);
-    double merit, error = evaluate(p, island, f, w, merit), least = error;
+    double merit, error = begin(p, island, f, x, w, merit), least = error;
     if (error <= parameters.solved) return error;
-    factor.analyse(p, island);
-    for (int i : island.elements) piece_[i] = Piece::unknown;
+    keeps_factor_ = keeps_factor_ && !has_changed_piece(island);
+    if (!keeps_factor_) {
+        factor.analyse(p, island);
+        for (int i : island.elements) piece_[i] = Piece::unknown;
+    }
     each_row([&](int r) { f_best_[r] = f[r]; });
     const auto cautious = [&] { return std::clamp(error, parameters.proximal, parameters.most_proximal); };
-    double weight = bold ? parameters.proximal : cautious();
-    double factored = 0.0, recent[4] = {merit, merit, merit, merit};
+    double weight = keeps_factor_ ? yielding_ : bold ? parameters.proximal : cautious();
+    double factored = keeps_factor_ ? weight : 0.0, recent[4] = {merit, merit, merit, merit};
     int refusals = 0, unguarded = 0, stagnant_steps = 0;
     for (int step = 0; step < parameters.steps && error > parameters.solved; ++step, ++steps_) {
         if (!bold) weight = cautious();
         const bool anew = !(weight >= parameters.kept_from * factored && weight <= parameters.kept_to * factored);
         bool symmetric = true;
         if (anew) factored = weight;
-        if (linearize(p, island, factored, anew, symmetric)) {
+        keeps_factor_ = keeps_factor_ && !has_changed_piece(island);
+        if (!keeps_factor_ && linearize(p, island, factored, anew, symmetric)) {
             ++factors_;
+            yielding_ = factored + compliance_;
             if (!factor.factor(p, island, G_, symmetric)) break;
         }
         find_step(p, island, factor, factored);
@@ -320,8 +351,10 @@ double BlockNewton::solve(const BlockProblem& p, const Island& island, BlockFact
         if (!(merit < HUGE_VAL)) break;
         if (accepted && length == 1.0) {
             refusals = 0;
-            weight = std::max({parameters.proximal, weight * (merit < 0.1 * merit_before ? 0.01 : 0.3),
-                               std::min(1e-3 * error, parameters.most_proximal)});
+            keeps_factor_ = keeps_factor_ && merit < parameters.fast_decrease * merit_before;
+            if (!keeps_factor_)
+                weight = std::max({parameters.proximal, weight * (merit < 0.1 * merit_before ? 0.01 : 0.3),
+                                   std::min(1e-3 * error, parameters.most_proximal)});
         }
         if (error < least) {
             least = error;

@@ -26,6 +26,7 @@ struct BlockNewtonParameters {
     double proximal = 1e-8;         // least weight d of the proximal term: the root of the unit roundoff
     double most_proximal = 0.1;     // largest weight of the proximal term
     double more_proximal = 5.0;     // growth of the weight after a refused step
+    double fast_decrease = 1e-4;    // ratio of two squared errors after which `stiffen` keeps its factor
     // Least and largest change of the weight that keeps the factor.
     double kept_from = 0.3, kept_to = 3.0;
 };
@@ -46,6 +47,10 @@ public:
     // `factor` keeps the order of elimination of the island.
     double solve(const BlockProblem& p, const Island& island, BlockFactor& factor, Search search, double compliance,
                  VecX& f, VecX& x, VecX& w);
+    // Solve the laws without compliance from the forces of the last solution, which had a small one, with its factor.
+    double stiffen(const BlockProblem& p, const Island& island, BlockFactor& factor, VecX& f, VecX& x, VecX& w);
+    // Return the error of the forces f, with their x and w.
+    double error(const BlockProblem& p, const Island& island, const VecX& f, VecX& x, VecX& w);
     // Improve f and x by sweeps of the projected Gauss-Seidel method: each element in turn solves its own laws, with the
     // forces of the others fixed. w is overwritten.
     void sweep(const BlockProblem& p, const Island& island, int sweeps, VecX& f, VecX& x, VecX& w);
@@ -75,7 +80,9 @@ private:
     };
 
     Projection projection(const BlockElement& e, const double* y) const;
+    double begin(const BlockProblem& p, const Island& island, const VecX& f, VecX& x, VecX& w, double& merit);
     double evaluate(const BlockProblem& p, const Island& island, const VecX& f, const VecX& w, double& merit);
+    bool has_changed_piece(const Island& island) const;
     bool linearize(const BlockProblem& p, const Island& island, double d, bool anew, bool& symmetric);
     void local_step(const BlockProblem& p, const Island& island, double d, VecX& dx);
     void find_step(const BlockProblem& p, const Island& island, const BlockFactor& factor, double d);
@@ -87,6 +94,8 @@ private:
     std::vector<Projection> there_;  // at the last evaluation
     VecX y_, e_, z_, df_, dx_, dw_, f_try_, w_try_, f_best_;
     double compliance_ = 0.0;
+    double yielding_ = 0.0;      // compliance and proximal weight of the last factor
+    bool keeps_factor_ = false;  // the next step uses the last factor
     double unit_ = 0.0;  // largest free velocity of the island, in units of the square root of an energy
     int steps_ = 0, factors_ = 0;
 };

@@ -69,10 +69,52 @@ bool BlockSolver::settle(int island, VecX& f) {
     return false;
 }
 
+// Solve an island with a small compliance of all elements, then without. Compliant elements share a load in one way. Return
+// true if f solves the laws.
+bool BlockSolver::share(int island, VecX& f) {
+    const double error = newton(island, BlockNewton::Search::bold, parameters.shared_compliance, f);
+    if (error > parameters.compliance_path_tolerance) return false;
+    least_ = newton_.stiffen(problem, islands_[island], factors_[island], f, x_, w_);
+    return least_ <= parameters.accepted;
+}
+
+// Copy the forces of an island.
+void BlockSolver::copy(const Island& island, const VecX& from, VecX& to) const {
+    for (int i : island.elements) {
+        const BlockElement& e = problem.elements[i];
+        to.segment(e.row, e.dim()) = from.segment(e.row, e.dim());
+    }
+}
+
+// Check if a contact with a force in the guess has none in f.
+bool BlockSolver::unloads(int island, const VecX& f) const {
+    const auto& elements = islands_[island].elements;
+    return std::any_of(elements.begin(), elements.end(), [&](int i) {
+        const BlockElement& e = problem.elements[i];
+        return e.head() && guess_[e.row] > 0.0 && f[e.row] == 0.0;
+    });
+}
+
 // Solve an island by Newton's method from the guess, else after sweeps, else along the path of compliances. Return the
-// error.
+// error. A contact that loses its load may do so in one of several solutions: the one with shared loads is preferred.
 double BlockSolver::solve(int island, VecX& f) {
+    const Island& on = islands_[island];
+    const bool many = static_cast<int>(on.elements.size()) >= parameters.min_sharing, alone = many && on.nodes.size() == 1;
+    if (alone) {
+        least_ = newton_.error(problem, on, f, x_, w_);
+        if (least_ <= BlockNewton::parameters.solved || share(island, f)) return least_;
+        copy(on, guess_, f);
+    }
     least_ = newton(island, BlockNewton::Search::bold, 0.0, f);
+    if (least_ <= parameters.accepted && many && !alone && unloads(island, f)) {
+        const double error = least_;
+        best_ = f;
+        copy(on, guess_, f);
+        if (share(island, f)) return least_;
+        f = best_;
+        least_ = error;
+        newton_.move(problem, on, f, x_, w_);
+    }
     if (least_ <= parameters.accepted) return least_;
     best_ = f;
     if (!attempt(island, f) && least_ > parameters.tolerated && !settle(island, f)) stiffen(island, f);
@@ -84,6 +126,7 @@ double BlockSolver::solve(int island, VecX& f) {
 double BlockSolver::solve(VecX& f) {
     error_ = 0.0;
     miss_ = {};
+    guess_ = f;
     for (int i = 0; i < islands_.size(); ++i) {
         const double error = solve(i, f);
         if (error > error_) {

@@ -13,6 +13,8 @@ struct BlockSolverParameters {
     double compliance_path_tolerance = 1e-6;               // error on the path of compliances
     double first_compliance = 1.0, min_compliance = 1e-7;  // relative to an element's own response
     double first_factor = 0.1, last_factor = 0.95;         // ratio of successive compliances
+    double shared_compliance = 1e-4;  // compliance that decides shares of a load, relative to an element's own response
+    int min_sharing = 4;              // least number of elements on a single node whose shares are decided
     double attempted_from = 1e-2;                          // largest compliance from which a solution is attempted
     int most_stages = 30;                                  // maximum number of compliances on the path
     // Maximum rounds of sweeps, and sweeps of a round.
@@ -29,7 +31,8 @@ public:
     // Prepare the problem once its nodes and elements are set. Returns false if an inertia is not positive definite.
     bool pose();
     // Solve for the forces f from a guess, usually those of the last step. Return the largest error of an element,
-    // relative to its forces. Forces that share a load stay close to the guess.
+    // relative to its forces. The contacts of a single node share its load as equally compliant contacts do, so that
+    // their forces depend on the problem alone. Between several nodes shares stay close to the guess.
     double solve(VecX& f);
     // Compute the motion under the forces f.
     void move(const VecX& f);
@@ -49,13 +52,16 @@ public:
 
 private:
     double solve(int island, VecX& f);
+    bool share(int island, VecX& f);
+    void copy(const Island& island, const VecX& from, VecX& to) const;
+    bool unloads(int island, const VecX& f) const;
     bool settle(int island, VecX& f);
     bool stiffen(int island, VecX& f);
     bool attempt(int island, VecX& f);
     double newton(int island, BlockNewton::Search search, double compliance, VecX& f);
 
     BlockNewton newton_;
-    VecX best_, on_path_;
+    VecX guess_, best_, on_path_;
     double least_ = 0.0;  // error of best_
     Islands islands_;
     std::vector<BlockFactor> factors_;  // one for each island
