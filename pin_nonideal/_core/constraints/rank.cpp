@@ -11,8 +11,8 @@ namespace pn {
 // Part of a largest squared length, or of a largest pivot, below which a new choice of rows is due.
 static constexpr double faded_part = 0.1;
 
-// Check if a block is a permanent constraint. Contacts and friction count by their own length, as in the programs that
-// decide which elements stick.
+// Check if a block is a permanent constraint. Rows of contacts and friction are divided by their own length, as in the
+// problems that determine the sticking elements.
 static bool is_lasting(const Block& block) { return role(block.kind) == Role::constraint && pressing_row(block.kind) < 0; }
 
 // Check if the rows of a block hold a position by coordinates. Such rows keep their greatest length at any pose so far.

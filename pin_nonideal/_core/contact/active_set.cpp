@@ -24,7 +24,8 @@ constexpr double touching_time = 1e-12;
 constexpr double starting_width = 1e-10;
 // Enumerate all active sets up to this many contacts if pivoting fails.
 constexpr int most_enumerated = 12;
-// Limit of the enumeration if slip directions must be consistent too. Without consistency a motion to integrate exists.
+// Limit of the enumeration if slip directions must be consistent too. Without this condition a motion to integrate is
+// known already.
 constexpr int most_aligned = 8;
 // No body closes a wider gap [m or rad] within `touching_time`: its speed would exceed the speed of light.
 constexpr double sure_gap = 1e-3;
@@ -92,8 +93,8 @@ struct Search {
         return next;
     }
 
-    // Check if no contact begins to move. A joint answer that slides shows that no forces within the cones hold all
-    // contacts, although the loads of a redundant set do not show it.
+    // Check if no contact begins to move. If the joint solution slides, no forces within the cones hold all contacts.
+    // The loads of a redundant set alone do not show this.
     bool all_stay() {
         for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
             if (!rest[i]) continue;
@@ -259,8 +260,8 @@ void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, con
     }
     try {
         close(question.rest, nullptr);
-        // Multipliers of redundant rows do not show if friction at rest is within its cones. Sliding friction follows the
-        // loads of minimum norm, and the solution of the cones need not.
+        // Multipliers of redundant rows do not show if friction at rest is within its cones. Sliding friction follows
+        // the minimum-norm loads, unlike the solution of the cone problem.
         if (question.prescribed || !w.now.rows.redundant || !w.state.sticks_anywhere() || slides_anywhere(p, w, v)) return;
         if (!answer) answer = together();
         if (answer) return close(answer->closed, &*answer);

@@ -14,8 +14,8 @@ struct Touching {
     bool strikes = false;
     bool lands = false;  // some impact is at an open contact
 };
-// Find touching contacts from the widths and rates of the gaps at (t, q, v): closed gaps and narrow gaps. One of several
-// coincident gaps counts: the one that opens last, else a closed one.
+// Find touching contacts from the widths and rates of the gaps at (t, q, v): closed gaps and narrow gaps. Of several
+// coincident gaps, only the gap that opens last counts, else a closed gap.
 Touching touching_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, bool starts);
 
 // Caches the touching contacts of the last state.

@@ -62,8 +62,8 @@ private:
     int tail(size_t i) const { return cones[i].dim - head(i); }
     auto tail_of(const VecX& x, size_t i) const { return x.segment(first[i] + head(i), tail(i)); }
     VecX accelerations();
-    // Scale of the accelerations of all rows, or of some rows. That of all rows would hide the slip of a body beside much
-    // lighter ones.
+    // Scale of the accelerations of all rows, or of some rows. The scale of all rows would hide the slip of a body
+    // beside much lighter bodies.
     double in_play() const;
     double in_play(int row, int count) const;
     // Accelerations of these rows, and of the slip of a cone, that are rounding.

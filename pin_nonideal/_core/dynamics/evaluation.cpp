@@ -21,7 +21,7 @@ constexpr double balance_rounding = 1e-14;
 // Rounding of a sum, relative to the sum of the magnitudes of its terms.
 constexpr double residual_sum_rounding = 1e-13;
 
-// Evaluations between two looks at signals and wall time. Those of large scenes take milliseconds.
+// Evaluations between two checks of signals and wall time. One evaluation of a large scene takes milliseconds.
 constexpr long evaluations_a_watch = 16;
 
 static void factor_mass(const Program& p, Workspace& w, double t) {

@@ -58,7 +58,7 @@ struct Program {
 
     std::vector<GivenForce> forces;
     Actuation actuation;
-    TorqueTable added_torque;            // torques beside those of a sampled control, without times if there are none
+    TorqueTable added_torque;            // torques in addition to a sampled control; no times if there are none
     VecX least_effort, most_effort;      // limits of the actuators, by dof (empty if unlimited)
 
     // Flags that skip computations that the scene does not need.

@@ -15,7 +15,8 @@ constexpr double min_part = 1e-9;
 // Part of its limit by which friction may leave its cone by rounding.
 constexpr double cone_rounding = 1e-9;
 
-// Rows of the contacts that stick, as a cone problem whose w is zero for all multipliers with the force of those at hand.
+// Rows of the sticking contacts as a cone problem. Its w is zero for all multipliers that exert the same force as the
+// current multipliers.
 struct Shares {
     std::vector<int> rows;
     std::vector<ConeElement> cones;

@@ -9,8 +9,8 @@
 
 namespace pn {
 
-// Norm of four angles [rad] from which the system's library computes them. Below it n is exact. The products of n with
-// the first two parts of pi/2 (33 bits each) are exact too.
+// Norm of four angles [rad] above which the system's library computes their cosines and sines. Below it n is exact. The
+// products of n with the first two parts of pi/2 (33 bits each) are exact too.
 constexpr double farthest_reduced = 8e5;
 
 PN_INLINE void cosines_and_sines(const Lanes& x, Lanes& c, Lanes& s) {

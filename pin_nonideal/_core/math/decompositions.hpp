@@ -25,7 +25,8 @@ private:
     Eigen::LLT<MatX> factor_;
 };
 
-// Factorization P A = L U of a square matrix with partial pivoting. A singular A gives infinite numbers, not an error.
+// Factorization P A = L U of a square matrix with partial pivoting. If A is singular, the results are infinite, and no
+// error is raised.
 class LU {
 public:
     void compute(const MatX& A);

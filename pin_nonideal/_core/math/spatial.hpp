@@ -25,7 +25,7 @@ struct Vec3 {
     PN_INLINE Vec3(double a, double b, double c) : x{a, b, c, 0.0} {}
     template <class Derived>
     Vec3(const Eigen::MatrixBase<Derived>& v) : x{v[0], v[1], v[2], 0.0} {}
-    // Copies written by hand: such a class is passed in memory, in both versions of a wide function.
+    // Copies are written by hand, so that both versions of a wide function pass the vector in memory.
     PN_INLINE Vec3(const Vec3& o) : x(o.x) {}
     PN_INLINE Vec3& operator=(const Vec3& o) { x = o.x; return *this; }
 

@@ -1,6 +1,7 @@
-// Tolerances that several rooms of the core share. Others stand beside their algorithm.
+// Tolerances that several rooms of the core share. Other tolerances are defined beside their algorithm.
 //
-// The unit roundoff is 1e-16. Relative tolerances are multiples of it by the operations or the condition behind a value.
+// The unit roundoff is 1e-16. A relative tolerance is this roundoff times the number of operations, or times the
+// condition number of the value.
 #pragma once
 
 namespace pn {

@@ -14,11 +14,11 @@ public:
     RunLimits(const RunLimits&) = delete;
     RunLimits& operator=(const RunLimits&) = delete;
 
-    // Report progress and check the wall time at evaluations too. A step may take many of them.
+    // Report progress and check the wall time at evaluations too. A step may need many evaluations.
     void watch_evaluations();
     // Report progress, save a checkpoint if one is due, and check the limits, between two steps.
     void check();
-    // Save a checkpoint, if the run has a place for it.
+    // Save a checkpoint if the run has a file for it.
     void save();
 
 private:

@@ -130,8 +130,8 @@ bool LeastMove::find(const VecX& r, double floor, VecX& move) {
     return moves;
 }
 
-// Move the nodes of an island at random, against the weighted rows. A motion in which the rows leave a freedom keeps
-// its part along it: (M + J^T G J)^-1 M x = x there.
+// Move the nodes of an island at random, against the weighted rows. If the rows leave a freedom, the part of the motion
+// along this freedom is unchanged: (M + J^T G J)^-1 M x = x.
 void LeastMove::probe(int i) {
     probed_[i] = 1;
     if (!factor(i)) return;

@@ -187,7 +187,7 @@ struct Search {
         return e;
     }
 
-    // Open a face of the cube of (x, tau), with tau >= 0.
+    // Add a face of the cube of (x, tau), with tau >= 0, to the boxes of the search.
     void open_face(int face, double side) {
         if (face == n && side < 0.0) return;
         Box box{Point::Zero(n + 1), Point::Ones(n + 1), face};

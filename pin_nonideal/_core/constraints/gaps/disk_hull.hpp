@@ -39,7 +39,8 @@ struct RimRow {
         out.residual[0] = p.distance - radius;
         out.wrench[0] = force_at(p.place, p.n);
     }
-    // Over a face the rates are those of a disk over a plane. Beside an edge they are those of the edge over the disk.
+    // Over a face, the rates equal the rates of a disk over a plane. Beside an edge, they equal the rates of the edge
+    // over the disk.
     template <class Sides, class Out>
     PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
         const NearestOnDisk<Sides> p(s, solid, rim);

@@ -40,7 +40,8 @@ struct RimSlipRows : SlipDirections {
         const Sides turned = p.from_hull(s);
         const AlongLineMotion<Sides> m(turned, *p.line);
         const TurningTangents<Sides> along(s, p.n, -m.dn);
-        // Velocity of the point on the disk: that of the point on the edge, and the rate of the vector between both points.
+        // Velocity of the point on the disk: velocity of the point on the edge, plus the rate of the vector between
+        // both points.
         const Vec moves = turned.a.velocity(p.line->place()) + m.slides * p.line->e +
                           p.line->at.n.dot(m.u) * p.n - p.distance * m.dn;
         slide(s, out, along, p.place, moves);

@@ -21,7 +21,7 @@ struct UserSlipRows {
     static constexpr Shown shown = Shown::nothing;
 
     int count = 1;
-    std::function<void(double t, const VecX& q, VecX& rows)> directions;  // one after the other
+    std::function<void(double t, const VecX& q, VecX& rows)> directions;  // in sequence
 
     static constexpr auto data() {
         return std::tuple(Datum{"size", &UserSlipRows::count}, Datum{"directions", &UserSlipRows::directions});

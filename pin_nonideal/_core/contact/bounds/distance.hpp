@@ -117,7 +117,7 @@ inline double span(const Kind& kind, const Separation& at) {
 }
 
 // Check if two bodies stay apart over `length` [s]. Along a fixed direction the distance of any two points stays above
-// its chord minus the parabola of accelerations up to `bound`. Rotating bodies rotate their faces and edges. Along a
+// its chord minus the parabola of accelerations up to `bound`. Faces and edges rotate with their bodies. Along a
 // direction that turns uniformly between the normals, the relative speed and distance of the points enlarge the
 // parabola.
 inline bool stays_apart(const Kind& kind, const Separation& a, const Separation& b, double bound, double speed,
@@ -147,8 +147,8 @@ inline double rounded_by(const Kind& kind) {
     return HUGE_VAL;
 }
 
-// Depth that a point in front of a face, or behind it, may still reach before another face is nearer, from its distances
-// to the planes of the nearest and of the next face behind which it lies. Both are positive inside.
+// Depth to which a point may move before another face becomes the nearest. `nearest` and `next` are its distances to
+// the planes of both faces, positive inside.
 inline double depth_to_next_face(double nearest, double next) {
     return next > 0.0 ? next - std::max(nearest, 0.0) : 0.0;
 }
@@ -190,7 +190,8 @@ inline double depth_left(const Program& p, const Workspace& w, int gap, double w
     return std::min(all, radius + depth_to_next_face(nearest, next));
 }
 
-// Check if the gap is the lowest point of a body over a plane. Each point then stays above its own bound.
+// Check if the gap is the lowest point of a body over a plane. Then each point of the body separately keeps its
+// distance from the plane.
 inline bool has_lowest_point(const Program& p, int gap) {
     return std::holds_alternative<EllipsoidRow>(p.blocks[p.gaps[gap].block].kind);
 }

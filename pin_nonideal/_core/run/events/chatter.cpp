@@ -7,7 +7,7 @@ namespace pn {
 namespace {
 
 // Number of events within `chatter_time` that starts a stretch of time stepping with `chatter_steps` steps. If events
-// crowd again right after it, the next stretch is longer by `chatter_growth`, up to `longest_chatter` [s].
+// accumulate again right after it, the next stretch is longer by `chatter_growth`, up to `longest_chatter` [s].
 constexpr int chatter_events = 60;
 // Number of instants with mode changes within `chatter_time` that counts as an accumulation (Zeno) if the last one
 // finds no motion.
@@ -48,7 +48,7 @@ bool Clusters::dwindles() const {
     return last.size() == dwindling_events && progress_.t - last.front() <= chatter_time;
 }
 
-// Return the length [s] of the next stretch: twice the last one if events crowded again right after it.
+// Return the length [s] of the next stretch: twice the last one if events accumulated again right after it.
 double Clusters::next_stretch() const {
     const std::vector<double>& recent = progress_.recent_event_times;
     const double first = recent.empty() ? progress_.t : recent.front();

@@ -31,7 +31,7 @@ public:
     bool step_over(const Failure& failure, bool of_hand_over = false);
     // Check if a step failed because closed contacts contradict each other or the accuracy.
     static bool of_closed_contacts(const Failure& failure);
-    // Bridge crowded events, and select modes at the new state.
+    // Bridge an accumulation of events, and select modes at the new state.
     void bridge(int element);
 
 private:

@@ -11,10 +11,10 @@ namespace pn {
 
 namespace {
 
-// Loads above this multiple of their rounding press surely. Contacts near each other amplify the rounding of their loads,
-// by the ratio of the size of the body to their distance.
+// Loads above this multiple of their rounding are compressive beyond doubt. Contacts near each other amplify the
+// rounding of their loads, by the ratio of the size of the body to their distance.
 constexpr double surely_pressing = 1e6;
-// Maximum difference of accelerations that are the same, relative to all accelerations. Bodies that pass an edge between
+// Maximum difference of equal accelerations, relative to all accelerations. Bodies that pass an edge between
 // two others have 1e-11 from rounding.
 constexpr double same_acceleration = 1e-9;
 

@@ -1,4 +1,4 @@
-// Closed contacts without a load. Rounding alone decides if they hold their bodies, so they are better open.
+// Closed contacts without a load. Rounding alone would decide if they hold their bodies, so the run opens them.
 #pragma once
 
 #include <vector>

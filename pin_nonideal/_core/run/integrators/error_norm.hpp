@@ -11,7 +11,7 @@ public:
     // layout and is the floor of the tolerances.
     ErrorNorm(System& system, double rtol, const VecX& atol, const VecX& rounding);
 
-    // Set the errors that a step of size h between these states may have.
+    // Set the tolerances of a step of size h between these states.
     void set_tolerances(const VecX& y0, const VecX& y1, double h);
     // Check if rounding exceeds the tolerances.
     bool is_limited() const { return limited_; }

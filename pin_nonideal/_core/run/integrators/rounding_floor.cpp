@@ -12,8 +12,8 @@ namespace pn {
 namespace {
 
 // Number of steps from which rounding is measured, and steps between two measurements (seven evaluations each). Noise
-// that demands ever shorter steps causes such runs. The measured value is a bound that most runs stay far below, so
-// shorter runs ignore it.
+// that requires ever shorter steps causes runs of so many steps. In most shorter runs rounding is far below the
+// tolerances, so they do without the measurement.
 constexpr long min_measured_steps = 20000, steps_between_measurements = 64;
 // Safety factor on a measurement, which is only a sample. Part of the previous value that bounds the next one from
 // below.

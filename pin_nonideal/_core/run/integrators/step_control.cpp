@@ -16,8 +16,8 @@ constexpr double safety = 0.65, retry_safety = 0.9, shrink_limit = 0.2, growth_l
 // Return the rounding of an acceleration at the sine s to a singular position, with pivot = s^2. Unit roundoff grows by
 // 1/s in the position, by 1/s^2 in the velocity after projection, and by 1/s^3 in the solution of the rows.
 double rounding_at(double pivot) { return std::numeric_limits<double>::epsilon() / (pivot * std::sqrt(pivot)); }
-// A step is shortened by `detour` if an evaluation is nearer to a singular position than `clearance` times the step's
-// way. Its evaluations then lie elsewhere.
+// A step is shortened by `detour` if an evaluation is nearer to a singular position than `clearance` times the length
+// of the step's path. Its evaluations are then at other positions.
 constexpr double clearance = 0.04, detour = 0.85;
 constexpr int detour_limit = 3;
 

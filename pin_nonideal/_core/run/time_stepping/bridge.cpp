@@ -40,8 +40,8 @@ TimeStepping::TimeStepping(System& system, Progress& progress, GapWatch& watch, 
       moreau_contacts_(system, watch), is_autonomous_(!may_differ(system.p, options)),
       always_evaluated_(asks_always(system.p, options)) {}
 
-// End of a step of this size: at a stop, a jump of the actuation or a due sample before it. Times that differ by rounding
-// are one end, the last of them.
+// End of a step of this size: at a stop, a jump of the actuation or a due sample before it. Times that differ only by
+// rounding are one end, the latest of them.
 double TimeStepping::end_of_step(double size, double stop, double t_end) const {
     double end = progress_.t + size;
     bool met = false;
@@ -53,7 +53,7 @@ double TimeStepping::end_of_step(double size, double stop, double t_end) const {
     const double jump = torques_.next_stop(progress_.t + rounding_, t_end);
     meet(jump);
     meet(torques_.next_stop(jump, t_end));
-    // A sample that differs by rounding is taken at the end of the step, which it does not change.
+    // A sample whose time differs only by rounding is taken at the step's end, which does not move.
     if (options_.output_dt > 0.0 && output_.next() < end - rounding_) meet(output_.next());
     if (stop < end + rounding_) end = stop;
     return end;

@@ -142,7 +142,7 @@ bool ContactProjection::project(const Program& p, Workspace& w, double t, VecX& 
     for (int k = 0; k < max_contact_choices && is_open(p, w); ++k) {
         if (k > 0 && !open_held_apart(p, w)) break;
         posed = false;
-        if (!pose(p, w, false)) break;  // sticking elements slide by as little as the gaps ask for
+        if (!pose(p, w, false)) break;  // sticking elements slide only as far as the gaps require
         moves |= close_gaps(p, w, t, q, v);
     }
     if (moves) place_rows(p, w, t, v);

@@ -12,9 +12,8 @@ public:
     explicit ContactProjection(const Program& p);
 
     // Project q and v onto the closed contacts and sticking elements of the workspace: gaps close, and v satisfies
-    // their rows. Contacts that cannot close because other ones hold their bodies apart become open. A tree that the
-    // rows hold, with a velocity of rounding, comes to rest. Return false, with q and v unchanged, if the trees cannot be
-    // projected one by one.
+    // their rows. Contacts open if other contacts hold their bodies apart. A tree that the rows hold, with a velocity
+    // of rounding, comes to rest. Return false, with q and v unchanged, if the trees cannot be projected one by one.
     bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
     double numerical_energy() const { return moved_energy_; }  // energy that the last projection added, if `energy`
 

@@ -18,7 +18,7 @@ public:
     // Mark a body as not free in this step: a force of a contact or of dry friction acts on it.
     void begin();
     void touch(const Block& block);
-    // Correct the velocity v1 of the free bodies at the end of a step of length h from (q0, v0). The forces are those of
+    // Correct the velocity v1 of the free bodies at the end of a step of length h from (q0, v0). The forces come from
     // the evaluation in the workspace, at the velocity `mean`.
     void move(const Program& p, const Workspace& w, double h, const double* q0, const VecX& v0, const VecX& mean,
               VecX& v1);

@@ -7,8 +7,8 @@ namespace pn {
 
 // Change of the configuration in a step [rad or m] that counts as rounding.
 constexpr double configuration_rounding = 1e-13;
-// Change by a further sweep that is not worth it. The second sweep makes the step second order, and fast motion takes
-// more of them, which keep its energy.
+// Change by a further sweep below which no sweep follows. The second sweep makes the step second order. Fast motion
+// needs more sweeps to conserve its energy.
 constexpr double configuration_tolerance = 1e-9;
 constexpr int max_sweeps = 4;
 

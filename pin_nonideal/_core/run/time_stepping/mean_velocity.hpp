@@ -41,7 +41,7 @@ public:
     // Slip speed of a friction element at the velocity of the start.
     double start_speed(const Program& p, Workspace& w, const Friction& friction) const;
     // Set the right-hand sides b that satisfy the constraints at the end of the step. The rows are evaluated at the
-    // middle of the step, so half of their own change is still to come.
+    // middle of the step, so half of their change over the step remains.
     void meet_at_end(const Program& p, Workspace& w, VecX& b) const;
 
 private:

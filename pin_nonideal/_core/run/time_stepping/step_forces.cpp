@@ -9,7 +9,7 @@ namespace pn {
 
 namespace {
 
-// Largest error of the laws that a step may have, relative to an element's forces, if no forces meet them. An event
+// Accepted error of the laws, relative to an element's forces, in a step without an exact solution. An event
 // reports it.
 constexpr double most_relaxed = 1e-2;
 
@@ -101,7 +101,7 @@ bool StepForces::solve(double h, const VecX& q0, const VecX& v0) {
     return solved;
 }
 
-// Accept the best forces found, although they miss the laws of contact by the error of one element.
+// Accept the best forces found, which violate the laws of contact by the error of one element.
 void StepForces::relax(double h) {
     const BlockSolver::Miss& miss = trees_.miss();
     const StepElements::Part& part = elements_.parts[miss.element];
@@ -122,7 +122,8 @@ bool StepForces::moves() {
     return end_rows.head(n).cwiseAbs().maxCoeff() > cone_force_rounding * free_rows_.head(n).cwiseAbs().maxCoeff();
 }
 
-// Check if forces within all cones hold a rest, and set f to them then. The rows without forces are in end_rows.
+// Check if forces within all cones hold the bodies at rest, and set f to such forces. The rows without forces are in
+// end_rows.
 bool StepForces::keep_rest(bool solved, const VecX& q0) {
     const int n = static_cast<int>(elements_.rows.size());
     const auto W = responses_.matrix(n);
@@ -130,7 +131,7 @@ bool StepForces::keep_rest(bool solved, const VecX& q0) {
                        cone_force_rounding * end_rows.head(n).cwiseAbs().maxCoeff();
     if (solved && !moves) return false;
     const bool holds = solver_.hold(W, end_rows.head(n), elements_.cones, f.head(n));
-    if (!holds) q_without_rest_ = q0;  // the next sweeps and the step after the start need not ask again
+    if (!holds) q_without_rest_ = q0;  // the next sweeps and the step after the start skip this check
     return holds;
 }
 
