@@ -18,7 +18,7 @@ NAME_MAX = 64  # characters of a name that is compared with known names
 
 
 class PinNonidealError(Exception):
-    """Root of all errors raised by this package."""
+    """Base class of all errors raised by this package."""
 
     def __reduce__(self) -> tuple[object, ...]:
         # The constructor cannot be used, since its arguments differ from `args`.

@@ -314,7 +314,7 @@ def commanded(model: Model, torques: object) -> Mask:
 
 
 def _require_vectors(model: Model, kp: Array, who: str) -> None:
-    """Check that a stiffness acts on no joint whose configuration is no vector.
+    """Check that a stiffness acts only on joints whose configuration is a vector.
 
     Raises:
         InputError: see above.

@@ -172,7 +172,7 @@ class CompiledScene:
         return ""
 
     def _circumstances(self) -> Circumstances:
-        """Return the parts of the scene that errors of its runs name."""
+        """Return the names of the parts of the scene that error messages of its runs need."""
         spec = self.spec
         sources = ("the actuation", _quoted("force", spec.forces), _quoted("law", spec.laws))
         used_names: set[str] = set()

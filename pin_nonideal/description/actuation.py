@@ -1,8 +1,8 @@
 """Torques tau that drive a scene, in generalized coordinates (shape nv).
 
 A scene accepts None, constant torques, a function (t, q, v) -> tau that is called at every evaluation, one of
-the descriptions below, or a list of drives, whose torques add. Torques are arrays (nv,) or tables by joint
-name, also those of functions.
+the descriptions below, or a list of drives, whose torques add. Torques, also the results of functions, are
+arrays (nv,) or tables by joint name.
 """
 
 from __future__ import annotations
@@ -54,11 +54,11 @@ class SampledControl:
     torque `initial` acts for the first d samples. Each run starts without earlier samples: each call of
     `simulate`, each run of a `rollout`, and each `Stepper.reset`. Single states and steps
     (`Scene.acceleration`, `Scene.solve`, `Scene.step`) have no earlier samples, so `initial` acts there.
-    Torques that replace the actuation, as those of `Stepper.step` and of a callback, act without delay.
+    Torques that replace the actuation, in `Stepper.step` and in a callback, act without delay.
 
-    A control with `joints` may stand in a list of drives. The others are constant torques, controls and
-    `TrackTrajectory` drives of the same period, and tables. A `Table` with interpolation "hold" has times
-    t0 + k period. A linear one has any times. One control of a list may have a delay.
+    A control with `joints` may stand in a list of drives. The other drives are constant torques, controls and
+    `TrackTrajectory` drives of the same period, and tables. A `Table` with interpolation "hold" has times t0
+    + k period. A linear one has any times. One control of a list may have a delay.
 
     Args:
         function: (t, q, v) -> tau, shape (nv,) or by joint name, called once per period.
@@ -330,7 +330,7 @@ def drives_of(actuation: Any) -> tuple[Any, ...]:
 
 
 def requesting_drives(actuation: object) -> list[object]:
-    """Return the drives that request torques, those within effort limits included.
+    """Return the drives that request torques, including drives inside `EffortLimits`.
 
     Args:
         actuation: the actuation of a scene, as returned by `given_actuation`.

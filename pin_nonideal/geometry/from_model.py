@@ -58,7 +58,7 @@ class GeometryContact:
             need not be in the collision model, such as `ground()`.
         mu: kinetic coefficient of friction.
         static_ratio: static over kinetic friction, at least 1.
-        restitution: rate at which the gap opens after an impact over that at which it closed, 0 to 1.
+        restitution: opening rate of the gap after an impact over its closing rate before, 0 to 1.
         name: name in messages and results; if there are several contact points, their names are numbered.
         rounding: radius of rounded edges [m], for boxes and convex meshes against each other and against
             cylinders or cones. The same length rounds the rims of two cylinders or cones, and is the inset of

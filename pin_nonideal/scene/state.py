@@ -158,7 +158,7 @@ class SceneStates:
         return self._projected(q_in, v_in, t, self._named(q, v, t))
 
     def _named(self, q: State | None, v: State | None, t: float = 0.0) -> Held:
-        """Entries that are named by a state, or by the scene's own, which are those of its own start."""
+        """Return the entries that a given state names, else the named entries of the initial state."""
         return Held(
             self.held.q if q is None else named_coordinates(self._model, q),
             self.held.v if v is None else named_entries(self._model, v),

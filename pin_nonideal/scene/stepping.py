@@ -1,4 +1,4 @@
-"""Steps of a scene for loops of one's own: one at a time from any state, or period by period in one run."""
+"""Steps of a scene for user-written loops: single steps from any state, or period by period in one run."""
 
 from __future__ import annotations
 
@@ -173,7 +173,7 @@ class SceneStepper:
         rtol: float | None,
         atol: float | None,
     ) -> Stepper:
-        """A run that is taken period by period, see `Scene.stepper`."""
+        """Return a run that advances period by period, see `Scene.stepper`."""
         choice("stepper: method", method, STEPPING)
         length = positive("stepper: period", period)
         if dt is not None and method not in FIXED:

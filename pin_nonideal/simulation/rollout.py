@@ -118,7 +118,7 @@ def rollout(
 
 
 def _threads(jobs: int) -> int:
-    """Return the number of threads for a number of jobs, of which a negative one counts free processors.
+    """Return the number of threads; negative numbers of jobs count from the number of processors.
 
     Raises:
         InputError: it is zero or no number of jobs.

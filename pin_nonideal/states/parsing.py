@@ -156,7 +156,7 @@ def named_joint_values(model: Model, joint_values: object, what: str, others: fl
 
 
 def named_joint_samples(model: Model, joint_samples: object, count: int, what: str) -> Array:
-    """Samples of the degrees of freedom from an array or by joint name, (nt, nv); zero for joints left out.
+    """Return samples by degree of freedom from an array or by joint name, zero for missing joints, (nt, nv).
 
     Args:
         model: pinocchio.Model.
@@ -190,7 +190,7 @@ def named_joint_samples(model: Model, joint_samples: object, count: int, what: s
 def named_configuration_samples(
     model: Model, configurations: object, base: Array, count: int, what: str
 ) -> Array:
-    """Samples of a configuration from an array or by joint name, (nt, nq).
+    """Return samples of a configuration from an array or by joint name, (nt, nq).
 
     Args:
         model: pinocchio.Model.

@@ -175,7 +175,7 @@ class _Joint:
         return None
 
     def end(self, inside: float, side: int) -> float:
-        """Return an end x of the band, the end that the limits at x themselves give."""
+        """Return an end x of the band that equals the end under the friction limits at x."""
         sign = (-1.0, 1.0)[side]
         within = inside
         for k in range(MAX_PASSES):

@@ -161,7 +161,7 @@ class LimitCones:
         ]
 
     def missing(self) -> tuple[dict[int, float], dict[int, float]]:
-        """Return the forces that are missing where limits of any size cannot hold the scene.
+        """Return the missing forces of a scene that limits of any size cannot hold.
 
         Their sum is least. Only for loads that the unknowns can balance with any signs.
 
@@ -200,7 +200,7 @@ class LimitCones:
     def _least_violations(
         self, bounds: list[tuple[Array, float]], owners: list[int], *, pressing: bool
     ) -> Array:
-        """Return the violations of bounds row x <= bound, of least sum, for which forces balance.
+        """Return the violations of the bounds row x <= bound with the smallest sum for which forces balance.
 
         Args:
             bounds: rows and bounds.

@@ -55,10 +55,11 @@ class TrackTrajectory(SceneDrive):
       name enter "gravity" and "rnea" with their present position and velocity, and without acceleration.
     - "constrained": torques by which the driven joints move the mechanism along the reference, by
       `inverse_dynamics` with the constraints, laws and forces of the scene, without its contacts. The
-      reference is put onto the constraints: it keeps as many coordinates as these leave free, driven ones
-      first, and the others follow, also the joints that q does not name. Named coordinates beyond this
-      number must agree with the constraints up to rounding (1e-3 rad). The constraints must hold positions.
-      Forces that the driven joints cannot supply are left out in the sense of least squares.
+      reference is put onto the constraints: it keeps as many coordinates as the constraints leave free,
+      driven ones first. The other coordinates follow, also those of joints that q does not name. Named
+      coordinates beyond this number must agree with the constraints up to rounding (1e-3 rad). The
+      constraints must hold positions. Forces that the driven joints cannot supply are left out in the sense
+      of least squares.
 
     Args:
         times: increasing times [s], shape (nt,) with nt >= 1.

@@ -126,7 +126,7 @@ def sweep(
 
 
 def _check_options(duration: float, options: Table) -> None:
-    """Check the options of `simulate`, as far as they do not depend on the scene.
+    """Check the options of `simulate` that do not depend on the scene.
 
     Raises:
         InputError: `simulate` has no such option, or refuses its value.

@@ -14,7 +14,7 @@ from pin_nonideal.types import Array
 from .by_name import joint_record
 from .fields import RunFields
 
-# Kinds of joints by prefix, with the units of their positions as `JointRecord` has them and of their rates.
+# Kinds of joints by prefix, with the units of their positions in a `JointRecord` and of their rates.
 # Kinds that are not listed, such as composites, have unknown units.
 KINDS = (
     ("JointModelFreeFlyer", ("m",) * 3 + ("1",) * 4, ("m",) * 3 + ("rad",) * 3),

@@ -20,11 +20,12 @@ from pin_nonideal.types import Array, Model
 from .body_loads import Load, about_world, loads_on_bodies
 from .fields import RunFields, reactions_of
 
-# Largest part of the forces on a body by which they may miss its recorded reaction.
+# Tolerance of the sum of the forces on a body against its recorded reaction, relative to these forces.
 AGREES = 1e-6
-# Part of the weight of the mechanism by which they may miss it where forces cancel, as in free fall.
+# The same tolerance if forces cancel, as in free fall, relative to the weight of the mechanism.
 CANCELS = 1e-9
-# Smallest eigenvalue of the inertia that frames leave to their body, relative to the inertia of the body.
+# Minimum eigenvalue of the remaining inertia of a body without its frames, relative to the inertia of the
+# body.
 LEFT_OVER = -1e-9
 CARRIERS = (pin.FrameType.JOINT, pin.FrameType.FIXED_JOINT)
 

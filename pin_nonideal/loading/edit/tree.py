@@ -200,7 +200,7 @@ def _reduced(
 
 
 def has_joints(model: Model, constraint: Constraint, where: str) -> bool:
-    """Check if the joints of a constraint in the robot's file still exist; without them it is satisfied.
+    """Check if the joints of a constraint still exist; without these joints it is satisfied.
 
     Args:
         model: pinocchio.Model.

@@ -138,7 +138,7 @@ def requested_state(
 
 
 def held_entries(robot: RobotFile, table: Mapping[str, Any], start: Start, speed: Start) -> Held:
-    """Return the entries that the arguments of `load` name, or else the tables of the file.
+    """Return the entries that the arguments of `load` name, else the entries that robot.yaml names.
 
     Args:
         robot: content of the robot's file, with the joints of the scene.

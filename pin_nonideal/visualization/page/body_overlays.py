@@ -15,7 +15,7 @@ from .visuals import LINK_COLORS, Visual, visuals_of
 if TYPE_CHECKING:
     from pin_nonideal.scene.scene import Scene
 
-# Collision shapes with more triangles are not carried.
+# Collision shapes with more triangles are left out.
 TRIANGLES = 20_000
 
 
@@ -32,7 +32,7 @@ def inertia_box(inertia: pin.Inertia) -> Table:
 
 
 def collisions_of(scene: Scene) -> list[Visual]:
-    """Collision shapes, without those of too many triangles in all."""
+    """Collision shapes, unless they have too many triangles in total."""
     if scene.collision_model is None:
         return []
     overlays, room = [], TRIANGLES

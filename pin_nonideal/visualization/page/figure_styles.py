@@ -39,7 +39,7 @@ PAPER: Table = {
 
 
 def _checked(style: Mapping[str, object]) -> Table:
-    """Return settings that matplotlib knows.
+    """Return settings, checked to be settings of matplotlib.
 
     Raises:
         InputError: matplotlib has no setting of a name, or refuses its value.

@@ -186,7 +186,7 @@ def _plots(
 
 
 def _without_noise(plot: Plot, rounding: dict[str, float]) -> Plot:
-    """A plot with zero in place of rounding; on a logarithmic axis rounding is what is shown."""
+    """Return a plot with zero in place of rounding, which only logarithmic axes show."""
     if plot.log:
         return plot
     least = rounding_of((plot.unit, values) for values in plot.curves.values())

@@ -16,16 +16,16 @@ from .xy_plots import Relation, available, is_relation, relations_of
 if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
 
-# Points of a curve at most, of all curves together, and of what a law allows.
+# Maximum number of points of one curve, of all curves together, and of the limits of a law.
 MOST, POINTS, BOUNDS = 1_500, 60_000, 300
 
 
 def names_relation(run: Trajectory, item: Any) -> bool:
-    """Whether an item of `plots` names a relation and not a joint.
+    """Check if an item of `plots` names a relation and not a joint.
 
     Args:
         run: the run.
-        item: of `plots`.
+        item: entry of `plots`.
     """
     return is_relation(item) and item not in list(run.scene.model.names)
 
@@ -33,12 +33,12 @@ def names_relation(run: Trajectory, item: Any) -> bool:
 def stored_relations(
     payload: Payload, run: Trajectory, finer: Trajectory, requested: list[str]
 ) -> list[Table]:
-    """The relations of a run: those asked for, which are shown, and those that a reader may choose.
+    """Return the relations of a run: the requested ones, which are shown, and others for the reader's choice.
 
     Args:
-        payload: that carries their points.
+        payload: payload that stores their points.
         run: the run.
-        finer: the same with more samples, for phase planes.
+        finer: the same run with more samples, for phase planes.
         requested: names, as `relations_of` takes them.
     """
     more = [name for name in available(run) if name not in requested]
@@ -67,9 +67,9 @@ def _stored(payload: Payload, run: Trajectory, name: str, relation: Relation, po
 
 
 def _curve(payload: Payload, run: Trajectory, label: str, x: Array, y: Array, points: int) -> Table:
-    """Points of a curve with their times; where it breaks, numbers that are none."""
+    """Return the points of a curve with their times; NaN separates the parts of a broken curve."""
     t = np.asarray(run.t, dtype=float)
-    if len(x) > len(t):  # breaks were put in
+    if len(x) > len(t):  # the curve has breaks
         at = np.flatnonzero(np.isnan(x)) - np.arange(len(x) - len(t))
         t = np.insert(t, at, t[at])
     thin = Plot(label, "", t, {"x": x, "y": y}).thinned(max(points // 4, 25))
@@ -78,7 +78,7 @@ def _curve(payload: Payload, run: Trajectory, label: str, x: Array, y: Array, po
 
 
 def _bound(payload: Payload, label: str, x: Array, y: Array, one_side: bool) -> Table:
-    """What a law allows, in the order of x."""
+    """Return the limit of a law, in the order of x."""
     chosen = np.unique(np.linspace(0, len(x) - 1, BOUNDS).astype(int))
     order = chosen[np.argsort(x[chosen], kind="stable")]
     return {"label": label, "x": payload.add(x[order]), "y": payload.add(y[order]), "both": not one_side}

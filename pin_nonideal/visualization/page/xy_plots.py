@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
 
 KINDS = ("phase", "friction", "load")
-# Of so many joints and laws a page carries relations.
+# Maximum number of joints and of laws with relations on a page.
 MOST = 16
 
 
@@ -43,7 +43,7 @@ class Relation:
 
 
 def available(run: Trajectory) -> list[str]:
-    """Names of the relations that a run has, one joint or law each, those that move most of each kind.
+    """Return the names of a run's relations, one joint or law each: the ones of each kind that move most.
 
     Args:
         run: the run.

@@ -271,7 +271,7 @@ class Player {
     });
   }
 
-  /** The height of curves: of the style, or what a dock by hand leaves for a single row of plots. */
+  /** Sets the height of curves: the style's height, or the space for a single row of plots in a resized dock. */
   fitPlots() {
     const plots = element("plots"), last = this.plots[this.plots.length - 1];
     plots.style.removeProperty("--tall");
@@ -284,7 +284,7 @@ class Player {
     const box = element("forces"), { clientWidth: width, clientHeight: height } = element("stage"), narrow = width < 640, folded = box.classList.contains("off");
     // The view is framed between the heading and the buttons that cover it, and beside the table of forces if there is space.
     const taken = (card, side, room) => (card[side] ? card[side] + room : 0);
-    // The panel begins below the heading and ends above the buttons where they are under it.
+    // The panel begins below the heading, and ends above the buttons if they lie under it.
     const heading = element("heading"), beside = narrow || box.hidden ? 0 : box.offsetWidth;
     heading.style.maxWidth = beside ? `min(60%, ${Math.max(width - beside - 36, 200)}px)` : "";
     const tools = element("tools"), panel = element("panel"), under = tools.offsetLeft < panel.offsetLeft + panel.offsetWidth;

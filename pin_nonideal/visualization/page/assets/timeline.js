@@ -1,4 +1,4 @@
-// Time axis of the run: a slider, marks of events, and the density of crowded events.
+// Time axis of the run: a slider, marks of events, and the density of frequent events.
 
 const APART = 6; // minimum distance of separate marks [pixels]
 
@@ -76,7 +76,7 @@ class Timeline {
         for (const k of own) { const x = axis.x(times[k]); c.fillStyle = this.color(kinds[kind[k]]); c.beginPath(); c.moveTo(x, track - 5); c.lineTo(x - 3.5, track - 12); c.lineTo(x + 3.5, track - 12); c.fill(); }
         continue;
       }
-      // Crowded events are a column with a height by their number, divided by kind.
+      // Frequent events are a column with a height by their number, divided by kind.
       const tall = 4 + 10 * (Math.log(own.length) / Math.log(Math.max(most, 3))), counts = new Map();
       for (const k of own) counts.set(kind[k], (counts.get(kind[k]) || 0) + 1);
       let y = track - 5;
