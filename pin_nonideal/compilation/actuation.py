@@ -267,7 +267,7 @@ def _torques_of(function: Callable[..., object], model: Model, who: str) -> Call
 def _held(times: Array, values: Array) -> Timed:
     """Return a zero-order hold: each value ends one floating-point spacing before the next time.
 
-    A step of the core ends there and at the next time, so that no stage of a step sees both values.
+    A step of the core ends at both times, so that no stage of a step has both values.
     """
     ends = times[1:] - np.spacing(np.maximum(np.abs(times[1:]), np.diff(times)))
     both = np.column_stack([times[:-1], np.maximum(ends, times[:-1])]).ravel()

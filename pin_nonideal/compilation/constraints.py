@@ -37,7 +37,7 @@ from .resolver import Frame, Resolver, placed_on, words
 MAX_GEAR = 64
 # A ratio within this distance of a fraction is treated as that fraction.
 GEAR_ROUNDING = 1e-12
-# Step of central differences in time, relative to max(1 s, |t|): a compromise of rounding and curvature.
+# Step of central differences in time, relative to max(1 s, |t|): a compromise between rounding and curvature.
 TIME_DIFFERENCE = 1e-6
 
 

@@ -114,7 +114,7 @@ def geometry_contacts(
         links: names of links; only pairs with a shape on one of these links are used. The name of a joint
             selects all shapes that move with this joint. None selects all pairs.
         adjacent: whether the shapes of two bodies with a common joint may touch. The shapes of most robots
-            overlap there; an SRDF file disables these pairs by name.
+            overlap at their joints; an SRDF file disables these pairs by name.
         mu: kinetic coefficient of friction of all contacts.
         static_ratio: static over kinetic friction of all contacts, at least 1.
         restitution: coefficient of restitution of all contacts, 0 to 1.

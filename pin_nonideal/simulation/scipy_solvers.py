@@ -1,7 +1,7 @@
 """SciPy's implicit methods on the core's right-hand side, for stiff scenes.
 
 The state is y = (q, v, states of laws, work of the ledger's columns), with q in ambient coordinates.
-Quaternions and (cos, sin) pairs are plain numbers. The right-hand side is smooth off unit length as well.
+Quaternions and (cos, sin) pairs are plain numbers. The right-hand side is also smooth for other lengths.
 The core monitors the steps: modes of dry friction are fixed within a step, events are located by the method's
 interpolant, and the integrator restarts after each event. Radau is a one-step method and continues from the
 projected state after each step. BDF and LSODA use earlier steps, so only their samples are projected.

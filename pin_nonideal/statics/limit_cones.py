@@ -46,7 +46,7 @@ class LimitCones:
     Attributes:
         A: rows of constraints and contacts, (m, nv).
         parts: slice of each element's forces in the unknowns.
-        lengths: length of each unknown, which is multiplied by it.
+        lengths: factor of each unknown, the length of its row.
         unit: largest force, by which the unknowns are divided.
         constant: limits of the elements that do not depend on the unknowns, in the units of the unknowns.
         balance: forces of the unknowns along an orthonormal basis of their span, (r, m + d).

@@ -17,7 +17,8 @@ constexpr double tolerances_near[] = {1e-3, 1e-5, 1e-7, 1e-9};
 // Gaps above this fraction of the scene's size in dependent rows are closed by projection, which may move sticking
 // elements.
 constexpr double creeping_gap = 1e-11;
-// Maximum choices of rows to project one position. Each choice reduces the gaps of the other rows quadratically.
+// Maximum number of choices of rows for the projection of one position. Each choice reduces the gaps of the other rows
+// quadratically.
 constexpr int max_row_choices = 3;
 
 // Largest residual of the rows that count as dependent.

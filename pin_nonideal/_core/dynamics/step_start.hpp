@@ -11,8 +11,8 @@ void begin_step(const Program& p, Workspace& w, double t, const VecX& q, const V
 void continue_step(const Program& p, Workspace& w, double t, const VecX& v, bool chosen = false);
 // Configure and choose the independent rows, without forces. Return true if it chose rows.
 bool begin_rows(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
-// Configure inside a step, which leaves the constraints. Rows that depend on others seem independent there: if the
-// Cholesky factor cannot tell, the independent rows are chosen at the step's start (t0, q0).
+// Configure inside a step, which leaves the constraints. Off the constraints dependent rows seem independent. If the
+// Cholesky factor does not decide, the independent rows are chosen at the step's start (t0, q0).
 void begin_rows_inside(const Program& p, Workspace& w, double t0, const VecX& q0, double t, const VecX& q, const VecX& v);
 // Choose the independent rows in a configured workspace. Return true if it chose rows.
 bool configure_step(const Program& p, Workspace& w);
@@ -24,7 +24,7 @@ bool begin_step_on_rates(const Program& p, Workspace& w, double t, VecX& v, bool
 // Keep bodies moving after a change of modes. If newly chosen rows would stop the motion, rows that sticking elements
 // hold with negligible forces count as dependent from now on. The workspace is evaluated at (q, v) before and after.
 void keep_moving(const Program& p, Workspace& w, double t, const VecX& v);
-// Project a state onto the rows of newly set modes, with the rows that are independent there.
+// Project a state onto the rows of newly set modes, with independent rows at this state.
 void project_into_modes(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
 
 }  // namespace pn

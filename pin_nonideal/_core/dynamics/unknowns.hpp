@@ -7,7 +7,7 @@
 
 namespace pn {
 
-// Maximum steps of Newton's method for y = g(y).
+// Maximum number of steps of Newton's method for y = g(y).
 constexpr int max_reaction_newton = 30;
 
 struct Unknowns {

@@ -15,7 +15,8 @@
 
 namespace pn {
 
-// Maximum iterations of a projection, each with stored multipliers. Newton's method takes three if it converges well.
+// Maximum number of iterations of a projection, each with stored multipliers. Newton's method takes three if it
+// converges well.
 constexpr int projection_limit = 12;
 
 // Rank tolerance while elements stick. A direction held by a smaller part of their forces counts as free. It is the
@@ -126,7 +127,8 @@ struct Evaluation {
 struct Scratch {
     VecX scaled, scaled_free, trial, work, r, residual, lam_step;
     std::vector<char> ideal_locked;
-    // Projection of a position: state of the factorization, multipliers from there, and steps of the multipliers.
+    // Projection of a position: state of the factorization, multipliers of the move from this state, and steps of the
+    // multipliers.
     VecX position_start, position_lam;
     std::vector<VecX> position_lam_steps;
     VecX unknown, image, shifted;  // implicit reaction equation

@@ -63,7 +63,7 @@ struct Search {
     }
 
     // Check if the motion of the suggested modes satisfies their conditions. The motion is then unique, because no
-    // limit depends on the load. The workspace ends evaluated there.
+    // limit depends on the load. On return the workspace is evaluated at this motion.
     bool keeps_suggestion() {
         if (p.needs_reactions || !question.breaking.empty()) return false;
         try {

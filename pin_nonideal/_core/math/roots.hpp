@@ -82,7 +82,7 @@ inline double rise_between(double t0, double u0, double t1, double u1, double t2
 }
 
 // Return a point between a and b at which the margin is negative, by golden sections toward its minimum. `value` is the
-// margin there. Returns b if no such point is found.
+// margin at this point. Returns b if no such point is found.
 template <class Margin>
 double dip_between(double a, double b, const Margin& margin, double& value) {
     constexpr double golden = 0.3819660112501051;

@@ -188,7 +188,7 @@ def slopes(times: Array, values: Array) -> tuple[Array, Array]:
     """Return the rates of change at both ends of every interval, (n - 1, c) each, for the page.
 
     Inner frames have the rate of the parabola through three frames. Frames with equal times, as at an impact,
-    and the ends of the run have the one-sided rate of the parabola that ends there.
+    and the ends of the run have the one-sided rate of the adjacent parabola.
     """
     h = np.diff(times)[:, None]
     chord = np.divide(np.diff(values, axis=0), h, out=np.zeros((len(h), values.shape[1])), where=h > 0.0)

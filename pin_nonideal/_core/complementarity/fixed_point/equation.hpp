@@ -10,7 +10,7 @@
 
 namespace pn {
 
-// Maximum steps of Newton's method for a solution of the equation.
+// Maximum number of steps of Newton's method for a solution of the equation.
 constexpr int max_fixed_point_newton = 30;
 
 struct ReactionEquation {

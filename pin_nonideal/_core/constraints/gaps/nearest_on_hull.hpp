@@ -94,7 +94,7 @@ struct Hull {
     }
 
 private:
-    // The other face slopes away beyond the edge, so its normal has an outward component there.
+    // The other face slopes away beyond the edge, so its normal has an outward component at the edge.
     void add_side(const Edge& edge, int face, int other) {
         Vec3 side = faces[face].normal.cross(points[edge.to] - points[edge.from]).normalized();
         if (side.dot(faces[other].normal) < 0.0) side = -side;

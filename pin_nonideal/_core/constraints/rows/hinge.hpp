@@ -1,4 +1,4 @@
-// The origins of two frames coincide, and so do their axes.
+// The origins and the axes of two frames coincide.
 #pragma once
 
 #include <tuple>

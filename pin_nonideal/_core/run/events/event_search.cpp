@@ -27,8 +27,8 @@ constexpr double parabola_part = 0.25;
 constexpr double leap_part = 1e-3, leap_digits = 1e-15;
 // Error of a force / limit ratio that comes from an interpolant of low order, relative to its change.
 constexpr double doubted_part = 1e-2;
-// Maximum evaluations that confirm an interpolated crossing, and tolerance of the correction relative to the step. The
-// remaining error is the square of the correction, which the repeated step corrects.
+// Maximum number of evaluations that confirm an interpolated crossing, and tolerance of the correction relative to the
+// step. The remaining error is the square of the correction, which the repeated step corrects.
 constexpr int confirmations = 3;
 constexpr double confirmed_width = 1e-4;
 // A margin jumps if more than this fraction of it is left at the interpolated crossing. The polynomial through rates

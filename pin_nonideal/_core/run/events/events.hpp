@@ -10,8 +10,8 @@
 namespace pn {
 
 // Select new modes at (t, y), and project y onto the constraints. Without an event, as at the start of a run, every
-// element gets its mode from its velocity. The workspace ends evaluated there, with the rate in dy. Return the changes,
-// empty without an event.
+// element gets its mode from its velocity. On return the workspace is evaluated at (t, y), and dy holds the rate.
+// Return the changes, empty without an event.
 //
 // The contacts of two bodies open if none of them has a load at a lift, or at a touch in vain. `let_go` receives their
 // gaps.

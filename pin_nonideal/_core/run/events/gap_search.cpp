@@ -174,7 +174,7 @@ std::optional<GapSearch::Touch> GapSearch::search(int gap, const Look& a, const 
     if (b.width < -rounding_ && a.rate + bends.above * length < 0.0) return between(gap, a, b);
     if (bends.above * length * length < rounding_ || looks_ > most_looks) {
         // Bodies can slide to the next contact point, as a corner from a face onto an edge. The gap of that point then
-        // comes down to zero and stays there. It does not touch before it becomes negative.
+        // falls to zero and stays zero. It does not touch before it becomes negative.
         const bool has_closed = looks_ > most_looks && !rests && !(a.separation && slides_on(gap));
         if (a.width > 0.0 && b.width < -rounding_) return between(gap, a, b);
         if (b.width < -rounding_ || has_closed) return Touch{b.part, b.rate * stepper_.h};

@@ -24,8 +24,8 @@ public:
     };
     const std::vector<Candidate>& find_candidates();
     const std::vector<Candidate>& candidates() const { return candidates_; }  // candidates of the last search
-    // Part of the step at which a candidate closes, and rate of the gap there per step. The search leaves the workspace
-    // at another state.
+    // Part of the step at which a candidate closes, and rate of its gap at this instant per step. The search leaves the
+    // workspace at another state.
     struct Touch { double part, slope; };
     std::optional<Touch> first_touch(int gap);  // `gap`: a candidate
     // Return the zero level of the gap in this step. Rounding can leave a rising gap below its plane at the start.

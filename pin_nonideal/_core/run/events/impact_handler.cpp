@@ -13,7 +13,7 @@ namespace {
 
 // Energy gain of an impact that counts as rounding, relative to its works.
 constexpr double gain_rounding = 1e-12;
-// Maximum number of consecutive impacts at one instant. An impact can make other contacts approach again.
+// Maximum number of consecutive impacts at one instant. An impact can reverse the separation of other contacts.
 constexpr int most_at_once = 100;
 
 }  // namespace

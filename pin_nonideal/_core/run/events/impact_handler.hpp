@@ -10,8 +10,7 @@ class Landing {
 public:
     Landing(System& system, Progress& progress, GapWatch& watch, const Options& options, Output& output, Recording& out);
 
-    // Apply impacts of contacts that touch and approach each other, until none does. Return true if there was an
-    // impact.
+    // Apply impacts until no touching contact approaches. Return true if there was an impact.
     bool strike(bool starts);
     // Advance to the end of bouncing after an impact, not beyond `stop` or the next sample. Without low bouncing the
     // state stays.

@@ -1,4 +1,5 @@
-// Closed contacts without a load. Rounding alone would decide if they hold their bodies, so the run opens them.
+// Closed contacts without a load. Rounding alone would decide if such contacts hold their bodies, so the run opens
+// them.
 #pragma once
 
 #include <vector>

@@ -21,7 +21,7 @@ public:
     // Store the signs at the start of a run.
     void start(double t, const VecX& y);
     // Search the step just taken, which may end at a friction event, and end it at the first value event. Return true
-    // if its end has changed. The workspace must be evaluated at the step's end, and is evaluated there again.
+    // if its end has changed. The workspace must be evaluated at the step's end, also on return.
     bool locate(bool ends_at_event);
     // Count the events at the end of a step of time stepping, whose end stays.
     void look_at_end(double t, const VecX& y);

@@ -22,7 +22,7 @@ constexpr double longer = 5.0;
 // Maximum growth in one fixed step that counts. Faster growth comes from the method: the step is too long, and the
 // motion overflows.
 constexpr double growth_in_step = 0.1;
-// Speed [rad/s or m/s] that no mechanism has. A run of fixed steps ends there, before its motion overflows.
+// Speed [rad/s or m/s] that no mechanism has. A run of fixed steps ends at this speed, before its motion overflows.
 constexpr double impossible_speed = 1e12;
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Integration methods as data. A new explicit Runge-Kutta pair is one table in method.cpp, and its name there. The core
+// Integration methods as data. A new explicit Runge-Kutta pair needs one table and one name in method.cpp. The core
 // follows the steps of methods outside the core.
 #pragma once
 

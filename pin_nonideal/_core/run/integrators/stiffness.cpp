@@ -15,7 +15,8 @@ constexpr double usual_steps = 1e5;
 // Steps near the limit of stability until stiffness is checked. `quiet_steps` steps in a row away from the limit reset
 // the count. [Hairer, Wanner, Solving ODEs II, IV.2, checks after 15]
 constexpr long suspicious_steps = 1000, quiet_steps = 6;
-// Fraction of the stability limit beyond which a step counts. Error control keeps a stiff run there on average.
+// Fraction of the stability limit beyond which a step counts. On average, error control keeps the steps of a stiff run
+// at this fraction.
 constexpr double near_border = 0.5;
 // Stability limit of Euler's rule, which time stepping applies to decaying motions.
 constexpr double euler_border = 2.0;

@@ -32,7 +32,7 @@ private:
 
     void look_for_border();
     void look_ahead();
-    // Return the fastest mode at the step's end. The workspace is there before and after.
+    // Return the fastest mode at the step's end. The workspace is evaluated at the step's end before and after.
     FastestMode mode_here();
     double stage_rate() const;
     VecX difference(double relative, const VecX& direction, VecX& force);

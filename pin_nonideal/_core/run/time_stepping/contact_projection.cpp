@@ -15,7 +15,7 @@ namespace pn {
 // rows that contradict each other.
 constexpr double contact_stall_ratio = 0.5;
 constexpr int sure_moves = 1, max_projection_moves = 12;
-// Maximum choices of contacts that stay closed.
+// Maximum number of choices of closed contacts.
 constexpr int max_contact_choices = 4;
 
 static void hold_locked(const Program& p, const Workspace& w, VecX& x) {

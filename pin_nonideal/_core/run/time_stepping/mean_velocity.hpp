@@ -29,7 +29,7 @@ public:
     void begin(double h, const VecX& v0);
     // Compute the velocity at the step's end for the acceleration a.
     void end(const VecX& a, VecX& v1);
-    // Move the mean to that of the step's start and end for another sweep. Return false if none is needed.
+    // Move the mean to that of the step's start and end for another sweep. Return false if no further sweep is needed.
     bool move();
 
     const VecX& value() const { return value_; }  // velocity at which the forces are taken

@@ -18,7 +18,7 @@
 
 namespace pn {
 
-// Maximum passes for load-dependent limits.
+// Maximum number of passes for load-dependent limits.
 constexpr int max_load_passes = 60;
 
 class Moreau {
