@@ -18,9 +18,9 @@ namespace {
 
 // Maximum height of flights that are too low to be integrated, relative to the scene's size.
 constexpr double low_flight = 4e-12;
-// Number of flights after which the bouncing is judged. It dies out if the second half takes less than `hardly_shorter`
-// of the time of the first half. With a restitution of 1 it does not die out, and contacts that land later come to
-// rest.
+// Number of flights after which the bouncing is judged. The bouncing dies out if the second half takes less than
+// `hardly_shorter` of the time of the first half. With a restitution of 1 it does not die out, and contacts that land
+// later come to rest.
 constexpr int most_bounces = 10000;
 constexpr double hardly_shorter = 0.9;
 constexpr double no_landing = std::numeric_limits<double>::infinity();

@@ -25,7 +25,7 @@ constexpr double shortest_resolved = 1e-9;
 constexpr double velocity_rounding = 64 * std::numeric_limits<double>::epsilon();
 // Residuals below this multiple of the rounding of a projection are no error of a step.
 constexpr double residual_spacings = 8.0;
-// Rounding of the time in a step's stages, in floating-point spacings. It moves prescribed motions.
+// Rounding of the time in a step's stages, in floating-point spacings. This rounding shifts prescribed motions.
 constexpr double time_spacings = 4.0;
 
 // First step [Hairer, Norsett, Wanner, sec. II.4]. The move of Euler's rule is bounded relative to the size of the

@@ -90,8 +90,8 @@ static void fields(Archive& a, Recording& x) {
     a(steps, rejected, limited, rounding);
 }
 
-// The choice of independent rows outlives an evaluation, with the data that judges it. It is made at the start of a
-// step and kept until it proves wrong.
+// The choice of independent rows, and the data that tests this choice, are kept from step to step until the choice
+// proves wrong.
 static void archive(Archive& a, Workspace& w, Progress& progress, Recording& out) {
     RowSystem& rows = w.now.rows;
     a(w.state, w.counters, rows.active, rows.longest, rows.longest_chosen, rows.chosen_pivot, progress, out);

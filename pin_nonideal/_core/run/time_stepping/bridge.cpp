@@ -143,7 +143,8 @@ void TimeStepping::take(double end, double t_end) {
     progress_.is_stationary = y == y_from;
 }
 
-// Elements at rest have the modes of the end of a first step. It solves its laws at far less cost than accelerations.
+// Elements at rest take their modes from the end of a first step, which costs far less than a solution for
+// accelerations.
 void TimeStepping::begin(double size) {
     system_.read(progress_.y);
     std::vector<char> closed = system_.touching.at(p, w, progress_.t, system_.q, system_.v, true).rest;
