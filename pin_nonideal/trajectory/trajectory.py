@@ -228,7 +228,7 @@ class Trajectory(RunFields):
         """Return the first samples of a run, with the events up to the last sample.
 
         Args:
-            count: number of samples, at most all.
+            count: number of samples, at most the number of samples of the run.
 
         Raises:
             InputError: `count` is not a number of samples.
