@@ -9,26 +9,26 @@
 namespace pn {
 
 // Contact state: touching contacts, resting contacts, and impacts.
-struct Touching {
+struct TouchingContacts {
     std::vector<char> touch, rest;
     bool strikes = false;
     bool lands = false;  // some impact is at an open contact
 };
 // Find touching contacts from the widths and rates of the gaps at (t, q, v): closed gaps and narrow gaps. Of several
 // coincident gaps, only the gap that opens last counts, else a closed gap.
-Touching touching_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, bool starts);
+TouchingContacts touching_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, bool starts);
 
 // Caches the touching contacts of the last state.
-class TouchingKnown {
+class TouchingCache {
 public:
-    const Touching& at(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, bool starts);
+    const TouchingContacts& at(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, bool starts);
 
 private:
     bool known_ = false, starts_ = false;
     double t_ = 0.0;
     VecX q_, v_;
     std::vector<char> closed_;
-    Touching found_;
+    TouchingContacts found_;
 };
 
 // Check if all slip that begins from rest opposes its friction. If one contact would need tension, other contacts may

@@ -17,7 +17,7 @@ constexpr double contact_limit_rounding = 1e-9;  // rounding relative to the lim
 constexpr double breaking_by = 1e-6;  // relative reduction of the limit of elements that just reached it
 constexpr int most_releases = 4;  // rounds that set kinetic limits of slipping contacts
 constexpr int max_load_iterations = 100;  // maximum iterations of loads and their friction
-constexpr double settled = 1e-13;  // rounding of the loads' change, relative to the largest acceleration
+constexpr double load_change_tol = 1e-13;  // rounding of the loads' change, relative to the largest acceleration
 
 // Coefficient of a contact, or limit of another element.
 double strength(const Friction& f) { return f.gap >= 0 ? f.mu : f.constant; }
@@ -26,7 +26,7 @@ double strength(const Friction& f) { return f.gap >= 0 ? f.mu : f.constant; }
 
 bool is_at_rest(const Program& p, const Workspace& w, const VecX& v, const ClosingQuestion& question,
                 const RunState& before, int e) {
-    const bool known = before.mode[e] == sticking || before.lingers[e];
+    const bool known = before.mode[e] == sticking || before.is_sticking_deferred[e];
     return e == question.arrived_element || (known && !question.after_impact) ||
            slip_velocity(w.now, p.frictions[e]).norm() <= rest_speed * (1.0 + v.cwiseAbs().maxCoeff());
 }
@@ -44,7 +44,7 @@ void RestingMotion::answer(const Program& p, Workspace& w, ModeQuestion& questio
         question.modes[e] = modes[e];
         if (p.frictions[e].dim > 1 && slips(modes[e])) w.state.slip_direction[e] = w.state.last_direction[e] = direction[e];
     }
-    question.answered = true;
+    question.is_solved_jointly = true;
     question.several = several;
 }
 
@@ -113,16 +113,18 @@ VecX RestingProblem::accelerations() {
     return out;
 }
 
-double RestingProblem::in_play() const { return w0.cwiseAbs().maxCoeff() + (W.cwiseAbs() * f.cwiseAbs()).maxCoeff(); }
+double RestingProblem::acceleration_scale() const {
+    return w0.cwiseAbs().maxCoeff() + (W.cwiseAbs() * f.cwiseAbs()).maxCoeff();
+}
 
-double RestingProblem::in_play(int row, int count) const {
+double RestingProblem::acceleration_scale(int row, int count) const {
     if (count == 0) return 0.0;
     return w0.segment(row, count).cwiseAbs().maxCoeff() +
            (W.middleRows(row, count).cwiseAbs() * f.cwiseAbs()).maxCoeff();
 }
 
 double RestingProblem::rounding(int row, int count) const {
-    return none * in_play(row, count) + common_slip_rounding * in_play();
+    return none * acceleration_scale(row, count) + common_slip_rounding * acceleration_scale();
 }
 
 // Check if friction is at its limit. A contact that shares a load may have a load of rounding only.
@@ -184,7 +186,7 @@ bool RestingProblem::solve_cones(bool warm, bool& shared) {
     for (int round = 0; round < most_releases; ++round) {
         const bool solved = solver.solve(W, w0, cones, warm || round > 0, f) == ConeStatus::solved;
         if (round == 0 && !warm && (!solved || moves())) {
-            const bool another = solved && (w0 + W * f).cwiseAbs().maxCoeff() > min_other_motion * in_play();
+            const bool another = solved && (w0 + W * f).cwiseAbs().maxCoeff() > min_other_motion * acceleration_scale();
             if (hold(solver)) {
                 several = another;
                 break;
@@ -205,7 +207,7 @@ bool RestingProblem::take_turns(const VecX& free) {
         const VecX before = f;
         w0 = free + dragging * before;
         if (!solve_cones(true, shared)) return false;
-        if ((dragging * (f - before)).cwiseAbs().maxCoeff() <= settled * in_play()) return true;
+        if ((dragging * (f - before)).cwiseAbs().maxCoeff() <= load_change_tol * acceleration_scale()) return true;
     }
     return false;
 }
@@ -216,7 +218,7 @@ void RestingProblem::read(RestingMotion& out) const {
         const int e = rows.element(i);
         if (i < rows.gaps.size()) {
             const int gap = rows.gaps[i];
-            out.closed[gap] = a[first[i]] <= none * in_play();
+            out.closed[gap] = a[first[i]] <= none * acceleration_scale();
             out.loaded[gap] = out.closed[gap] && f[first[i]] > none * f.cwiseAbs().maxCoeff();
             if (e < 0 || !out.closed[gap]) continue;
             if (slides[i]) {

@@ -64,8 +64,8 @@ private:
     VecX accelerations();
     // Scale of the accelerations of all rows, or of some rows. The scale of all rows would hide the slip of a body
     // beside much lighter bodies.
-    double in_play() const;
-    double in_play(int row, int count) const;
+    double acceleration_scale() const;
+    double acceleration_scale(int row, int count) const;
     // Accelerations of these rows, and of the slip of a cone, that are rounding.
     double rounding(int row, int count) const;
     double slip_rounding(size_t i) const { return rounding(first[i] + head(i), tail(i)); }

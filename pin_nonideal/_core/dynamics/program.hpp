@@ -69,7 +69,7 @@ struct Program {
         return added_torque.times.empty() ? std::get_if<TorqueTable>(&actuation) : &added_torque;
     }
     bool needs_reactions = false;        // some law reads them
-    bool rubs_while_closed = false;      // the only laws are frictions of unilateral contacts
+    bool has_contact_friction_only = false;      // the only laws are frictions of unilateral contacts
     bool driven = false;                 // forces or actuation
     bool has_body_forces = false;        // given forces that act on bodies
     bool moves_in_time = false;          // some constraint depends on time

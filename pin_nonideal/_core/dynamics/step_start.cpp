@@ -18,8 +18,8 @@ constexpr double consistency_tolerance = 1e-6, background = 1e-3;
 // Factor by which biases of a dependent row's basis rows may enter its own bias.
 constexpr double dependence_growth = 10.0;
 // A change of modes may take at most this fraction of the kinetic energy. If rows held by elements would take more,
-// rows held with at most `most_unheld` of their forces count as dependent. `unheld_growth` is the step of that search.
-constexpr double stopped_part = 1e-9, most_unheld = 1e-3, unheld_growth = 3.0;
+// rows held with at most `max_unheld_part` of their forces count as dependent. `unheld_growth` is the step of that search.
+constexpr double max_removed_energy_part = 1e-9, max_unheld_part = 1e-3, unheld_growth = 3.0;
 
 // Length of x in the metric of M, restricted to the constrained dofs.
 static double scaled_length(const Program& p, Workspace& w, const VecX& x) {
@@ -90,7 +90,7 @@ static void choose_rows_anew(const Program& p, Workspace& w, int most = INT_MAX)
 }
 
 bool configure_step(const Program& p, Workspace& w) {
-    w.state.ideal_decided = false;
+    w.state.has_ideal_row_choice = false;
     if (w.now.rows.blocks.empty()) return false;
     const RowSystem& rows = w.now.rows;
     const bool due = p.gaps.empty() && is_choice_due(w.now.rows);  // contacts are chosen with their modes
@@ -136,7 +136,7 @@ void begin_step(const Program& p, Workspace& w, double t, const VecX& q, const V
 }
 
 // Fraction of the kinetic energy of v that the rows in use would remove.
-static double part_stopped(const Program& p, Workspace& w, double t, const VecX& v) {
+static double removed_energy_part(const Program& p, Workspace& w, double t, const VecX& v) {
     VecX kept = v;
     project_velocity(p, w, t, kept);
     const double before = kinetic_energy(p.mechanism, w.now.terms, v);
@@ -145,7 +145,7 @@ static double part_stopped(const Program& p, Workspace& w, double t, const VecX&
     return before > 0.0 ? std::abs(before - after) / before : 0.0;
 }
 
-void keep_moving(const Program& p, Workspace& w, double t, const VecX& v) {
+void restore_motion(const Program& p, Workspace& w, double t, const VecX& v) {
     if (!w.now.rows.redundant || !w.state.sticks_anywhere() || v.cwiseAbs().maxCoeff() <= immobile_speed) return;
     const auto choose = [&](double tolerance) {
         w.state.rank_tolerance = tolerance;
@@ -153,8 +153,9 @@ void keep_moving(const Program& p, Workspace& w, double t, const VecX& v) {
         continue_step(p, w, t, v, true);
     };
     double tolerance = w.state.rank_tolerance;
-    while (tolerance < most_unheld && part_stopped(p, w, t, v) > stopped_part) choose(tolerance *= unheld_growth);
-    if (tolerance >= most_unheld) choose(rank_tolerance_sticking);
+    while (tolerance < max_unheld_part && removed_energy_part(p, w, t, v) > max_removed_energy_part)
+        choose(tolerance *= unheld_growth);
+    if (tolerance >= max_unheld_part) choose(rank_tolerance_sticking);
 }
 
 bool begin_rows(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
@@ -177,7 +178,7 @@ void project_into_modes(const Program& p, Workspace& w, double t, VecX& q, VecX&
 }
 
 bool begin_step_on_rates(const Program& p, Workspace& w, double t, VecX& v, bool chosen, bool evaluates) {
-    if (w.state.steps_since != never_decided) ++w.state.steps_since;
+    if (w.state.steps_since != undecided_steps) ++w.state.steps_since;
     const bool moved = project_velocity(p, w, t, v);
     if (evaluates) continue_step(p, w, t, v, chosen);
     return moved;

@@ -12,7 +12,7 @@ namespace pn {
 namespace {
 
 constexpr double unknown_difference_step = 1e-7;  // relative to the unknowns: square root of the rounding, with a margin
-constexpr int most_mixed = 6;  // more laws mirror one branch at a time instead of all combinations
+constexpr int max_mixed_laws = 6;  // more laws mirror one branch at a time instead of all combinations
 constexpr double same_solution = 1e-9;  // relative residual at which a point is a solution
 constexpr double other_solution = 1e-6;  // relative distance beyond which two solutions differ
 constexpr double near_motion = 1e-6;  // tolerance between solutions of the arrays and motions, relative to the unknowns
@@ -57,7 +57,7 @@ void sort_by_distance(const ReactionEquation& equation, const VecX& start, std::
 
 // Remove the rounding of the arrays from a solution near a motion. Return false if no motion is near.
 bool refine(Unknowns& u, const ReactionEquation& equation, VecX& y) {
-    const FreeLoads free(u.w);
+    const ReleasedZeroLoads free(u.w);
     ReactionNewton newton;
     VecX g(u.n);
     for (int pass = 0; pass < refinements; ++pass) {
@@ -84,7 +84,7 @@ std::vector<VecX> motions_of(Unknowns& u, const ReactionEquation& equation, cons
 
 // Check if all sticking elements hold in the motion of a solution. If one slips, the motion has other modes.
 bool holds(Unknowns& u, const VecX& y) {
-    const FreeLoads free(u.w);
+    const ReleasedZeroLoads free(u.w);
     u.set(y);
     u.motion();
     for (int e = 0; e < static_cast<int>(u.p.frictions.size()); ++e)
@@ -117,7 +117,7 @@ void decide_over_pieces(Unknowns& u, const VecX& start, VecX& y, const Failure& 
     ReactionEquation equation;
     bool complete = true;
     for (const std::vector<char>& unloaded : pieces) {
-        const HeldPiece held(u.w, unloaded);
+        const FrozenZeroLoads held(u.w, unloaded);
         u.equation(y, equation);
         if (!equation.finite()) throw Failure(Failure::Kind::not_finite, u.t);
         ReactionRoots roots;
@@ -143,7 +143,7 @@ void decide(Unknowns& u, const ReactionEquation& equation, const VecX& start, Ve
     state.growth = growth(L);
     state.steps_since = 0;
     const bool contracts = state.growth < 1.0 - least_determinant_told;
-    const bool in_pieces = shares_pressing(u.p, u.w);  // one zero-load set proves nothing about the others
+    const bool in_pieces = shares_contact_loads(u.p, u.w);  // one zero-load set proves nothing about the others
     state.unique = contracts && !in_pieces ? Uniqueness::shown : Uniqueness::not_shown;
     if (contracts && solved) return;
     if (solved && determinant_at(equation, y) > least_determinant_told) {
@@ -230,7 +230,7 @@ template <class Look>
 void each_mixture(const Unknowns& u, const MatX& J, const Look& look) {
     const auto laws = groups(u);
     const int m = static_cast<int>(laws.size());
-    const bool all = m <= most_mixed;
+    const bool all = m <= max_mixed_laws;
     for (int mixture = 1; mixture < (all ? 1 << m : m + 1); ++mixture) {
         MatX other = J;
         VecX mirrored = VecX::Zero(u.n);

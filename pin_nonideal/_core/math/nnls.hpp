@@ -17,15 +17,15 @@ VecX least_violation(const MatX& Z, const VecX& N);
 // Compute the shortest z that makes the marked numbers zero, or as near to zero as possible.
 VecX shortest_with_zeros(const MatX& Z, const VecX& N, const std::vector<char>& zero);
 
-// Shortest z with N + Z z >= 0, or with the least violation if no z is feasible (`met` is false). `held` marks the
+// Shortest z with N + Z z >= 0, or with the least violation if no z is feasible (`is_feasible` is false). `held` marks the
 // numbers at zero: z is the shortest vector with these numbers at zero.
-struct Nonnegative { VecX z; std::vector<char> held; bool met; };
-Nonnegative shortest_nonnegative(const MatX& Z, const VecX& N);
+struct NonnegativeSum { VecX z; std::vector<char> held; bool is_feasible; };
+NonnegativeSum shortest_nonnegative(const MatX& Z, const VecX& N);
 
 // Largest s for which some z gives N + Z z >= s. `weight` marks the numbers that bind together: weight >= 0, Z^T
 // weight = 0, sum(weight) = 1 and s = weight . N. If s has no bound, `value` is the largest entry of |N| and `weight`
 // is empty.
-struct LargestLeast { double value; VecX weight; };
-LargestLeast largest_least(const MatX& Z, const VecX& N);
+struct MaxMin { double value; VecX weight; };
+MaxMin max_min(const MatX& Z, const VecX& N);
 
 }  // namespace pn

@@ -30,7 +30,7 @@ private:
     Recording& out_;
     long ticks_ = 0;
     Clock::time_point next_save_;
-    const Clock::time_point begun_ = Clock::now();
+    const Clock::time_point start_time_ = Clock::now();
 };
 
 }  // namespace pn

@@ -86,7 +86,7 @@ def arrows_of(
     ]
     if run.lam is not None:
         for name, item, shown in constraints_of(run.scene):
-            if shown == core.Shown.contact:  # the forces of contacts are drawn at their points
+            if shown == core.DisplayKind.contact:  # the forces of contacts are drawn at their points
                 continue
             rows = run.scene.constraint_slices[name]
             parts = {"total": motion.of(run.lam[:, rows])}
@@ -125,26 +125,26 @@ def _above_rounding(arrows: list[Arrow], model: pin.Model, size: float) -> list[
 
 
 def _reaction(
-    scene: Scene, motion: Motion, name: str, kind: str, item: Any, shown: core.Shown, lam: Array
+    scene: Scene, motion: Motion, name: str, kind: str, item: Any, shown: core.DisplayKind, lam: Array
 ) -> list[Arrow]:
     """Return the arrows of one constraint: the force on its first body, or the force on its joints."""
     model = scene.model
     if hasattr(item, "lower"):  # the force of a stop points away from the stop
         way = -1.0 if name.endswith(" upper") else 1.0
         return along(model, motion, name, kind, model.getJointId(item.joint), way * lam[:, 0])
-    if shown in (core.Shown.anchor, core.Shown.rod):
+    if shown in (core.DisplayKind.anchor, core.DisplayKind.rod):
         return _connection_arrows(scene, motion, name, kind, item, shown, lam)
-    if shown == core.Shown.rolling:
+    if shown == core.DisplayKind.rolling:
         body = side_of(model, item.frame)
         force, place = _rolling(model, motion, item, lam)
         return [Arrow(name, kind, "N", force, body.joint, place)]
-    if shown == core.Shown.edge:
+    if shown == core.DisplayKind.edge:
         edge = side_of(model, item.frame)
         force = edge.turned(motion, lam[:, :1] * np.array(unit_axis("axis", item.axis)))
         return [Arrow(name, kind, "N", force, edge.joint, motion.point(edge.joint, edge.point))]
-    if shown == core.Shown.drive:
+    if shown == core.DisplayKind.drive:
         return along(model, motion, name, kind, model.getJointId(item.joint), lam[:, 0])
-    if shown == core.Shown.gear:
+    if shown == core.DisplayKind.gear:
         driven = along(model, motion, name, kind, model.getJointId(item.joint1), lam[:, 0])
         leading = along(model, motion, name, kind, model.getJointId(item.joint2), -item.ratio * lam[:, 0])
         return driven + leading
@@ -162,12 +162,12 @@ def _user_gap_arrows(run: Trajectory, motion: Motion, name: str, lam: Array) -> 
 
 
 def _connection_arrows(
-    scene: Scene, motion: Motion, name: str, kind: str, item: Any, shown: core.Shown, lam: Array
+    scene: Scene, motion: Motion, name: str, kind: str, item: Any, shown: core.DisplayKind, lam: Array
 ) -> list[Arrow]:
     """Return the force on the first of two connected frames, and the moment if the constraint has one."""
     first, second = sides_of(scene, item)
     origin = motion.point(first.joint, first.point)
-    if shown == core.Shown.rod:
+    if shown == core.DisplayKind.rod:
         force = lam[:, :1] * _unit(origin - motion.point(second.joint, second.point))
         return [Arrow(name, kind, "N", force, first.joint, origin)]
     axes = ["xyz".index(axis) for axis in getattr(item, "axes", "xyz")]

@@ -29,7 +29,7 @@ constexpr double least_pivot = 1e-10;           // pivot of W relative to its di
 constexpr int most_undecided = 100, most_boxes = 20000;
 
 // Interval of a value: middle and radius.
-struct Length {
+struct Interval {
     double middle, radius;
     double least() const { return std::max(0.0, middle - radius); }
     double most() const { return middle + radius; }
@@ -37,12 +37,12 @@ struct Length {
 
 // Interval of a vector that is linear in the point, and its direction within `turn`. If the vector may vanish, the
 // direction is arbitrary.
-struct Arrow {
+struct VectorInterval {
     Short middle, along;
-    Length length;
+    Interval length;
     double turn = 1.0;
 
-    Arrow(const Rows& rows, const Point& x, const Point& radius)
+    VectorInterval(const Rows& rows, const Point& x, const Point& radius)
         : middle(rows * x), along(Short::Zero(rows.rows())), length{middle.norm(), (rows.cwiseAbs() * radius).norm()} {
         if (length.middle <= length.radius) return;
         along = middle / length.middle;
@@ -64,7 +64,7 @@ struct Slopes {
 };
 
 struct Limit {
-    Length size;
+    Interval size;
     Slopes slopes;
 };
 
@@ -82,7 +82,7 @@ struct Element {
         Limit out{{constant * x[tau], constant * radius[tau]}, {Rows::Zero(1, tau + 1), Rows::Zero(1, tau + 1)}};
         out.slopes.middle(0, tau) = constant;
         for (const Rows& vector : vectors) {
-            const Arrow arrow(vector, x, radius);
+            const VectorInterval arrow(vector, x, radius);
             out.size.middle += arrow.length.middle;
             out.size.radius += arrow.length.radius;
             out.slopes.middle += arrow.along.transpose() * vector;
@@ -93,8 +93,8 @@ struct Element {
 
     // Check if the element neither sticks nor begins to slip anywhere in the box.
     bool is_excluded(const Point& x, const Point& radius) const {
-        const Length limit = this->limit(x, radius).size;
-        const Arrow own(force, x, radius), accelerated(response, x, radius);
+        const Interval limit = this->limit(x, radius).size;
+        const VectorInterval own(force, x, radius), accelerated(response, x, radius);
         if (may_stick && accelerated.length.least() == 0.0 && own.length.least() <= limit.most()) return false;
         const Short along = may_stick ? accelerated.along : direction;
         const double turn = may_stick ? accelerated.turn : 0.0;
@@ -108,7 +108,7 @@ struct Element {
             slopes = {force + direction * limit.slopes.middle, direction.cwiseAbs() * limit.slopes.radius};
             return force * x + limit.size.middle * direction;
         }
-        const Arrow point(asked, x, radius);
+        const VectorInterval point(asked, x, radius);
         const bool inside = point.length.least() <= limit.size.most(), outside = point.length.most() >= limit.size.least();
         if (inside) slopes = {response, Rows::Zero(dim, x.size())};
         if (outside && inside) slopes.join(slope_outside(point, limit));
@@ -118,7 +118,7 @@ struct Element {
     }
 
     // Return the derivatives of x - limit p / |p|, with p = x - rho alpha beyond the limit.
-    Slopes slope_outside(const Arrow& p, const Limit& limit) const {
+    Slopes slope_outside(const VectorInterval& p, const Limit& limit) const {
         const double most = std::min(1.0, limit.size.most() / std::max(p.length.least(), 1e-300));
         const double least = std::min(most, limit.size.least() / p.length.most());
         const double part = 0.5 * (most + least), part_radius = 0.5 * (most - least);

@@ -19,7 +19,7 @@ public:
     struct Bends { double below, above; };  // bounds of the second derivative: magnitude below zero, and largest value
     struct Candidate {
         int gap;
-        GapLook end;  // sample at the step's end
+        GapSample end;  // sample at the step's end
         Bends bends;  // bounds over the step
     };
     const std::vector<Candidate>& find_candidates();
@@ -32,7 +32,7 @@ public:
     double plane(int gap) const { return start_.rate[gap] > 0.0 ? std::min(0.0, start_.width[gap]) : 0.0; }
 
 private:
-    using Look = GapLook;
+    using Look = GapSample;
     Look look(int gap, double part);
     Look look_at_start(int gap) const;
     // Measure a sample from a zero level: the plane, or for round bodies the lowest contact point of the same two
@@ -55,7 +55,7 @@ private:
     Workspace& w;
     GapWatch& watch_;
     GapState& start_;
-    Reach reach_;
+    CurvatureBounds reach_;
     std::vector<Candidate> candidates_;
     std::vector<int> closed_round_;  // closed gaps of round bodies, their next contact point is not lower
     VecX speed_, acceleration_, probe_;

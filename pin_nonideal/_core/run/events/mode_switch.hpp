@@ -20,8 +20,8 @@ public:
     // Switch modes and state at an event that has been reached.
     void change(FoundEvent event);
     // Forced switch: if no step is short enough, the motion of the current modes may have ended. `may_end` is false if
-    // the last forced switch was less than `leaving_apart` tiny steps ago. `leave` selects modes one tiny step ahead.
-    // It returns false if it finds none.
+    // the last forced switch was less than `forced_switch_spacing` tiny steps ago. `leave` selects modes one tiny step
+    // ahead. It returns false if it finds none.
     bool may_end(const Failure& failure) const;
     bool leave();
     // Check if the failure only means that no motion or no step was found, which proves nothing.
@@ -37,7 +37,7 @@ public:
 private:
     void end_bouncing();
     bool has_let_go(int gap) const;
-    void keep_last(const RunState& before, bool struck);
+    void keep_last(const RunState& before, bool has_impact);
     static bool undecided(const Failure& failure);
     bool creeps() const;
     void go_on_with_new_modes();

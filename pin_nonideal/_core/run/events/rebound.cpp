@@ -19,10 +19,10 @@ namespace {
 // Maximum height of flights that are too low to be integrated, relative to the scene's size.
 constexpr double low_flight = 4e-12;
 // Number of flights after which the bouncing is judged. The bouncing dies out if the second half takes less than
-// `hardly_shorter` of the time of the first half. With a restitution of 1 it does not die out, and contacts that land
+// `max_time_ratio` of the time of the first half. With a restitution of 1 it does not die out, and contacts that land
 // later come to rest.
 constexpr int most_bounces = 10000;
-constexpr double hardly_shorter = 0.9;
+constexpr double max_time_ratio = 0.9;
 constexpr double no_landing = std::numeric_limits<double>::infinity();
 
 struct Bouncing {
@@ -58,7 +58,7 @@ struct Bouncing {
             if (!is_low && height <= lowest) out.leaves = std::max(out.leaves, landing(lowest - height, -rate, -fall));
         }
         for (int e = 0; e < system.ne; ++e) {
-            if (!slips(w.state.mode[e]) || w.state.lingers[e]) continue;
+            if (!slips(w.state.mode[e]) || w.state.is_sticking_deferred[e]) continue;
             const auto [slip, rate] = slip_toward_rest(p, w, e);
             if (!(rate < 0.0) || slip > -rate * out.rest) continue;
             out.rest = std::max(0.0, -slip / rate);
@@ -106,7 +106,7 @@ std::optional<Rest> bounce_to_rest(System& system, double t, double stop, VecX& 
         retract(p.mechanism, system.q.data(), move.data(), y.data());
         out.time += time;
         halves[2 * bounce >= most_bounces] += time;
-        if (bounce + 1 == most_bounces) dies_out = halves[1] < hardly_shorter * halves[0];
+        if (bounce + 1 == most_bounces) dies_out = halves[1] < max_time_ratio * halves[0];
         FoundEvent event{FoundEvent::Kind::touch, 0, out.time};
         if (next.rest < next.low && !contacts_land(system, out.time, y))
             event = {FoundEvent::Kind::rest_or_limit, next.element, out.time};

@@ -12,6 +12,6 @@ namespace pn {
 bool is_unloaded(System& system, double t, int gap);
 
 // Open the contacts of all pairs of bodies that move the same without them. Return these contacts.
-std::vector<int> open_unloaded(System& system, double t);
+std::vector<int> open_unloaded_contacts(System& system, double t);
 
 }  // namespace pn

@@ -19,7 +19,7 @@ constexpr double share_part = 1e-4;
 constexpr double stuck_force_rounding = 64 * std::numeric_limits<double>::epsilon();
 // Shortest step [s] that resolves a load. The error of a load that jumps does not decrease with the step, so shorter
 // steps skip it.
-constexpr double shortest_resolved = 1e-9;
+constexpr double min_resolved_step = 1e-9;
 // Rounding of a velocity, relative to the largest one. A joint that constraints drive slowly beside fast joints has no
 // digits below it at any step size.
 constexpr double velocity_rounding = 64 * std::numeric_limits<double>::epsilon();
@@ -73,9 +73,9 @@ void ErrorNorm::set_tolerances(const VecX& y0, const VecX& y1, double h) {
         limited_ |= least > tolerance_[k];
         tolerance_[k] = std::max(tolerance_[k], least);
     }
-    resolves_shares_ = std::abs(h) >= shortest_resolved;
+    resolves_shares_ = std::abs(h) >= min_resolved_step;
     share_rounding_ = stuck_force_rounding * std::abs(h) * system_.w.now.F.cwiseAbs().maxCoeff();
-    share_tolerance_ = share_part * std::max(std::abs(h), shortest_resolved);
+    share_tolerance_ = share_part * std::max(std::abs(h), min_resolved_step);
 }
 
 void ErrorNorm::to_tangent(const VecX& dy, const VecX& y) {

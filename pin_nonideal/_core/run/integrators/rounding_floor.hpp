@@ -23,7 +23,7 @@ private:
     ErrorNorm& norm_;
     Progress& progress_;
     Recording& out_;
-    double raised_ = 0.0;  // factor from the rounding of a rate to the raised tolerance, per step
+    double tolerance_factor_ = 0.0;  // factor from the rounding of a rate to the raised tolerance, per step
     VecX change_, probe_, rate_, noise_;
 };
 

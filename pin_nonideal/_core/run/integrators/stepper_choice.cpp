@@ -18,7 +18,7 @@ StepperChoice::StepperChoice(System& system, Stepper& stepper, Progress& progres
     : w(system.w), system_(system), stepper_(stepper), progress_(progress), options_(options) {}
 
 void StepperChoice::look() {
-    turns_stiffly_ = options_.method.adaptive() && turning(system_) && stepper_.stiffness() > stiff;
+    is_stiff_ = options_.method.adaptive() && turning(system_) && stepper_.stiffness() > stiff;
 }
 
 void StepperChoice::choose() {
@@ -32,7 +32,7 @@ void StepperChoice::choose() {
     } else if (turning_steps < 0) {
         ++turning_steps;
     } else {
-        turning_steps = turns_stiffly_ ? turning_steps + 1 : 0;
+        turning_steps = is_stiff_ ? turning_steps + 1 : 0;
         seeks |= turning_steps == stiff_in_a_row;
     }
 }

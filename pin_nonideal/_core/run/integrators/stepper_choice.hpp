@@ -16,7 +16,7 @@ public:
     void look();
     // Select the stepper of the next step.
     void choose();
-    void forget() { turns_stiffly_ = false; }
+    void forget() { is_stiff_ = false; }
 
 private:
     Workspace& w;
@@ -24,7 +24,7 @@ private:
     Stepper& stepper_;
     Progress& progress_;
     const Options& options_;
-    bool turns_stiffly_ = false;  // stability limited the step just taken
+    bool is_stiff_ = false;  // stability limited the step just taken
 };
 
 }  // namespace pn

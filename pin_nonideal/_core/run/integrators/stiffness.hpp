@@ -43,7 +43,7 @@ private:
     Progress& progress_;
     const Options& options_;
     const double most_steps_;
-    Clock::time_point begun_;
+    Clock::time_point start_time_;
     long steps_, next_look_ahead_;
     VecX probe_, probe_rate_;
 };

@@ -90,7 +90,7 @@ void System::watch_loads(VecX& dy) {
     for (int i : w.now.touching) {
         if (p.blocks[p.gaps[i].block].kept.empty()) continue;
         if (!w.now.rows.redundant) loads[i] = w.now.lam[p.blocks[p.gaps[i].block].row];
-        else loads[i] = reactions(p, w).presses ? 1.0 : -1.0;
+        else loads[i] = reactions(p, w).loads_are_feasible ? 1.0 : -1.0;
     }
 }
 

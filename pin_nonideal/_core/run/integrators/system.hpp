@@ -29,7 +29,7 @@ struct System {
     double numerical_energy = 0.0;  // energy change by the last projection of a step's end [J], if the ledger is kept
     const int nq, nv, nz, nw, ne, ng, ns, ny;  // sizes of q, v, z, work, elements, gaps, y without watch, y
     VecX q, v;                         // state read last
-    TouchingKnown touching;            // touching contacts of the last state
+    TouchingCache touching;            // touching contacts of the last state
 
     System(const Program& program, Workspace& workspace, bool with_energy);
 

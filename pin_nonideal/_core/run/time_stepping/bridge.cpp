@@ -115,16 +115,16 @@ void TimeStepping::take(double end, double t_end) {
     if (system_.ng > 0) return take_with_contacts(end, t_end);
     double& t = progress_.t;
     VecX &y = progress_.y, &y_from = y_from_;
-    const bool rested = rests();
+    const bool was_at_rest = rests();
     Modes& before = before_step_;
-    if (rested) {
+    if (was_at_rest) {
         y_from = y;
         before = w.state.mode;
     }
     const double energy_before = progress_.numerical_energy;
     moreau_.step(t, end - t, y, progress_.numerical_energy);
     t = end;
-    const bool held = rested && std::equal(before.begin(), before.end(), w.state.mode.begin());
+    const bool held = was_at_rest && std::equal(before.begin(), before.end(), w.state.mode.begin());
     if (!held) {
         const bool bridges = options_.method.scheme != Method::Scheme::moreau;
         system_.settle(t, y, progress_.rate, asks_for_motion(end, t_end), bridges);

@@ -23,7 +23,7 @@ private:
     bool pose(const Program& p, Workspace& w, bool sticks);
     bool close_gaps(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
     bool is_open(const Program& p, const Workspace& w) const;
-    bool open_held_apart(const Program& p, Workspace& w);
+    bool open_blocked_contacts(const Program& p, Workspace& w);
     void meet_rates(const Program& p, Workspace& w, VecX& v);
     void rest(const Program& p, Workspace& w, VecX& v);
     void add(int block, int rows, bool joined);

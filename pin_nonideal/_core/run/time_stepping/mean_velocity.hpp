@@ -51,7 +51,7 @@ private:
     double h_ = 0.0;
     VecX value_, start_, end_, next_;
     VecX turning_;  // rates of the linear velocities by turning axes
-    VecX back_;     // velocity of the start minus mean, plus h/2 of these rates
+    VecX start_difference_;     // velocity of the start minus mean, plus h/2 of these rates
     int moves_ = 0;  // sweeps after the first one
 };
 

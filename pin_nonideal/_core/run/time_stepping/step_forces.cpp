@@ -11,7 +11,7 @@ namespace {
 
 // Accepted error of the laws, relative to an element's forces, in a step without an exact solution. An event
 // reports it.
-constexpr double most_relaxed = 1e-2;
+constexpr double max_relaxed_error = 1e-2;
 
 }  // namespace
 
@@ -89,11 +89,11 @@ bool StepForces::solve(double h, const VecX& q0, const VecX& v0) {
     f.head(n) -= middle_.head(n);
     end_rows.head(n) = free_rows_.head(n);
     end_rows.head(n).noalias() += W * middle_.head(n);
-    solver_.search_briefly(error <= most_relaxed);
+    solver_.search_briefly(error <= max_relaxed_error);
     if (!solved) solved = solver_.solve(W, end_rows.head(n), elements_.cones, true, f.head(n), true) == ConeStatus::solved;
     if (starts) solved = keep_rest(solved, q0) || solved;
     f.head(n) += middle_.head(n);
-    if (!solved && error <= most_relaxed) {
+    if (!solved && error <= max_relaxed_error) {
         f.head(n) = best_f_;
         relax(h);
         return true;
