@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from .errors import InputError, nearest, short_repr
 
-FEW = 100  # up to this size a Python sum is faster than NumPy; a finite sum implies finite numbers
+MAX_PYTHON_SUM = 100  # up to this size a Python sum is faster than NumPy; a finite sum implies finite numbers
 
 Vector3 = tuple[float, float, float]
 
@@ -195,7 +195,7 @@ def floats(
         result = np.array(source, dtype=float, copy=copy or None) if source.dtype.kind in kinds else None
     except (TypeError, ValueError):  # rows of unequal length, or objects that are no numbers
         result = None
-    if result is None or (result.size <= FEW and math.isfinite(sum(result.ravel().tolist()))):
+    if result is None or (result.size <= MAX_PYTHON_SUM and math.isfinite(sum(result.ravel().tolist()))):
         return result, None
     if np.count_nonzero(np.isfinite(result)) == result.size:  # faster than all()
         return result, None

@@ -23,7 +23,7 @@ from pin_nonideal.description.scene_spec import SceneSpec
 from pin_nonideal.errors import InputError, UserFunctionError
 from pin_nonideal.states.joint_layout import joint_places
 from pin_nonideal.states.parsing import (
-    joint_named,
+    find_joint,
     named_configuration,
     named_joint_samples,
     named_joint_values,
@@ -31,16 +31,16 @@ from pin_nonideal.states.parsing import (
 from pin_nonideal.types import Array, Model
 from pin_nonideal.validation import by_name
 
-from .callbacks import checked
+from .callbacks import checked_function
 from .delay import DelayedTorque
 from .resolver import Resolver, words
 from .torques import (
     SAMPLE_ROUNDING,
-    Called,
-    Constant,
+    ConstantTorque,
     Part,
     Spring,
-    Timed,
+    TimedTorque,
+    TorqueFunction,
     kind_of_drive,
     sum_of_torques,
 )
@@ -48,7 +48,7 @@ from .torques import (
 Mask = NDArray[np.bool_]
 
 # Efforts from here on are unlimited: Pinocchio stores the largest float for no limit.
-UNBOUNDED = 1e300
+UNLIMITED_EFFORT = 1e300
 
 
 def lower_actuation(u: object, out: core.Builder, resolver: Resolver, spec: SceneSpec) -> None:
@@ -80,7 +80,7 @@ def lower_actuation(u: object, out: core.Builder, resolver: Resolver, spec: Scen
 def _lowered_drives(drives: Sequence[object], resolver: Resolver, spec: SceneSpec) -> list[tuple[Part, Mask]]:
     listed = len(drives) > 1
     return [
-        _lowered(drive, resolver, spec, f"actuation[{k}]" if listed else "actuation")
+        _lower_drive(drive, resolver, spec, f"actuation[{k}]" if listed else "actuation")
         for k, drive in enumerate(drives)
     ]
 
@@ -91,9 +91,9 @@ def _sum(parts: Sequence[Part], drives: Sequence[object], model: Model) -> Part:
 
 def _write(part: Part, out: core.Builder) -> None:
     """Set the torques of the program."""
-    if isinstance(part, Constant):
+    if isinstance(part, ConstantTorque):
         out.set_constant_torque(tau=part.tau)
-    elif isinstance(part, Timed):
+    elif isinstance(part, TimedTorque):
         out.set_torque_table(part.times.tolist(), np.ascontiguousarray(part.values))
     elif isinstance(part, Spring):
         out.set_hold_position(kp=part.kp, kd=part.kd, q=part.q)
@@ -109,37 +109,41 @@ def _write(part: Part, out: core.Builder) -> None:
 # --- one drive ----------------------------------------------------------------------------------------------
 
 
-def _lowered(u: object, resolver: Resolver, spec: SceneSpec, who: str) -> tuple[Part, Mask]:
+def _lower_drive(u: object, resolver: Resolver, spec: SceneSpec, who: str) -> tuple[Part, Mask]:
     """Return the torques of one drive, and the mask of the degrees of freedom that it commands, (nv,)."""
     model, everything = resolver.model, np.ones(resolver.model.nv, dtype=bool)
     if isinstance(u, SampledControl):
         acts = _commanded_by_control(u, model)
         if u.delay_in_samples:  # runs have their own delayed torques, see `delayed_torque`
             initial = initial_torque(u, model)
-            return Called(lambda t, q, v: initial, u.period), acts
-        return Called(_sampled_torque(u, model), u.period), acts
+            return TorqueFunction(lambda t, q, v: initial, u.period), acts
+        return TorqueFunction(_sampled_torque(u, model), u.period), acts
     if isinstance(u, SceneDrive):
         function, acts, breaks = u.bound(model, resolver.q0, spec)
-        return Called(_Identified(checked(function, words(u), (model.nv,)), u), u.period, breaks), acts
+        return TorqueFunction(
+            _IdentifiedFunction(checked_function(function, words(u), (model.nv,)), u), u.period, breaks
+        ), acts
     if isinstance(u, HoldPosition):
         q = resolver.q0 if u.q is None else named_configuration(model, u.q, resolver.q0, f"{words(u)}: q")
         kp, kd = (gains_of(model, getattr(u, key), f"{words(u)}: {key}") for key in ("kp", "kd"))
         _require_vectors(model, kp, f"{words(u)}: kp")
-        acts = commanded(model, u.kp) | commanded(model, u.kd)
+        acts = command_mask(model, u.kp) | command_mask(model, u.kd)
         return Spring(kp, kd, np.ascontiguousarray(q)), acts
     if isinstance(u, Table):
         times = np.asarray(u.times)
         values = named_joint_samples(model, u.values, times.size, f"{words(u)}: values")
-        timed = Timed(times, values) if u.interpolation == "linear" else _held(times, values)
-        return timed, commanded(model, u.values)
+        timed = TimedTorque(times, values) if u.interpolation == "linear" else _zero_order_hold(times, values)
+        return timed, command_mask(model, u.values)
     if callable(u):
-        return Called(checked(_torques_of(u, model, who), who, (model.nv,)), None), everything
-    return Constant(named_joint_values(model, u, who)), commanded(model, u)
+        return TorqueFunction(
+            checked_function(_torques_of(u, model, who), who, (model.nv,)), None
+        ), everything
+    return ConstantTorque(named_joint_values(model, u, who)), command_mask(model, u)
 
 
 def delayed_torque(
     u: SampledControl, resolver: Resolver, spec: SceneSpec, t0: float, by_thread: bool
-) -> tuple[DelayedTorque, Called]:
+) -> tuple[DelayedTorque, TorqueFunction]:
     """Return the delayed torques of one run or of the runs of a rollout, and their sum with other drives.
 
     Args:
@@ -153,11 +157,13 @@ def delayed_torque(
     function, initial = _sampled_torque(u, model), initial_torque(u, model)
     delayed = DelayedTorque(function, u.delay_in_samples, initial, t0, by_thread)
     if len(drives) == 1:
-        return delayed, Called(delayed, u.period)
+        return delayed, TorqueFunction(delayed, u.period)
     parts = [part for part, _ in _lowered_drives(drives, resolver, spec)]
-    parts = [Called(delayed, u.period) if d is u else part for d, part in zip(drives, parts, strict=True)]
+    parts = [
+        TorqueFunction(delayed, u.period) if d is u else part for d, part in zip(drives, parts, strict=True)
+    ]
     total = _sum(parts, drives, model)
-    assert isinstance(total, Called)
+    assert isinstance(total, TorqueFunction)
     return delayed, total
 
 
@@ -188,7 +194,7 @@ def require_samples(u: object, t0: float) -> None:
 
 def _sampled_torque(u: SampledControl, model: Model) -> Callable[..., object]:
     who = f"{words(u)}: function"
-    function = checked(_torques_of(u.function, model, who), who, (model.nv,))
+    function = checked_function(_torques_of(u.function, model, who), who, (model.nv,))
     if u.joints is None:
         return function
     others = ~_commanded_by_control(u, model)
@@ -213,7 +219,7 @@ def _commanded_by_control(u: SampledControl, model: Model) -> Mask:
     """Return the mask of the degrees of freedom that a sampled control commands, (nv,)."""
     acts = np.full(model.nv, u.joints is None)
     for name in u.joints or ():
-        j = joint_named(model, name, f"{words(u)}: joints")
+        j = find_joint(model, name, f"{words(u)}: joints")
         acts[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]] = True
     return acts
 
@@ -237,7 +243,7 @@ def initial_torque(u: SampledControl, model: Model) -> Array:
     return tau
 
 
-class _Identified:
+class _IdentifiedFunction:
     """A function of torques that is equal to those of the same drive only, see `parameter_overrides`.
 
     Args:
@@ -264,7 +270,7 @@ def _torques_of(function: Callable[..., object], model: Model, who: str) -> Call
     return torques
 
 
-def _held(times: Array, values: Array) -> Timed:
+def _zero_order_hold(times: Array, values: Array) -> TimedTorque:
     """Return a zero-order hold: each value ends one floating-point spacing before the next time.
 
     A step of the core ends at both times, so that no stage of a step has both values.
@@ -272,7 +278,7 @@ def _held(times: Array, values: Array) -> Timed:
     ends = times[1:] - np.spacing(np.maximum(np.abs(times[1:]), np.diff(times)))
     both = np.column_stack([times[:-1], np.maximum(ends, times[:-1])]).ravel()
     values = np.vstack([np.repeat(values[:-1], 2, axis=0), values[-1:]])
-    return Timed(np.append(both, times[-1]), values, held=True)
+    return TimedTorque(np.append(both, times[-1]), values, held=True)
 
 
 def gains_of(model: Model, gain: object, who: str) -> Array:
@@ -288,11 +294,11 @@ def gains_of(model: Model, gain: object, who: str) -> Array:
         UnknownNameError: there is no such joint.
     """
     if isinstance(gain, float):
-        return np.where(commanded(model, gain), gain, 0.0)
+        return np.where(command_mask(model, gain), gain, 0.0)
     return named_joint_values(model, gain, who)
 
 
-def commanded(model: Model, torques: object) -> Mask:
+def command_mask(model: Model, torques: object) -> Mask:
     """Return the mask of the degrees of freedom that torques, samples or gains command, (nv,).
 
     A table by joint name commands its joints. A number commands the joints with one degree of freedom, and an
@@ -306,7 +312,7 @@ def commanded(model: Model, torques: object) -> Mask:
     table = by_name(torques)
     if table is None and not isinstance(torques, float):
         return ~acts
-    names = None if table is None else {joint_named(model, name, "actuation") for name in table}
+    names = None if table is None else {find_joint(model, name, "actuation") for name in table}
     for j, place in enumerate(joint_places(model), start=1):
         if place.nv == 1 if names is None else j in names:
             acts[place.v_first : place.v_first + place.nv] = True
@@ -360,8 +366,8 @@ def _efforts(u: EffortLimits, model: Model) -> tuple[Array, Array]:
         return -most, most
     least, most = model.lowerEffortLimit.copy(), model.upperEffortLimit.copy()
     unstated = least >= most
-    least[unstated | (least <= -UNBOUNDED)] = -np.inf
-    most[unstated | (most >= UNBOUNDED)] = np.inf
+    least[unstated | (least <= -UNLIMITED_EFFORT)] = -np.inf
+    most[unstated | (most >= UNLIMITED_EFFORT)] = np.inf
     return np.ascontiguousarray(least), np.ascontiguousarray(most)
 
 

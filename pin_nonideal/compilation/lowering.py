@@ -52,11 +52,11 @@ def lower(spec: SceneSpec, builder: core.Builder, resolver: Resolver) -> dict[st
     Raises:
         InputError, UnknownNameError: a frame, joint or constraint does not exist or does not fit.
     """
-    items = lowered(spec, builder, resolver)
+    items = lower_stepwise(spec, builder, resolver)
     return {each.name: each.description for each in items if each.kind in ("constraint", "contact")}
 
 
-def lowered(spec: SceneSpec, builder: core.Builder, resolver: Resolver) -> Iterator[LoweredItem]:
+def lower_stepwise(spec: SceneSpec, builder: core.Builder, resolver: Resolver) -> Iterator[LoweredItem]:
     """Add one scene to the core's builder and yield each description after it is added.
 
     A contact is yielded twice: after its normal rows and after its friction.

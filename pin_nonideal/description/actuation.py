@@ -41,7 +41,7 @@ __all__ = [
 ]
 
 MAX_DELAY = 1_000_000_000  # samples
-WHOLE = 1e-9  # a delay this part of a period above a whole number of periods is rounded down
+PERIOD_ROUNDING = 1e-9  # a delay this part of a period above a whole number of periods is rounded down
 Gain = float | Sequence[float] | NDArray[np.float64] | Mapping[str, ArrayLike]
 
 
@@ -113,7 +113,7 @@ class SampledControl:
     @property
     def delay_in_samples(self) -> int:
         """Delay as a number of samples; a delay in seconds is rounded up."""
-        return self.delay_samples or math.ceil(self.delay / self.period - WHOLE)
+        return self.delay_samples or math.ceil(self.delay / self.period - PERIOD_ROUNDING)
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,7 +34,7 @@ from pin_nonideal.validation import (
 
 from .ground import ground as plain_ground
 from .manifold import ManifoldContact, manifold
-from .shapes import Shape, object_named, shape_of
+from .shapes import Shape, geometry_object, shape_of
 
 __all__ = ["GeometryContact", "geometry_contacts", "ground_contacts"]
 
@@ -192,7 +192,7 @@ def ground_contacts(
     if ground is None:
         ground = plain_ground()
     elif not isinstance(ground, pin.GeometryObject):
-        object_named(who, text(f"{who}: ground", ground), collision_model)
+        geometry_object(who, text(f"{who}: ground", ground), collision_model)
     below = str(ground.name if isinstance(ground, pin.GeometryObject) else ground)
     if links is None:
         shapes = {i: "" for i, item in enumerate(objects) if item.parentJoint and item.name != below}
@@ -299,4 +299,4 @@ def _manifold(c: GeometryContact, model: Model, geometry: GeometryModel) -> list
 
 def _shape(who: str, item: str | GeometryObject, model: Model, geometry: GeometryModel) -> Shape:
     is_object = isinstance(item, pin.GeometryObject)
-    return shape_of(who, item if is_object else object_named(who, item, geometry), model)
+    return shape_of(who, item if is_object else geometry_object(who, item, geometry), model)

@@ -19,7 +19,7 @@ from pin_nonideal.loading.library.example_robots import example_names, example_r
 from pin_nonideal.loading.library.generators import GENERATORS
 from pin_nonideal.loading.urdf.loop_tolerance import remove_dependent_rows
 from pin_nonideal.loading.urdf.reader import RobotFile, read_urdf
-from pin_nonideal.loading.urdf.xml import listed
+from pin_nonideal.loading.urdf.xml import quote_names
 from pin_nonideal.loading.yaml.assembly import scene_arguments
 from pin_nonideal.loading.yaml.initial_state import Start, held_entries
 from pin_nonideal.loading.yaml.robot import MODEL_KEYS, check_keys, optional_string, read_yaml
@@ -151,14 +151,14 @@ def _add_limits(arguments: Table, used: bool, ranges: Sequence[UserContact]) -> 
     empty = [str(model.names[i]) for i, at in single if low[at] >= high[at]]
     if used:
         if empty:
-            note = f"joints without a range (their bounds are equal) get no stops: {listed(empty)}"
+            note = f"joints without a range (their bounds are equal) get no stops: {quote_names(empty)}"
             arguments["notes"] = (*arguments.get("notes", ()), note)
         stops = [JointLimit(name) for name in bounded]
         arguments["contacts"] = (*arguments.get("contacts", ()), *stops, *ranges)
         return
     unused = [f"of the positions of {len(bounded)} joints"] if bounded else []
     if ranges:
-        unused.append(f"of ball joints and tendons ({listed([str(one.name) for one in ranges])})")
+        unused.append(f"of ball joints and tendons ({quote_names([str(one.name) for one in ranges])})")
     if unused:
         note = f"bounds {' and '.join(unused)} are not used; limits=True makes them stops"
         arguments["notes"] = (*arguments.get("notes", ()), note)
@@ -223,8 +223,8 @@ def _origin(text: str, parameters: Table) -> Table | None:
     recorded, path = dict(parameters), Path(text).expanduser()
     folders = recorded.get("package_dirs")
     if folders is not None:
-        listed = [folders] if isinstance(folders, (str, Path)) else folders
-        recorded["package_dirs"] = [str(Path(folder).resolve()) for folder in listed]
+        quote_names = [folders] if isinstance(folders, (str, Path)) else folders
+        recorded["package_dirs"] = [str(Path(folder).resolve()) for folder in quote_names]
     own = text in (*robot_folders(), *example_names()) or not path.exists()
     try:
         return dict(
@@ -304,13 +304,13 @@ def _file_options(parameters: Table, name: str) -> tuple[Table, bool]:
 def _load_mjcf(path: Path, parameters: Table) -> LoadedRobot:
     # Imported on use, since most programs load no MJCF file.
     from pin_nonideal.loading.mjcf.reader import read_mjcf
-    from pin_nonideal.loading.mjcf.unsupported import ALLOWED
+    from pin_nonideal.loading.mjcf.unsupported import IGNORABLE_FEATURES
 
     check_parameters(parameters, MJCF_PARAMETERS, path.name)
     allow = parameters.get("allow", ())
     allow = (allow,) if isinstance(allow, str) else tuple(sequence("allow", allow))
     for key in allow:
-        choice("allow", key, ALLOWED)
+        choice("allow", key, IGNORABLE_FEATURES)
     return LoadedRobot(read_mjcf(path, **{**parameters, "allow": allow}), {}, path.stem)
 
 
@@ -349,7 +349,7 @@ def _load_folder(folder: Path, parameters: Table) -> LoadedRobot:
     for key in kinds:
         optional_string(entry, key, f'"{yaml_path}": model')
     if "generator" in entry:
-        return _generated(entry, table, parameters, name, yaml_path)
+        return _generate(entry, table, parameters, name, yaml_path)
     if "example_robot_data" in entry:
         check_parameters(parameters, (), name)
         robot = example_robot(entry["example_robot_data"], [])
@@ -380,7 +380,7 @@ def _flag(entry: Table, key: str, name: str) -> bool:
     return value
 
 
-def _generated(entry: Table, table: Table, parameters: Table, name: str, path: Path) -> LoadedRobot:
+def _generate(entry: Table, table: Table, parameters: Table, name: str, path: Path) -> LoadedRobot:
     """Return a robot that a function of this package builds from parameters."""
     key = entry["generator"]
     if key not in GENERATORS:

@@ -31,7 +31,7 @@ from pin_nonideal.types import Model, Table
 
 Indices = NDArray[np.intp]
 # Descriptions that act only on the bodies that they name.
-LOCAL = (
+LOCAL_DESCRIPTIONS = (
     *(PointAnchor, FrameAnchor, HingeAnchor, Distance, JointCoupling, PrescribedMotion, KnifeEdge),
     *(JointFriction, SigmoidFriction, Drag, SpringDamper, JointSpring, Wrench),
 )
@@ -81,14 +81,14 @@ def _components(scene: Scene) -> list[Component]:
         or program.states
         or scene.contacts
         or not (held is None or by_position)
-        or any(type(one) not in LOCAL for one in descriptions)
+        or any(type(one) not in LOCAL_DESCRIPTIONS for one in descriptions)
         or sum(parent == 0 for parent in list(model.parents)[1:]) < 2
     )
     if whole:
         return []
     tree = _trees(model)
     anchors = dict(zip(scene.constraint_slices, scene.constraints, strict=False))
-    touched = [_touched(one, model, tree, anchors) for one in descriptions]
+    touched = [_tree_roots(one, model, tree, anchors) for one in descriptions]
     group = {root: root for root in tree[1:]}
     for roots in touched:
         joined = {group[root] for root in roots}
@@ -110,7 +110,7 @@ def _trees(model: Model) -> list[int]:
     return tree
 
 
-def _touched(one: Any, model: Model, tree: Sequence[int], anchors: Table) -> set[int]:
+def _tree_roots(one: Any, model: Model, tree: Sequence[int], anchors: Table) -> set[int]:
     """Return the root joints of the trees that a description acts on."""
     roots: set[int] = set()
     for place in (f.name for f in fields(one) if f.name in PLACES):
@@ -122,7 +122,7 @@ def _touched(one: Any, model: Model, tree: Sequence[int], anchors: Table) -> set
         elif model.existFrame(name):
             roots.add(tree[model.frames[model.getFrameId(name)].parentJoint])
         elif is_dataclass(anchors.get(name)):
-            roots |= _touched(anchors[name], model, tree, {})
+            roots |= _tree_roots(anchors[name], model, tree, {})
     return roots - {0}
 
 
@@ -130,7 +130,7 @@ def _component(
     scene: Scene, descriptions: Sequence[Any], own: Sequence[int], group: Sequence[int | None], of: int
 ) -> Component:
     joints = [joint for joint, each in enumerate(group) if each == of]
-    model, q, v = _alone(scene.model, joints)
+    model, q, v = _separate_model(scene.model, joints)
     of_component = [one for one, each in zip(descriptions, own, strict=True) if each == of]
     held = scene.actuation
     if isinstance(held, HoldPosition) and held.q is not None:
@@ -153,7 +153,7 @@ def _component(
     return Component(alone, q, v, np.array(elements, dtype=np.intp), np.array(works, dtype=np.intp))
 
 
-def _alone(model: Model, joints: Sequence[int]) -> tuple[Model, Indices, Indices]:
+def _separate_model(model: Model, joints: Sequence[int]) -> tuple[Model, Indices, Indices]:
     """Return some trees of a model as a separate model, and the indices of its q and v in the whole model."""
     alone, number = pin.Model(), {0: 0}
     alone.name, alone.gravity = model.name, model.gravity

@@ -85,7 +85,7 @@ def run_decoupled(
     outcomes = []
     for k, part in enumerate(parts):
         own = _options_of(part, options, len(v0))
-        own_tick = _after(tick, k, len(parts), options)
+        own_tick = _shared_progress(tick, k, len(parts), options)
         outcome = run_together(part.scene, q0[part.q], v0[part.v], own, tick=own_tick)
         if isinstance(outcome.stopped, KeyboardInterrupt):
             return merge_outcomes(scene, [], [], options, outcome.stopped)
@@ -137,7 +137,7 @@ def _options_of(part: Component, options: RunOptions, nv: int) -> RunOptions:
     return replace(silent, atol=atol, dense=True)
 
 
-def _after(
+def _shared_progress(
     tick: Callable[[float], None] | None, k: int, n: int, options: RunOptions
 ) -> Callable[[float], None] | None:
     """Return a progress function for the k-th of n runs that maps its time to the progress of all runs."""

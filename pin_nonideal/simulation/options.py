@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.actuation import sampled_drives
 from pin_nonideal.errors import InputError
-from pin_nonideal.scene.evaluation import SEVERAL
+from pin_nonideal.scene.evaluation import SEVERAL_CHOICES
 from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.types import Array
 from pin_nonideal.validation import array, choice, count, flag, label, nonnegative, number, positive, sequence
@@ -168,7 +168,7 @@ def run_options(
         laws="laws" in groups or "forces" in groups,
         reactions="reactions" in groups,
         tau="tau" in groups or "forces" in groups,
-        several=choice("simulate: several", several, SEVERAL),
+        several=choice("simulate: several", several, SEVERAL_CHOICES),
         dense="dense" in groups,
         max_wall=_most_wall(max_wall),
         event_names=event_names,
@@ -222,7 +222,7 @@ def check_values(
     _most_wall(max_wall)
     number("simulate: t0", t0)
     positive("simulate: duration", duration)
-    choice("simulate: several", several, SEVERAL)
+    choice("simulate: several", several, SEVERAL_CHOICES)
     flag("simulate: strict", strict)
 
 

@@ -17,7 +17,7 @@ from pin_nonideal.types import Array
 
 from .decoupled import decoupled_components, rollout_decoupled
 from .options import RunOptions
-from .results import LEFT
+from .results import MAX_RESIDUAL
 
 Number = TypeVar("Number", np.float64, np.int64)
 
@@ -157,7 +157,7 @@ def _failures(
             failures[i] = RunInterrupted("the runs were interrupted")
         else:
             failures[i] = UserFunctionError(f"a function of the scene failed: {cause}")
-    for i in map(int, np.flatnonzero(violation > LEFT)):
+    for i in map(int, np.flatnonzero(violation > MAX_RESIDUAL)):
         gap = f"gap {violation[i]:.1e} (m or rad)"
         failures.setdefault(i, LoopClosureError(f"run {i} has left its constraints: {gap}", gaps={}))
     return failures

@@ -29,7 +29,7 @@ Tick = Callable[[float], None]  # function of the time [s]
 # Smallest relative tolerance that SciPy's methods accept and reach.
 MIN_RTOL = 1e-13
 # Absolute tolerance of work: excludes work from step size control.
-FREE = 1e100
+WORK_ATOL = 1e100
 
 
 class _Run:
@@ -65,7 +65,7 @@ class _Run:
             same = joint.nq == joint.nv
             positions[joint.idx_q : joint.idx_q + joint.nq] = own if same else own.min(initial=np.inf)
         known = np.concatenate([positions, atol[model.nv :]])
-        return np.concatenate([known, np.full(size - known.size, FREE)])
+        return np.concatenate([known, np.full(size - known.size, WORK_ATOL)])
 
     def smooth_stretch(self, method: Any, t_end: float) -> None:
         """Integrate to the next event, to the next break of a function of time, or to the end."""

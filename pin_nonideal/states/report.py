@@ -77,8 +77,8 @@ def report_of(
     """
     (q, v), (on, v_on) = start, projected
     move, change = pin.difference(model, q, on), v_on - v
-    distance, most, moved = _farthest(model, unit, mass, q, move)
-    velocity_distance, fastest, changed = _farthest(model, unit, mass, on, change)
+    distance, most, moved = _largest_change(model, unit, mass, q, move)
+    velocity_distance, fastest, changed = _largest_change(model, unit, mass, on, change)
     return ProjectionReport(
         distance,
         most,
@@ -94,7 +94,7 @@ def report_of(
     )
 
 
-def _farthest(
+def _largest_change(
     model: Model, unit: Array, mass: Callable[[Array], Array], q: Array, change: Array
 ) -> tuple[float, str, float]:
     """Return the length of a change in the metric of M(q), and name and change of its largest coordinate."""

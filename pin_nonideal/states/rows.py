@@ -83,10 +83,10 @@ def row_lengths(runner: core.Runner, q: Array, v: Array, t: float, *, own: bool 
 
 # Singular value of rows over their greatest lengths below which rows are dependent or vanish. Closures and
 # rounding give about 1e-12; directions of light mechanisms lie above 1e-7.
-DEPENDENT = 1e-9
+MIN_SINGULAR_VALUE = 1e-9
 
 
-def shortest(scaled: Array, y: Array, lengths: Array) -> Array:
+def minimum_norm(scaled: Array, y: Array, lengths: Array) -> Array:
     """Solve min |scaled diag(lengths) x - y| for the x of least norm, (n,).
 
     Args:
@@ -97,7 +97,7 @@ def shortest(scaled: Array, y: Array, lengths: Array) -> Array:
     used = lengths > 0.0
     x = np.zeros(len(lengths))
     left, values, right = np.linalg.svd(scaled[:, used])
-    rank = int((values > DEPENDENT).sum())
+    rank = int((values > MIN_SINGULAR_VALUE).sum())
     solution = right[:rank].T @ ((left.T[:rank] @ y) / values[:rank]) / lengths[used]
     idle = right[rank:].T / lengths[used][:, None]
     x[used] = solution - idle @ np.linalg.lstsq(idle, solution, rcond=None)[0]

@@ -32,7 +32,7 @@ def sweep_grid(**axes: Iterable[object]) -> list[Table]:
             or getattr(values, "ndim", 1) == 0
         ):
             raise InputError(f"sweep_grid: {name} must be a list of values; got {short_repr(values)}")
-    listed = [[_plain(value) for value in values] for values in axes.values()]
+    listed = [[_plain_value(value) for value in values] for values in axes.values()]
     return [dict(zip(axes, point, strict=True)) for point in itertools.product(*listed)]
 
 
@@ -73,5 +73,5 @@ def sweep_samples(
     return [dict(zip(ranges, point.tolist(), strict=True)) for point in points]
 
 
-def _plain(value: object) -> object:
+def _plain_value(value: object) -> object:
     return value.item() if isinstance(value, np.generic) else value

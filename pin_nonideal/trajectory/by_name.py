@@ -9,7 +9,7 @@ import pinocchio as pin
 
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
 from pin_nonideal.scene.scene import compiled_scene
-from pin_nonideal.states.joint_layout import CIRCLES
+from pin_nonideal.states.joint_layout import COS_SIN_JOINTS
 from pin_nonideal.states.kinematics import frame_motion
 from pin_nonideal.types import Array
 from pin_nonideal.validation import choice, text
@@ -32,7 +32,7 @@ def joint_record(run: RunFields, name: str) -> JointRecord:
     v, a, tau = (None if x is None else x[:, rates] for x in (run.v, run.a, run.tau))
     assert v is not None
     q = run.q[:, place.q_first : place.q_first + place.nq]
-    if place.kind.startswith(CIRCLES):
+    if place.kind.startswith(COS_SIN_JOINTS):
         q = np.column_stack([q[:, :-2], angles(q[:, -2:], v[:, -1], run.t)])
     alone = place.nv == 1 and q.shape[1] == 1
     parts = [x if x is None or not alone else x[:, 0] for x in (q, v, a, tau)]

@@ -12,7 +12,7 @@ from pin_nonideal.description.constraints import Constraint, JointCoupling
 from pin_nonideal.errors import LoadingError, short_repr
 from pin_nonideal.loading.urdf.geometry_sources import Shapes
 from pin_nonideal.loading.urdf.reader import RobotFile
-from pin_nonideal.loading.urdf.xml import listed
+from pin_nonideal.loading.urdf.xml import quote_names
 from pin_nonideal.loading.yaml.initial_state import joint_index, vector
 from pin_nonideal.loading.yaml.robot import check_keys, joint_types, names_in, pitches
 from pin_nonideal.types import GeometryModel, Model, Table
@@ -133,7 +133,7 @@ def lock(
     if not locked:
         return q0, v0
     indices = [joint_index(robot.model, n, f"{where}: model: locked") for n in locked]
-    return _reduced(robot, indices, q0, v0)
+    return _fix_joints(robot, indices, q0, v0)
 
 
 def fix_massless(
@@ -162,9 +162,9 @@ def fix_massless(
     if not idle or len(idle) == model.njoints - 1:
         return q0, v0
     names = {str(model.names[j]) for j in idle}
-    notes.append(f"joints that move no inertia are fixed: {listed(sorted(names))}")
+    notes.append(f"joints that move no inertia are fixed: {quote_names(sorted(names))}")
     robot.constraints = [c for c in robot.constraints if not names & set(map(str, vars(c).values()))]
-    return _reduced(robot, idle, q0, v0)
+    return _fix_joints(robot, idle, q0, v0)
 
 
 def _moves_no_inertia(model: Model, joint: int) -> bool:
@@ -186,7 +186,7 @@ def names_on(model: Model, joint: int) -> set[str]:
     return {str(f.name) for f in model.frames if f.parentJoint in beyond} | {str(model.names[joint])}
 
 
-def _reduced(
+def _fix_joints(
     robot: RobotFile, indices: list[int], q0: NDArray[np.float64], v0: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Fix joints at q0, and return the configuration and velocity of the others."""

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
 
 # Residual of closed loops, relative to the size of the mechanism or to 1 rad: far below a pixel.
-CLOSED = 1e-6
+CLOSURE_TOL = 1e-6
 
 
 class Cubics:
@@ -102,7 +102,7 @@ class Cubics:
         v = (1.0 - part) * self.run.v[k] + part * self.run.v[k + 1]
         t = self.t[k] + s * (self.t[k + 1] - self.t[k])
         on, after = _closest(program, q, v, t, np.inf)
-        moved, tolerance = np.abs(on - q).max(axis=1, initial=0.0), CLOSED * min(1.0, size)
+        moved, tolerance = np.abs(on - q).max(axis=1, initial=0.0), CLOSURE_TOL * min(1.0, size)
         failed = np.flatnonzero(~(after <= tolerance))
         if len(failed):
             on[failed] = q[failed]
@@ -128,7 +128,7 @@ class Cubics:
         return xi, rate
 
     def _steps(self, q0: Array, q1: Array, v1: Array) -> tuple[Array, Array]:
-        """Return differences of configurations, and their end rates in the tangent space at q0, (n, nv) each."""
+        """Return differences of configurations, and end rates in the tangent space at q0, (n, nv) each."""
         steps = np.empty(v1.shape)
         dof, first = self._lines.T
         steps[:, dof] = q1[:, first] - q0[:, first]

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from pin_nonideal.scene.scene import Scene
 
 # Collision shapes with more triangles are left out.
-TRIANGLES = 20_000
+MAX_TRIANGLES = 20_000
 
 
 def inertia_box(inertia: pin.Inertia) -> Table:
@@ -35,8 +35,8 @@ def collisions_of(scene: Scene) -> list[Visual]:
     """Collision shapes, unless they have too many triangles in total."""
     if scene.collision_model is None:
         return []
-    overlays, room = [], TRIANGLES
-    for visual in visuals_of(scene.collision_model, TRIANGLES):
+    overlays, room = [], MAX_TRIANGLES
+    for visual in visuals_of(scene.collision_model, MAX_TRIANGLES):
         if visual.shape.kind != "plane" and len(visual.shape.triangles) <= room:
             room -= len(visual.shape.triangles)
             overlays.append(visual)

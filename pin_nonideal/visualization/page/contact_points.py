@@ -60,7 +60,7 @@ def contact_points(run: Trajectory, motion: Motion) -> list[ContactPoint]:
     compiled = compiled_scene(run.scene)
     names = [compiled.block_names[block] for block in compiled.program.framed_contacts]
     struck = {str(event.element) for event in run.events}
-    closed = {name: _closed(run, name) for name in names}
+    closed = {name: _closed_mask(run, name) for name in names}
     chosen = [
         k
         for k, name in enumerate(names)
@@ -73,7 +73,7 @@ def contact_points(run: Trajectory, motion: Motion) -> list[ContactPoint]:
     ]
 
 
-def _closed(run: Trajectory, name: str) -> NDArray[np.bool_]:
+def _closed_mask(run: Trajectory, name: str) -> NDArray[np.bool_]:
     """Check if a contact is closed at each sample, (nt,)."""
     closed = getattr(run, "closed", None)
     if closed is None:

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 # largest moment and the largest force times the length of a link.
 MIN_RELATIVE_SIZE = 1e-9
 # Joints of several degrees of freedom with constant directions of motion in their own frame.
-STEADY = ("JointModelFreeFlyer", "JointModelSpherical", "JointModelTranslation")
+CONSTANT_AXES_JOINTS = ("JointModelFreeFlyer", "JointModelSpherical", "JointModelTranslation")
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ def _reaction(
         return _connection_arrows(scene, motion, name, kind, item, shown, lam)
     if shown == core.DisplayKind.rolling:
         body = side_of(model, item.frame)
-        force, place = _rolling(model, motion, item, lam)
+        force, place = _rolling_force(model, motion, item, lam)
         return [Arrow(name, kind, "N", force, body.joint, place)]
     if shown == core.DisplayKind.edge:
         edge = side_of(model, item.frame)
@@ -183,7 +183,7 @@ def _connection_arrows(
     return arrows
 
 
-def _rolling(model: pin.Model, motion: Motion, item: Any, lam: Array) -> tuple[Array, Array]:
+def _rolling_force(model: pin.Model, motion: Motion, item: Any, lam: Array) -> tuple[Array, Array]:
     """Return the force on a rolling sphere or disk, and the contact point, (n, 3) each."""
     t1, t2, normal = (np.array(axis) for axis in axis_triad(unit_axis("normal", item.normal)))
     local = lam @ np.array([t1, t2, normal])
@@ -232,7 +232,7 @@ def _at_joints(model: pin.Model, motion: Motion, kind: str, force: Array) -> lis
     for joint in reversed(range(1, model.njoints)):
         if joint in covered:
             continue
-        chain = _sliding(model, joint)
+        chain = _particle_joints(model, joint)
         covered.update(chain)
         name = ", ".join(str(model.names[j]) for j in reversed(chain))
         if len(chain) > 1:
@@ -247,7 +247,7 @@ def _at_joints(model: pin.Model, motion: Motion, kind: str, force: Array) -> lis
     return arrows
 
 
-def _sliding(model: pin.Model, joint: int) -> list[int]:
+def _particle_joints(model: pin.Model, joint: int) -> list[int]:
     """Return a joint and the joints before it that move the same particle."""
     chain = [joint]
     while _slides(model, joint):
@@ -268,7 +268,7 @@ def _wrench(model: pin.Model, motion: Motion, kind: str, joint: int, force: Arra
     item, name = model.joints[joint], str(model.names[joint])
     data, own = item.createData(), force[:, item.idx_v : item.idx_v + item.nv]
     item.calc(data, motion.q[0])
-    if item.shortname() in STEADY:
+    if item.shortname() in CONSTANT_AXES_JOINTS:
         local = own @ np.linalg.pinv(np.asarray(data.S))
     else:
         local = np.empty((len(force), 6))

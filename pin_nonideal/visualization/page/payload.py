@@ -14,7 +14,7 @@ from pin_nonideal.types import Array, Table
 from .applied_forces import applied_force_arrows
 from .binary import Payload, Shapes
 from .body_overlays import collisions_of, colored_collisions, inertia_box
-from .camera import link_length, pattern_spacings, upward, view
+from .camera import link_length, pattern_spacings, up_direction, view
 from .constraint_curves import Guide, guides_of
 from .contact_points import contact_point_marks, contact_points
 from .contact_surfaces import contact_surfaces
@@ -74,7 +74,7 @@ def packed_runs(
     stage("shapes")
     ends = [(m.joint1, m.point1) for m in marks] + [(m.joint2, m.point2) for m in marks]
     visuals, bare = _drawn(scene, motion, ends)
-    visuals = visuals + contact_surfaces(finer, motion, visuals, upward(model))
+    visuals = visuals + contact_surfaces(finer, motion, visuals, up_direction(model))
     guides = guides_of(finer, motion)
     shapes = Shapes(payload)
     looking = view(scene, motion, visuals, ends, np.vstack([np.zeros((0, 3)), *(g.points for g in guides)]))
@@ -101,7 +101,7 @@ def packed_runs(
         "visuals": drawn,
         "name": names[0],
         "others": [
-            _other(payload, shapes, *other) for other in zip(runs[1:], motions[1:], names[1:], strict=True)
+            _ghost(payload, shapes, *other) for other in zip(runs[1:], motions[1:], names[1:], strict=True)
         ],
         "marks": [
             _stored_mark(payload, motion, mark)
@@ -117,7 +117,7 @@ def packed_runs(
             _stored_element(payload, motion, element if forces else replace(element, normal=None))
             for element in elements_of(finer, motion, marks, touches)
         ],
-        "view": _plain(looking),
+        "view": _dataclass_fields(looking),
         "collisions": shapes.add(collisions_of(scene)),
         "signals": [_stored_signal(payload, signal, rounding) for signal in signals],
         "relations": stored_relations(payload, run, finer, [x for x in items if names_relation(run, x)]),
@@ -135,7 +135,7 @@ def _drawn(scene: Scene, motion: Motion, ends: list[tuple[int, Array]]) -> tuple
     return link_bars(scene.model, ends, link_length(scene.model, ends, motion.size)), True
 
 
-def _other(payload: Payload, shapes: Shapes, run: Trajectory, motion: Motion, name: str) -> Table:
+def _ghost(payload: Payload, shapes: Shapes, run: Trajectory, motion: Motion, name: str) -> Table:
     """Return a run as a ghost: its motion and its bodies."""
     marks = marks_of(run.scene)
     ends = [(m.joint1, m.point1) for m in marks] + [(m.joint2, m.point2) for m in marks]
@@ -180,7 +180,7 @@ def _plots(
         for number, others in enumerate(each[1:], 1):
             for other in others:
                 if (other.title, other.unit) == (plot.title, plot.unit):
-                    stored["curves"] += _compared(payload, plot, other, number, names[number])
+                    stored["curves"] += _common_curves(payload, plot, other, number, names[number])
         plots.append(stored)
     return plots
 
@@ -205,7 +205,7 @@ def _stored_signal(payload: Payload, signal: Signal, rounding: dict[str, float])
     }
 
 
-def _compared(payload: Payload, plot: Plot, other: Plot, number: int, name: str) -> list[Table]:
+def _common_curves(payload: Payload, plot: Plot, other: Plot, number: int, name: str) -> list[Table]:
     """Return the curves of another run that the first run also has."""
     t, common = payload.add(other.t, "f8"), {k: v for k, v in other.curves.items() if k in plot.curves}
     return [
@@ -284,7 +284,7 @@ def _impulse(event: Any) -> Array:
     return np.zeros(3) if impulse is None else np.asarray(impulse, dtype=float)
 
 
-def _plain(item: Any, apart: Sequence[str] = ()) -> Table:
+def _dataclass_fields(item: Any, apart: Sequence[str] = ()) -> Table:
     """Return the fields of a dataclass, with arrays as lists, except those that are stored apart."""
     return {
         key: v.tolist() if isinstance(v, np.ndarray) and key not in apart else v
@@ -294,7 +294,7 @@ def _plain(item: Any, apart: Sequence[str] = ()) -> Table:
 
 def _stored_arrow(payload: Payload, motion: Motion, arrow: Arrow) -> Table:
     """Return an arrow with its origin in the frame of its joint, stored once if it is constant."""
-    stored = _plain(arrow, ("values", "origin"))
+    stored = _dataclass_fields(arrow, ("values", "origin"))
     stored["values"] = payload.add(arrow.values)
     if arrow.origin is not None:
         stored["origin"] = payload.add(
@@ -309,14 +309,14 @@ def _without_repetition(vectors: Array, size: float) -> Array:
 
 
 def _stored_mark(payload: Payload, motion: Motion, mark: Mark) -> Table:
-    stored = _plain(mark, ("path", "closed"))
+    stored = _dataclass_fields(mark, ("path", "closed"))
     stored["path"] = None if mark.path is None else payload.add(_without_repetition(mark.path, motion.size))
     stored["closed"] = None if mark.closed is None else payload.add(mark.closed, "u1")
     return stored
 
 
 def _stored_element(payload: Payload, motion: Motion, element: Element) -> Table:
-    stored = _plain(element, ("point", "axis", "share", "normal"))
+    stored = _dataclass_fields(element, ("point", "axis", "share", "normal"))
     for key, size in (("point", motion.size), ("axis", 1.0)):
         stored[key] = payload.add(_without_repetition(np.atleast_2d(getattr(element, key)), size))
     for key in ("share", "normal"):
@@ -327,7 +327,7 @@ def _stored_element(payload: Payload, motion: Motion, element: Element) -> Table
 
 def _stored_guide(payload: Payload, guide: Guide) -> Table:
     apart = ("points", "shift", "normals")
-    stored = _plain(guide, apart)
+    stored = _dataclass_fields(guide, apart)
     for key in apart:
         if stored[key] is not None:
             stored[key] = payload.add(getattr(guide, key))
@@ -346,17 +346,17 @@ def _modes(payload: Payload, run: Trajectory) -> list[Table]:
 def _subtitle(run: Trajectory) -> str:
     model = run.scene.model
     count = len(run.scene.constraint_slices)
-    words = [_counted(model.njoints - 1, "joint"), _counted(count, "constraint")]
+    words = [_count(model.njoints - 1, "joint"), _count(count, "constraint")]
     if count:
-        words.append(f"violation below {_above(float(np.max(run.violation)))}")
+        words.append(f"violation below {_rounded_up(float(np.max(run.violation)))}")
     return " · ".join(words)
 
 
-def _counted(count: int, word: str) -> str:
+def _count(count: int, word: str) -> str:
     return f"{count or 'no'} {word}{'' if count == 1 else 's'}"
 
 
-def _above(value: float) -> str:
+def _rounded_up(value: float) -> str:
     """Return a value rounded up to two digits."""
     if not value > 0.0:
         return "1e-16"

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
 
 # Maximum number of points of one curve, of all curves together, and of the limits of a law.
-MOST, POINTS, BOUNDS = 1_500, 60_000, 300
+MAX_CURVE_POINTS, MAX_POINTS, MAX_LIMIT_POINTS = 1_500, 60_000, 300
 
 
 def names_relation(run: Trajectory, item: Any) -> bool:
@@ -42,16 +42,16 @@ def stored_relations(
         requested: names, as `relations_of` takes them.
     """
     more = [name for name in available(run) if name not in requested]
-    each = min(MOST, POINTS // max(len(requested) + len(more), 1))
+    each = min(MAX_CURVE_POINTS, MAX_POINTS // max(len(requested) + len(more), 1))
     stored = []
     for name in [*requested, *more]:
         own = finer if name.split(" ", 1)[0] == "phase" else run
         for relation in relations_of(own, name):
-            stored.append(_stored(payload, own, name, relation, each) | {"shown": name in requested})
+            stored.append(_store(payload, own, name, relation, each) | {"shown": name in requested})
     return stored
 
 
-def _stored(payload: Payload, run: Trajectory, name: str, relation: Relation, points: int) -> Table:
+def _store(payload: Payload, run: Trajectory, name: str, relation: Relation, points: int) -> Table:
     curves = [_curve(payload, run, label, *pair, points) for label, pair in relation.curves.items()]
     one_side = relation.x.startswith("load")
     bounds = [_bound(payload, label, *pair, one_side) for label, pair in relation.bounds.items()]
@@ -73,16 +73,16 @@ def _curve(payload: Payload, run: Trajectory, label: str, x: Array, y: Array, po
         at = np.flatnonzero(np.isnan(x)) - np.arange(len(x) - len(t))
         t = np.insert(t, at, t[at])
     thin = Plot(label, "", t, {"x": x, "y": y}).thinned(max(points // 4, 25))
-    values = {key: without_rounding(part, 1e-12 * _largest(part)) for key, part in thin.curves.items()}
+    values = {key: without_rounding(part, 1e-12 * _largest_value(part)) for key, part in thin.curves.items()}
     return {"label": label, "t": payload.add(thin.t, "f8")} | {k: payload.curve(v) for k, v in values.items()}
 
 
 def _bound(payload: Payload, label: str, x: Array, y: Array, one_side: bool) -> Table:
     """Return the limit of a law, in the order of x."""
-    chosen = np.unique(np.linspace(0, len(x) - 1, BOUNDS).astype(int))
+    chosen = np.unique(np.linspace(0, len(x) - 1, MAX_LIMIT_POINTS).astype(int))
     order = chosen[np.argsort(x[chosen], kind="stable")]
     return {"label": label, "x": payload.add(x[order]), "y": payload.add(y[order]), "both": not one_side}
 
 
-def _largest(values: Array) -> float:
+def _largest_value(values: Array) -> float:
     return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 KINDS = ("phase", "friction", "load")
 # Maximum number of joints and of laws with relations on a page.
-MOST = 16
+MAX_RELATIONS = 16
 
 
 @dataclass(frozen=True)
@@ -50,11 +50,11 @@ def available(run: Trajectory) -> list[str]:
     """
     model = run.scene.model
     joints = [joint for joint in range(1, model.njoints) if model.joints[joint].nv == 1]
-    joints = sorted(joints, key=lambda joint: -_spread(run, joint))[:MOST]
+    joints = sorted(joints, key=lambda joint: -_spread(run, joint))[:MAX_RELATIONS]
     names = []
     if run.law_forces:
         known = friction_joints(run)
-        laws = sorted(known, key=lambda law: -_spread(run, known[law]))[:MOST]
+        laws = sorted(known, key=lambda law: -_spread(run, known[law]))[:MAX_RELATIONS]
         kinds = ("friction", "load") if run.reactions else ("friction",)
         names = [f"{kind} {law}" for kind in kinds for law in laws if law in run.law_forces]
     return names + [f"phase {model.names[joint]}" for joint in sorted(joints)]
