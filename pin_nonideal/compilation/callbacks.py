@@ -251,8 +251,8 @@ class Reactions:
     def wrench(self, name: str) -> Array:
         """[force; moment] that a joint or an anchor exerts, (6,) [N; N m].
 
-        A joint acts on the body that it moves: axes and moment point are those of the joint frame. An anchor
-        acts on the body of frame1: the axes are those of frame2.
+        A joint acts on the body that it moves: the joint frame gives the axes and the moment point. An anchor
+        acts on the body of frame1: frame2 gives the axes.
 
         Args:
             name: a joint of the model, or a constraint.

@@ -85,7 +85,7 @@ def named_failure(
     if kind is kinds.not_converged:
         names = [program.element_names[i] for i in failure.elements]
         blocks = block_names(program)
-        return _step_size_error(names or [blocks[i] for i in program.contacts], t)
+        return _modes_error(names or [blocks[i] for i in program.contacts], t)
     if kind is kinds.closure:
         name = program.constraints[failure.elements[0]].name
         return open_loop_error(name, {name: value}, t)
@@ -246,7 +246,7 @@ def _paradox(names: Sequence[str], failure: core.CoreFailure) -> RunError:
     )
 
 
-def _step_size_error(names: Sequence[str], t: float) -> RunError:
+def _modes_error(names: Sequence[str], t: float) -> RunError:
     return FrictionConvergenceError(
         f"it was not found at t = {t:.4g} s whether {_list_names(names)} sticks or slips, although a motion "
         'may exist; change an initial value a little, tighten rtol, use method="moreau", or give modes to '

@@ -112,7 +112,7 @@ def sum_of_torques(parts: Sequence[Part], drives: Sequence[object], model: Model
 
 
 def _require_steady(parts: Sequence[Part], drives: Sequence[object]) -> None:
-    """Check that torques beside sampled torques are those of tables, or constant between the samples.
+    """Check that torques in addition to sampled torques come from tables, or are constant between samples.
 
     Raises:
         InputError: see above.

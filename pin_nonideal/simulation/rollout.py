@@ -89,9 +89,9 @@ def rollout(
 
     Raises:
         InputError, UnknownNameError: an argument does not fit.
-        RunError: a run stopped early. The error is that of the first failed run: `index` is its index,
+        RunError: a run stopped early. The first failed run raises its error: `index` is its index,
             `trajectory` has its samples, and `results` holds the trajectories and errors of all runs.
-        RunInterrupted: Ctrl-C ended all runs; the attributes are those of RunError.
+        RunInterrupted: Ctrl-C ended all runs; the attributes are as for RunError.
     """
     if not isinstance(scene, Scene):
         raise InputError(f"rollout: scene must be a Scene; got {type(scene).__name__}")

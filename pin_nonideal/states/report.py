@@ -22,7 +22,7 @@ class ProjectionReport:
     Attributes:
         distance: sqrt(d^T M(q) d) of the displacement d = q' - q in tangent coordinates [sqrt(kg) m].
         coordinate: name of the coordinate with the largest displacement over its unit, a radian or the length
-            of the mechanism. The name is that of the joint, with an index from 0 if the joint has several
+            of the mechanism. The name is the joint's name, with an index from 0 if the joint has several
             coordinates. Empty without a displacement.
         moved: displacement of this coordinate [rad or m].
         gap: largest residual before [m or rad, in the scale of its row].

@@ -49,9 +49,9 @@ class Rest:
     def holding(self) -> dict[str, HoldingTorque]:
         """Torques that friction holds and torques of slow motion, by joint name, computed on first access.
 
-        The joints are those of one degree of freedom that a law of dry friction acts on. The other joints
-        keep their torques. The torque of a joint is the whole torque of its drive, with that of the scene's
-        actuation.
+        The table has the joints of one degree of freedom on which a law of dry friction acts. The other
+        joints keep their torques. The torque of a joint is the whole torque of its drive, with that of the
+        scene's actuation.
         """
         return self._holding()
 

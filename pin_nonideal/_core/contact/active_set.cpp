@@ -113,13 +113,13 @@ struct Search {
     // Return the open contact with the fastest relative approach acceleration, or -1.
     int fastest_approaching(const Choice& choice) {
         int found = -1;
-        double most = 1.0;
+        double max_ratio = 1.0;
         for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
             if (!rest[i] || choice[i]) continue;
             evaluate_gap(p, w, t, v, i);
             const double beyond = -gap_acceleration(p, w, i) / acceleration_rounding(p, w, i);
-            if (beyond <= most) continue;
-            most = beyond;
+            if (beyond <= max_ratio) continue;
+            max_ratio = beyond;
             found = i;
         }
         return found;

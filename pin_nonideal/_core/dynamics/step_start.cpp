@@ -84,8 +84,8 @@ static int contradicting_block(const Program& p, Workspace& w, const VecX& v, do
     return found;
 }
 
-static void choose_rows_anew(const Program& p, Workspace& w, int most = INT_MAX) {
-    choose_rows(p, w, w.state.sticks_anywhere() ? w.state.rank_tolerance : rank_tolerance, most);
+static void choose_rows_anew(const Program& p, Workspace& w, int max_rank = INT_MAX) {
+    choose_rows(p, w, w.state.sticks_anywhere() ? w.state.rank_tolerance : rank_tolerance, max_rank);
     ++w.counters.factorizations;
 }
 

@@ -183,9 +183,9 @@ void decide(Unknowns& u, const ReactionEquation& equation, const VecX& start, Ve
     const bool shown = found.size() == 1 || hold > 1;
     if (!shown && determinant_at(equation, y) > least_determinant_told) return;
     state.unique = Uniqueness::several;
-    VecX::Index most = 0;
-    (found.back() - y).cwiseQuotient((found.back() + y).cwiseMax(min_scale)).cwiseAbs().maxCoeff(&most);
-    u.w.now.several_element = u.elements()[most];
+    VecX::Index widest = 0;
+    (found.back() - y).cwiseQuotient((found.back() + y).cwiseMax(min_scale)).cwiseAbs().maxCoeff(&widest);
+    u.w.now.several_element = u.elements()[widest];
     if (u.w.continues && determinant_at(equation, y) > least_determinant_told) return;
     if (found.size() == 1) throw paradox(u, std::min(least, edge));
     throw two_motions(u, least, found[0], found[1]);

@@ -14,7 +14,7 @@ constexpr double least_determinant_told = 1e-8;
 void decide(Unknowns& unknowns, const ReactionEquation& equation, const VecX& start, VecX& y, bool solved);
 
 // Solve with all zero-load sets after one of them had no solution. y becomes the solution nearest to `start` in any
-// set. If there is none, throw `failure`.
+// set. If no set has a solution, throw `failure`.
 void decide_over_pieces(Unknowns& unknowns, const VecX& start, VecX& y, const Failure& failure);
 
 // Search for other solutions with user functions among the unknowns. J is dg/dy at y. Throws a failure if the

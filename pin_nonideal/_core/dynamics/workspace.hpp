@@ -103,7 +103,7 @@ struct Evaluation {
     Reactions reactions;
     VecX holding;                     // M a - F - C - A^T lam: forces that hold the locked dofs
     bool has_holding = false;
-    bool ideal = false;               // the motion is that of the ideal constraints alone
+    bool ideal = false;               // the motion is due to the ideal constraints alone
     std::vector<SlipLimits> load;     // limits at rest before the static ratio
     std::vector<double> limit;        // kinetic limit of each element
     std::vector<Vec3> slip_force;     // force of each slipping element, along its directions

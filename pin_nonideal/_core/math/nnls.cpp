@@ -28,7 +28,8 @@ constexpr int most_cuts = 50;  // updates of the bound in max_min, each exact fo
 // Least-squares solutions over a set of columns, which changes by one column at a time. [Lawson, Hanson, ch. 24.]
 class ColumnSet {
 public:
-    ColumnSet(Eigen::Index rows, Eigen::Index most) : Q_(rows, std::min(rows, most)), R_(MatX::Zero(Q_.cols(), Q_.cols())) {}
+    ColumnSet(Eigen::Index rows, Eigen::Index max_columns)
+        : Q_(rows, std::min(rows, max_columns)), R_(MatX::Zero(Q_.cols(), Q_.cols())) {}
 
     // Append a column. Return false if the set spans it.
     bool append(const VecX& column) {

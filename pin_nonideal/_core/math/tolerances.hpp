@@ -34,7 +34,7 @@ constexpr double min_directed_speed = 1e-9;
 // --- Forces and accelerations
 // Rounding of accelerations, relative to their scale.
 constexpr double relative_acceleration_rounding = 1e-12;
-// Acceleration of a tree at rest that counts as rounding, relative to that without forces.
+// Acceleration of a tree at rest that counts as rounding, relative to the acceleration without forces.
 constexpr double tree_acceleration_rounding = 1e-9;
 // Minimum response to a force under constraints, relative to its free response. Smaller responses are rounding.
 constexpr double min_constrained_response = 1e-13;

@@ -48,24 +48,24 @@ struct RunSamples {
 // take longer than the copy.
 struct PaddedArray {
     std::vector<double> RunSamples::* field;
-    size_t n, most;
+    size_t n, max_samples;
     double* to;
     Numbers numbers;
 
-    PaddedArray(std::vector<double> RunSamples::* field, size_t n, size_t runs, size_t most)
-        : field(field), n(n), most(most), to(new double[std::max<size_t>(1, runs * most * n)]) {
+    PaddedArray(std::vector<double> RunSamples::* field, size_t n, size_t runs, size_t max_samples)
+        : field(field), n(n), max_samples(max_samples), to(new double[std::max<size_t>(1, runs * max_samples * n)]) {
         const nb::capsule owner(to, [](void* data) noexcept { delete[] static_cast<double*>(data); });
-        numbers = Numbers(to, {runs * most * n}, owner);
+        numbers = Numbers(to, {runs * max_samples * n}, owner);
     }
     // Write runs from number `first` on, with NaN after the last sample of a run.
     void copy(const RunSamples& some, size_t first) const {
         const double* from = (some.*field).data();
-        double* at = to + first * most * n;
+        double* at = to + first * max_samples * n;
         for (const double samples : some.samples) {
             const size_t own = static_cast<size_t>(samples) * n;
-            std::fill(std::copy_n(from, own, at), at + most * n, NAN);
+            std::fill(std::copy_n(from, own, at), at + max_samples * n, NAN);
             from += own;
-            at += most * n;
+            at += max_samples * n;
         }
     }
 };
@@ -122,18 +122,18 @@ std::vector<RunSamples> run_all(const Program& p, const Array2& q, const Array2&
 nb::tuple rollout_arrays(const Program& p, const Array2& q, const Array2& v, const Options& options, int threads,
                          const std::vector<NumberTuple>& names, const Array2& values) {
     std::vector<RunSamples> all = run_all(p, q, v, options, threads, names, values);
-    size_t most = 0;
+    size_t max_samples = 0;
     nb::list stopped;
     std::vector<size_t> first{0};
     for (const RunSamples& some : all) {
-        for (const double samples : some.samples) most = std::max(most, static_cast<size_t>(samples));
+        for (const double samples : some.samples) max_samples = std::max(max_samples, static_cast<size_t>(samples));
         for (const RunSamples::Stop& each : some.stopped) stopped.append(nb::make_tuple(each.run, stop_reason(each)));
         first.push_back(first.back() + some.samples.size());
     }
     const size_t runs = q.shape(0), nq = p.mechanism.nq, nv = p.mechanism.nv;
-    const PaddedArray padded[] = {{&RunSamples::t, 1, runs, most},
-                                  {&RunSamples::q, nq, runs, most},
-                                  {&RunSamples::v, nv, runs, most}};
+    const PaddedArray padded[] = {{&RunSamples::t, 1, runs, max_samples},
+                                  {&RunSamples::q, nq, runs, max_samples},
+                                  {&RunSamples::v, nv, runs, max_samples}};
     std::atomic<bool> interrupted{false};
     share_out(all.size(), threads, interrupted, [&](size_t part, int) {
         for (const PaddedArray& each : padded) {

@@ -153,10 +153,10 @@ PN_INLINE void columns(const Joint& j, const Body& b, const JointMotion& other, 
 }  // namespace
 
 NativePass::NativePass(const Mechanism& m) : cos_sin(m.joints.size()), others(m), rest(VecX::Zero(m.nv)) {
-    int most = 0;
+    int max_dofs = 0;
     for (const Joint& j : m.joints)
-        if (j.kind == JointKind::other) most = std::max(most, j.nv);
-    motion.S.resize(most);
+        if (j.kind == JointKind::other) max_dofs = std::max(max_dofs, j.nv);
+    motion.S.resize(max_dofs);
 }
 
 // The functions below are compiled twice, for mechanisms with deep trees and without. The second version has no checks

@@ -31,8 +31,8 @@ constexpr int most_undecided = 100, most_boxes = 20000;
 // Interval of a value: middle and radius.
 struct Interval {
     double middle, radius;
-    double least() const { return std::max(0.0, middle - radius); }
-    double most() const { return middle + radius; }
+    double lower() const { return std::max(0.0, middle - radius); }
+    double upper() const { return middle + radius; }
 };
 
 // Interval of a vector that is linear in the point, and its direction within `turn`. If the vector may vanish, the
@@ -95,10 +95,10 @@ struct Element {
     bool is_excluded(const Point& x, const Point& radius) const {
         const Interval limit = this->limit(x, radius).size;
         const VectorInterval own(force, x, radius), accelerated(response, x, radius);
-        if (may_stick && accelerated.length.least() == 0.0 && own.length.least() <= limit.most()) return false;
+        if (may_stick && accelerated.length.lower() == 0.0 && own.length.lower() <= limit.upper()) return false;
         const Short along = may_stick ? accelerated.along : direction;
         const double turn = may_stick ? accelerated.turn : 0.0;
-        return (own.middle + limit.middle * along).norm() > own.length.radius + limit.radius + turn * limit.most();
+        return (own.middle + limit.middle * along).norm() > own.length.radius + limit.radius + turn * limit.upper();
     }
 
     // Return the residual of the equation in the middle of a box. `slopes` bounds its derivatives anywhere in the box.
@@ -109,7 +109,7 @@ struct Element {
             return force * x + limit.size.middle * direction;
         }
         const VectorInterval point(asked, x, radius);
-        const bool inside = point.length.least() <= limit.size.most(), outside = point.length.most() >= limit.size.least();
+        const bool inside = point.length.lower() <= limit.size.upper(), outside = point.length.upper() >= limit.size.lower();
         if (inside) slopes = {response, Rows::Zero(dim, x.size())};
         if (outside && inside) slopes.join(slope_outside(point, limit));
         else if (outside) slopes = slope_outside(point, limit);
@@ -119,9 +119,9 @@ struct Element {
 
     // Return the derivatives of x - limit p / |p|, with p = x - rho alpha beyond the limit.
     Slopes slope_outside(const VectorInterval& p, const Limit& limit) const {
-        const double most = std::min(1.0, limit.size.most() / std::max(p.length.least(), 1e-300));
-        const double least = std::min(most, limit.size.least() / p.length.most());
-        const double part = 0.5 * (most + least), part_radius = 0.5 * (most - least);
+        const double upper = std::min(1.0, limit.size.upper() / std::max(p.length.lower(), 1e-300));
+        const double lower = std::min(upper, limit.size.lower() / p.length.upper());
+        const double part = 0.5 * (upper + lower), part_radius = 0.5 * (upper - lower);
         const Rows steep = limit.slopes.middle, steep_radius = limit.slopes.radius;
         Slopes out{force - p.along * steep,
                    p.along.cwiseAbs() * steep_radius +
@@ -129,7 +129,7 @@ struct Element {
         if (dim == 1) return out;
         const Turned across = Turned::Identity(dim, dim) - p.along * p.along.transpose();
         const Turned across_radius =
-            part_radius * across.cwiseAbs() + 2.0 * most * p.turn * Turned::Ones(dim, dim);
+            part_radius * across.cwiseAbs() + 2.0 * upper * p.turn * Turned::Ones(dim, dim);
         out.middle -= part * across * asked;
         out.radius += across_radius * asked.cwiseAbs();
         return out;

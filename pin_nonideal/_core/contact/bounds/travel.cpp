@@ -50,14 +50,14 @@ void TravelState::add_bodies() {
     add(body_step, body);
     add(joint_step, joint);
     add(turn_step, turn);
-    most = scene = (scene + scene_step) * rounded_up;
+    max_total = scene = (scene + scene_step) * rounded_up;
 }
 
 void TravelState::add_step() {
     if (summed) return add_bodies();
     add(slid_step, slid);
     add(turned_step, turned);
-    most = (most + max_step) * rounded_up;
+    max_total = (max_total + max_step) * rounded_up;
 }
 
 TravelBound::TravelBound(const Program& program)
@@ -163,7 +163,7 @@ void TravelBound::step(const Terms& terms, const VecX& speed, double h, TravelSt
     travel.max_step *= joints_rounded_up;
 }
 
-// Propagate along the tree: the travel of a body is that of its parent plus that of its joint.
+// Propagate along the tree: the travel of a body is the travel of its parent plus the travel of its joint.
 void TravelBound::spread(const std::vector<double>& slid, const std::vector<double>& turned, TravelState& travel) const {
     travel.scene_step = 0.0;
     for (const Moved& moved : moved_) {

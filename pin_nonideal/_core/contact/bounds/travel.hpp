@@ -21,7 +21,7 @@ struct TravelState {
     // Travel over the current step. Entries of bodies are valid only if `summed`.
     std::vector<double> body_step, joint_step, turn_step, slid_step, turned_step;
     double scene_step = 0.0;
-    double most = 0.0, max_step = 0.0;  // upper bounds of the scene's travel: total, and over the step
+    double max_total = 0.0, max_step = 0.0;  // upper bounds of the scene's travel: total, and over the step
     bool summed = false;
 
     // Add the travel of the step to the totals.

@@ -250,10 +250,10 @@ Strike strike_contacts(System& system, double t, VecX& y, bool starts, bool boun
     return out;
 }
 
-void remember_directions(System& system, std::vector<double>& slip, int arrived) {
+void remember_directions(System& system, std::vector<double>& slip, int stopped_element) {
     Workspace& w = system.w;
     const auto velocity = [&](int e) { return slip_velocity(w.now, system.p.frictions[e]); };
-    const double least = arrived < 0 ? directed_slip : std::max(directed_slip, velocity(arrived).norm());
+    const double least = stopped_element < 0 ? directed_slip : std::max(directed_slip, velocity(stopped_element).norm());
     for (int e : w.now.loaded) {
         const Friction& f = system.p.frictions[e];
         if (w.state.is_sticking_deferred[e] && !hardly_moves(system, e)) w.state.is_sticking_deferred[e] = 0;

@@ -42,7 +42,7 @@ bool turning(const System& system);
 Event::Kind kind_of_change(Mode before, Mode after);
 
 // Store the slip directions at a step's end for the next step, and the slip speeds in `slip`. The remaining slip of an
-// element that has `arrived` at rest is an error of the step. Slip up to this speed does not change a direction.
-void remember_directions(System& system, std::vector<double>& slip, int arrived = -1);
+// element that has `stopped_element` at rest is an error of the step. Slip up to this speed does not change a direction.
+void remember_directions(System& system, std::vector<double>& slip, int stopped_element = -1);
 
 }  // namespace pn

@@ -130,7 +130,7 @@ void GapWatch::step(const VecX& speed, double h) {
     unseen_.clear();
     TravelState& here = gaps.travel;
     travel.step(w.now.terms, speed, h, here);
-    if (here.most + watch_steps_ahead * here.max_step < gaps.ask) return;
+    if (here.max_total + watch_steps_ahead * here.max_step < gaps.ask) return;
     travel.sum_up(here);
     if (!(here.scene + watch_steps_ahead * here.scene_step < gaps.ask)) ask_far();
 }

@@ -19,8 +19,8 @@ constexpr double as_fast = 0.8, much_faster = 100.0;
 // decade takes ten times as long, and near a singular position it is shorter.
 constexpr long min_decade_steps = 1000;
 constexpr double longer = 5.0;
-// Maximum growth in one fixed step that counts. Faster growth comes from the method: the step is too long, and the
-// motion overflows.
+// Maximum growth in one fixed step that is attributed to the motion. Faster growth comes from the method: the step is
+// too long, and the motion overflows.
 constexpr double growth_in_step = 0.1;
 // Speed [rad/s or m/s] that no mechanism has. A run of fixed steps ends at this speed, before its motion overflows.
 constexpr double impossible_speed = 1e12;

@@ -31,9 +31,9 @@ static void fields(Archive& a, RunState& x) {
 
 static void fields(Archive& a, TravelState& x) {
     auto& [body, joint, turn, scene, lever, slid_until, placed, slid, turned, body_step, joint_step, turn_step, slid_step,
-           turned_step, scene_step, most, max_step, summed] = x;
+           turned_step, scene_step, max_total, max_step, summed] = x;
     a(body, joint, turn, scene, lever, slid_until, placed, slid, turned, body_step, joint_step, turn_step, slid_step,
-      turned_step, scene_step, most, max_step, summed);
+      turned_step, scene_step, max_total, max_step, summed);
 }
 
 static void fields(Archive& a, GapState& x) {

@@ -85,7 +85,7 @@ bool ContactProjection::is_open(const Program& p, const Workspace& w) const {
                        [&](int i) { return !is_bare(p, i) && std::abs(gap_width(p, w, i)) > allowed; });
 }
 
-// Open closed contacts whose gap other contacts keep open. Return true if there are any.
+// Open closed contacts whose gap other contacts keep open. Return true if a contact opens.
 bool ContactProjection::open_blocked_contacts(const Program& p, Workspace& w) {
     const double allowed = max_projected_gap * scene_size(p, w);
     const auto is_apart = [&](int i) { return !is_bare(p, i) && gap_width(p, w, i) > allowed; };
