@@ -114,18 +114,18 @@ def flag(what: str, value: object) -> bool:
     return bool(value)
 
 
-def count(what: str, value: object, *, least: int = 0, most: int = 1_000_000_000) -> int:
-    """Return an integer from `least` to `most`.
+def count(what: str, value: object, *, min_value: int = 0, max_value: int = 1_000_000_000) -> int:
+    """Return an integer from `min_value` to `max_value`.
 
     Raises:
         InputError: `value` is no integer, too small or too large.
     """
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
         raise InputError(f"{what} must be an integer; got {short_repr(value)}")
-    if value < least:
-        raise InputError(f"{what} must be at least {least}; got {value}")
-    if value > most:
-        raise InputError(f"{what} must be at most {most}; got {value}")
+    if value < min_value:
+        raise InputError(f"{what} must be at least {min_value}; got {value}")
+    if value > max_value:
+        raise InputError(f"{what} must be at most {max_value}; got {value}")
     return int(value)
 
 

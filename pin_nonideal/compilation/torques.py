@@ -92,10 +92,10 @@ def sum_of_torques(parts: Sequence[Part], drives: Sequence[object], model: Model
     )
     if periods:
         _require_steady(parts, drives)
-    late = SAMPLE_ROUNDING * periods[0] if periods else 0.0
+    time_shift = SAMPLE_ROUNDING * periods[0] if periods else 0.0
     linear = [part for part in parts if periods and isinstance(part, TimedTorque) and not part.held]
     functions = [
-        _function_of(part, model, late) for part in parts if not any(part is table for table in linear)
+        _function_of(part, model, time_shift) for part in parts if not any(part is table for table in linear)
     ]
 
     def total(t: float, q: Array, v: Array) -> Array:
@@ -166,12 +166,12 @@ def _sum_of_springs(springs: Sequence[Spring], model: Model) -> Spring:
     return Spring(np.sum([s.kp for s in springs], axis=0), np.sum([s.kd for s in springs], axis=0), q)
 
 
-def _function_of(part: Part, model: Model, late: float) -> Callable[..., object]:
-    """Return the torques of a part as a function (t, q, v) -> tau; a table is read `late` [s] after t."""
+def _function_of(part: Part, model: Model, time_shift: float) -> Callable[..., object]:
+    """Return the torques of a part as (t, q, v) -> tau; tables are read `time_shift` [s] after t."""
     if isinstance(part, TorqueFunction):
         return part.function
     if isinstance(part, TimedTorque):
-        return lambda t, q, v: _table_torque(part, t + late)
+        return lambda t, q, v: _table_torque(part, t + time_shift)
     if isinstance(part, ConstantTorque):
         return lambda t, q, v: part.tau
     return lambda t, q, v: part.kp * pin.difference(model, q, part.q) - part.kd * v

@@ -88,7 +88,7 @@ class SampledControl:
         function(f"{who}: function", self.function, "(t, q, v) -> tau")
         object.__setattr__(self, "period", positive(f"{who}: period", self.period))
         object.__setattr__(self, "delay", nonnegative(f"{who}: delay", self.delay))
-        samples = count(f"{who}: delay_samples", self.delay_samples, most=MAX_DELAY)
+        samples = count(f"{who}: delay_samples", self.delay_samples, max_value=MAX_DELAY)
         object.__setattr__(self, "delay_samples", samples)
         if self.delay and samples:
             raise InputError(
@@ -258,9 +258,9 @@ def sample_times(who: str, values: object) -> Array:
     times = array(f"{who}: times", values, (None,))
     if times.size == 0:
         raise InputError(f"{who}: times must hold at least one sample; got none")
-    late = np.flatnonzero(np.diff(times) <= 0.0)
-    if late.size:
-        i = int(late[0])
+    disorder = np.flatnonzero(np.diff(times) <= 0.0)
+    if disorder.size:
+        i = int(disorder[0])
         raise InputError(
             f"{who}: times must increase; times[{i + 1}] = {times[i + 1]:g} does not follow "
             f"times[{i}] = {times[i]:g}"

@@ -366,7 +366,7 @@ class UserConstraint:
         _name(self)
         who = label(self)
         function(f"{who}: function", self.function, "(t, q, v, data) -> (A, b)")
-        object.__setattr__(self, "size", count(f"{who}: size", self.size, least=1, most=MAX_ROWS))
+        object.__setattr__(self, "size", count(f"{who}: size", self.size, min_value=1, max_value=MAX_ROWS))
         if self.residual is not None:
             function(f"{who}: residual", self.residual, "(t, q) -> phi")
         if self.rate is not None:

@@ -200,10 +200,10 @@ def ground_contacts(
             raise InputError(f"{who}: collision_model must have a shape on a moving body; it has none")
     else:
         shapes = _shapes_of_links(who, links, model, objects)
-    alone = [link for link in shapes.values() if link and list(shapes.values()).count(link) == 1]
+    single_links = [link for link in shapes.values() if link and list(shapes.values()).count(link) == 1]
     return [
         GeometryContact(
-            objects[i].name, ground, name=f"{link} on {below}" if link in alone else None, **rubbing
+            objects[i].name, ground, name=f"{link} on {below}" if link in single_links else None, **rubbing
         )
         for i, link in shapes.items()
     ]

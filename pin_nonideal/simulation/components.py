@@ -135,7 +135,7 @@ def _component(
     held = scene.actuation
     if isinstance(held, HoldPosition) and held.q is not None:
         held = replace(held, q=named_configuration(scene.model, held.q, scene.q0, "q")[q])
-    alone = Scene(
+    component_scene = Scene(
         model,
         constraints=[one for one in of_component if any(one is each for each in scene.constraints)],
         laws=[one for one in of_component if any(one is each for each in scene.laws)],
@@ -147,36 +147,36 @@ def _component(
         terms=scene.terms,
         assembly_tolerance=scene_origin(scene).assembly_tolerance,
     )
-    elements = [scene.element_names.index(name) for name in alone.element_names]
+    elements = [scene.element_names.index(name) for name in component_scene.element_names]
     powers = compiled_scene(scene).program.power_names
-    works = [powers.index(name) for name in compiled_scene(alone).program.power_names]
-    return Component(alone, q, v, np.array(elements, dtype=np.intp), np.array(works, dtype=np.intp))
+    works = [powers.index(name) for name in compiled_scene(component_scene).program.power_names]
+    return Component(component_scene, q, v, np.array(elements, dtype=np.intp), np.array(works, dtype=np.intp))
 
 
 def _separate_model(model: Model, joints: Sequence[int]) -> tuple[Model, Indices, Indices]:
     """Return some trees of a model as a separate model, and the indices of its q and v in the whole model."""
-    alone, number = pin.Model(), {0: 0}
-    alone.name, alone.gravity = model.name, model.gravity
+    component_model, number = pin.Model(), {0: 0}
+    component_model.name, component_model.gravity = model.name, model.gravity
     q: list[int] = []
     v: list[int] = []
     for joint in joints:
         kind = model.joints[joint]
         at_q, at_v = slice(kind.idx_q, kind.idx_q + kind.nq), slice(kind.idx_v, kind.idx_v + kind.nv)
-        number[joint] = alone.addJoint(
+        number[joint] = component_model.addJoint(
             number[model.parents[joint]], kind, model.jointPlacements[joint], model.names[joint]
         )
-        alone.appendBodyToJoint(number[joint], model.inertias[joint], pin.SE3.Identity())
-        added = alone.joints[number[joint]]
+        component_model.appendBodyToJoint(number[joint], model.inertias[joint], pin.SE3.Identity())
+        added = component_model.joints[number[joint]]
         to_q, to_v = slice(added.idx_q, added.idx_q + added.nq), slice(added.idx_v, added.idx_v + added.nv)
         for name in ("lowerPositionLimit", "upperPositionLimit"):
-            getattr(alone, name)[to_q] = getattr(model, name)[at_q]
+            getattr(component_model, name)[to_q] = getattr(model, name)[at_q]
         for name in ("armature", "rotorInertia", "rotorGearRatio", "damping", "friction"):
             if hasattr(model, name):
-                getattr(alone, name)[to_v] = getattr(model, name)[at_v]
+                getattr(component_model, name)[to_v] = getattr(model, name)[at_v]
         q.extend(range(at_q.start, at_q.stop))
         v.extend(range(at_v.start, at_v.stop))
     for frame in list(model.frames)[1:]:
-        if frame.parentJoint in number and not alone.existFrame(frame.name, frame.type):
+        if frame.parentJoint in number and not component_model.existFrame(frame.name, frame.type):
             joint = number[frame.parentJoint]
-            alone.addFrame(pin.Frame(frame.name, joint, 0, frame.placement, frame.type), False)
-    return alone, np.array(q, dtype=np.intp), np.array(v, dtype=np.intp)
+            component_model.addFrame(pin.Frame(frame.name, joint, 0, frame.placement, frame.type), False)
+    return component_model, np.array(q, dtype=np.intp), np.array(v, dtype=np.intp)

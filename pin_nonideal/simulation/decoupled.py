@@ -52,13 +52,13 @@ def run_together(
     """
     if program is not None and program is not compiled_scene(scene).program:
         return program.runner().simulate(q0, v0, options, **more)
-    idle: list[core.Runner] = scene.__dict__.setdefault("_idle_runners", [])
+    idle_runners: list[core.Runner] = scene.__dict__.setdefault("_idle_runners", [])
     try:
-        runner = idle.pop()
+        runner = idle_runners.pop()
     except IndexError:  # first run, or all workspaces are in use
         runner = compiled_scene(scene).program.runner()
     outcome = runner.simulate(q0, v0, options, **more)
-    idle.append(runner)
+    idle_runners.append(runner)
     return outcome
 
 

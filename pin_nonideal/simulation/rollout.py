@@ -123,7 +123,7 @@ def _threads(jobs: int) -> int:
     Raises:
         InputError: it is zero or no number of jobs.
     """
-    if count("rollout: jobs", jobs, least=-MAX_JOBS) == 0:
+    if count("rollout: jobs", jobs, min_value=-MAX_JOBS) == 0:
         raise InputError("rollout: jobs must not be zero; use 1 for no parallel jobs, -1 for all processors")
     return jobs if jobs > 0 else max(1, (os.cpu_count() or 1) + 1 + jobs)
 

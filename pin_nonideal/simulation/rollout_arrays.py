@@ -57,9 +57,9 @@ class RunArrays:
     def last(self) -> tuple[Array, Array]:
         """Configurations (n, nq) and velocities (n, nv) of each run's last sample; NaN without samples."""
         runs, at = np.arange(len(self)), np.maximum(self.samples - 1, 0)
-        none = self.samples == 0
+        is_empty = self.samples == 0
         q, v = self.q[runs, at], self.v[runs, at]
-        q[none], v[none] = np.nan, np.nan
+        q[is_empty], v[is_empty] = np.nan, np.nan
         return q, v
 
     def among(self, n: int, runs: NDArray[np.intp], errors: Mapping[int, PinNonidealError]) -> RunArrays:

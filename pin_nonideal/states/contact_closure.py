@@ -62,8 +62,8 @@ class UnilateralClosure(Search):
         known = iterate
         for _ in range(MAX_SETTLINGS):
             self._hold(np.zeros(0, dtype=int))
-            bare = self._place(iterate.q)
-            least = self._least(bare, bare.move)
+            free_iterate = self._place(iterate.q)
+            least = self._least(free_iterate, free_iterate.move)
             if least is None:
                 break
             self._hold(least.touching)

@@ -70,14 +70,14 @@ class Closure(NamedTuple):
         q: configuration, (nq,).
         gap: largest scaled residual.
         distance: distance from the start, in the metric of the mass matrix at the start.
-        settled: whether the distance is a local minimum.
+        is_minimum: whether the distance is a local minimum.
         iterations: total number of steps.
     """
 
     q: Array
     gap: float
     distance: float
-    settled: bool
+    is_minimum: bool
     iterations: int
 
 
@@ -181,11 +181,11 @@ class Search:
                 same = True
             often += same
         if best is not None:
-            alone = fallback is None or fallback.distance >= best.distance
-            known = best.settled and alone and (often > 1 or not further)
+            is_nearer = fallback is None or fallback.distance >= best.distance
+            known = best.is_minimum and is_nearer and (often > 1 or not further)
             return best._replace(iterations=self.iterations), known
         if fallback is not None:
-            return fallback._replace(iterations=self.iterations), fallback.settled
+            return fallback._replace(iterations=self.iterations), fallback.is_minimum
         lacking = self._lacking(open_iterate)
         return Closure(open_iterate.q, lacking, self._distance(open_iterate), False, self.iterations), False
 
@@ -289,14 +289,14 @@ class Search:
 
     def _settle(self, iterate: Iterate) -> Closure:
         """Descend to a local minimum of the distance; return the start if the descent ends at a corner."""
-        end, settled = self._slide(iterate)
-        if not settled and self._has_corner(end):
+        end, is_minimum = self._slide(iterate)
+        if not is_minimum and self._has_corner(end):
             end = iterate
-        return Closure(end.q, end.gap, self._distance(end), settled, self.iterations)
+        return Closure(end.q, end.gap, self._distance(end), is_minimum, self.iterations)
 
     def _slide(self, iterate: Iterate) -> tuple[Iterate, bool]:
         """Apply Newton's method for the Lagrangian in the open directions; return if it ends in a minimum."""
-        settled = False
+        is_minimum = False
         for _ in range(SLIDES):
             U, s, Vt = row_singular_values(iterate.B)
             open_directions = complement(Vt)
@@ -305,7 +305,7 @@ class Search:
             flat = np.linalg.norm(slope) <= STATIONARY_SLOPE * self._distance(iterate) + ROUNDING * self.size
             curvature, directions = self._curvature(iterate, lam, open_directions)
             if flat and curvature.min(initial=1.0) >= -SADDLE:
-                settled = len(curvature) <= MANY_FREEDOMS
+                is_minimum = len(curvature) <= MANY_FREEDOMS
                 break
             self.iterations += 1
             if flat:
@@ -317,10 +317,10 @@ class Search:
                 trial = self._downhill(iterate, x, float(np.linalg.norm(slope)))
             if trial is None:
                 # Neither distance nor slope decreases, so the remaining slope may be rounding.
-                settled = bool(np.linalg.norm(slope) <= 1e3 * STATIONARY_SLOPE * self._distance(iterate))
+                is_minimum = bool(np.linalg.norm(slope) <= 1e3 * STATIONARY_SLOPE * self._distance(iterate))
                 break
             iterate = trial
-        return iterate, settled
+        return iterate, is_minimum
 
     def _has_corner(self, iterate: Iterate) -> bool:
         """Check if row directions change abruptly, as for a disk that lies flat."""

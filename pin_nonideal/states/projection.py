@@ -61,7 +61,7 @@ class Projection:
         model: pinocchio.Model.
         program: the core's program.
         q0: configuration that defines the length of the mechanism if its model has no lengths, (nq,).
-        idle: names of contacts that no joint moves.
+        immovable_contacts: names of contacts that no joint moves.
         is_start: whether a run may start at q0. If not, user functions are not called at q0, and the first
             start defines the length.
 
@@ -75,14 +75,14 @@ class Projection:
         model: Model,
         program: core.Program,
         q0: Array,
-        idle: Collection[str] = (),
+        immovable_contacts: Collection[str] = (),
         is_start: bool = True,
     ) -> None:
         self.model, self.program = model, program
         self._slides = slides(model)
         self._chain = chain(model)
         self._measured = self._chain > 0.0 or is_start
-        self._gaps = gap_rows(program, idle)
+        self._gaps = gap_rows(program, immovable_contacts)
         self._loops = holonomic_rows(program)
         self._measure(self._chain or (self._length_at(q0) if self._measured else 0.0))
         self._has_gaps = bool(self._gaps.any())
@@ -141,13 +141,13 @@ class Projection:
         phi = rows_at(runner, q, v, t)[2]
         refuse_deep_starts(phi, self.program, MAX_PENETRATION * min(1.0, self.length), t)
         on, v_on, before, after, rate = runner.project(q, v, t, self._reached())
-        iterations, nearest, met = 0, True, after <= self._closed
-        if not (met and self._is_nearby(q, on) and self._stays_outside(runner, q, on, t)):
-            closure, nearest = self._search(runner, q, t, on if met else None)
+        iterations, nearest, is_closed = 0, True, after <= self._closed
+        if not (is_closed and self._is_nearby(q, on) and self._stays_outside(runner, q, on, t)):
+            closure, nearest = self._search(runner, q, t, on if is_closed else None)
             iterations = closure.iterations
             on, v_on, after, rate = self._polished(runner, closure.q, v, t)
-            met = after <= self._closed or closure.gap <= CLOSURE_TOLERANCE
-            self._require_met(runner, q, closure.q, met, nearest, t)
+            is_closed = after <= self._closed or closure.gap <= CLOSURE_TOLERANCE
+            self._require_met(runner, q, closure.q, is_closed, nearest, t)
         if held.q is not None and held.q.any():
             on, search = self._hold(runner, q, on, held.q, held.firm_q, t)
             if search is not None:
@@ -208,7 +208,7 @@ class Projection:
         return with_entries(self.model, on, q, held & ~moved_mask(self.model, q, on, self.unit)), search
 
     def _require_met(
-        self, runner: core.Runner, q: Array, projected: Array, met: bool, nearest: bool, t: float
+        self, runner: core.Runner, q: Array, projected: Array, is_closed: bool, nearest: bool, t: float
     ) -> None:
         """Check that a search ended on the constraints, and near its start if only contacts were violated.
 
@@ -216,7 +216,7 @@ class Projection:
             runner: a workspace of the core.
             q: start of the search, (nq,).
             projected: end of the search, (nq,).
-            met: whether all constraints are satisfied at the end.
+            is_closed: whether all constraints are satisfied at the end.
             nearest: whether the search confirms the end as nearest.
             t: time [s].
 
@@ -227,9 +227,9 @@ class Projection:
         phi, now = self._residuals(runner, q, t), self._residuals(runner, projected, t)
         inside = not self._is_outside(q, phi) and largest_loop_gap(phi, self.program) <= self._closed
         far = (np.abs(pin.difference(self.model, q, projected)) > FAR_MOVE * self.unit).any()
-        if inside and (not met or (far and not nearest)):
+        if inside and (not is_closed or (far and not nearest)):
             raise penetration_error(phi, self.program, t)
-        if not met:
+        if not is_closed:
             raise open_loops(now, self.program, t)
 
     def _polished(

@@ -107,7 +107,7 @@ def equilibrium(
     downhill = choice("equilibrium: stable", stable, (True, False))
     still = np.zeros(scene.model.nv)
     torque = None if tau is None else named_velocity(scene.model, tau, still, "equilibrium: tau")
-    time, attempts = number("equilibrium: t", t), count("equilibrium: starts", starts, least=1)
+    time, attempts = number("equilibrium: t", t), count("equilibrium: starts", starts, min_value=1)
     start = scene.project(q, still, time)[0]
     search = _Search(AtRest(scene, torque, time, start), downhill)
     best: Equilibrium | None = None
@@ -154,8 +154,8 @@ class _Search:
         for _ in range(MAX_STEPS):
             self.note(q, now)
             stiffness = self.stiffness(q, now)
-            move, distance, unopposed = self.move(q, now, stiffness)
-            if distance <= CONVERGED_STEP and not unopposed:
+            move, distance, is_unopposed = self.move(q, now, stiffness)
+            if distance <= CONVERGED_STEP and not is_unopposed:
                 q, now = self.polished(q, now, move)
                 return self.result(q, now, self.stiffness(q, now), start)
             size = float(np.abs(move / self.unit).max(initial=0.0))

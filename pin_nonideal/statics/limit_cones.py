@@ -214,8 +214,8 @@ class LimitCones:
         limits += [(0.0, None)] * several
         for first in self.contacts:
             limits[first] = (0.0 if pressing else None, None)
-        for idle in self.open:
-            limits[idle] = (0.0, 0.0)
+        for open_element in self.open:
+            limits[open_element] = (0.0, 0.0)
         rows = [np.append(row, -np.eye(several)[k]) for (row, _), k in zip(bounds, owners, strict=True)]
         optimum = linprog(
             np.append(np.zeros(self.count), np.ones(several)),
@@ -281,8 +281,8 @@ class LimitCones:
         limits.append((0.0, most if sign else None))
         for first in self.contacts:
             limits[first] = (0.0, None)
-        for idle in self.open:
-            limits[idle] = (0.0, 0.0)
+        for open_element in self.open:
+            limits[open_element] = (0.0, 0.0)
         if not self.holds:
             return np.inf, np.zeros(self.count)
         goal = np.zeros(self.count + 1)

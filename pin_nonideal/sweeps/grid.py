@@ -53,7 +53,7 @@ def sweep_samples(
     Raises:
         InputError: an argument is invalid.
     """
-    number = count("sweep_samples: n", n, least=1)
+    number = count("sweep_samples: n", n, min_value=1)
     choice("sweep_samples: kind", kind, ("sobol", "latin", "halton", "random"))
     count("sweep_samples: seed", seed)
     if not ranges:

@@ -96,7 +96,7 @@ def sweep(
                 f"sweep: parameters must hold mappings of keyword arguments; got {short_repr(entry)}"
             )
     length = positive("sweep: duration", duration)
-    if jobs is not None and count("sweep: jobs", jobs, least=-MAX_JOBS, most=MAX_JOBS) == 0:
+    if jobs is not None and count("sweep: jobs", jobs, min_value=-MAX_JOBS, max_value=MAX_JOBS) == 0:
         raise InputError("sweep: jobs must not be zero; leave it out for joblib's choice")
     if options.get("checkpoint") is not None:
         raise InputError("sweep: checkpoint is the file of one run; its runs would overwrite one another's")

@@ -81,8 +81,8 @@ class DenseOutput:
         """
         if len(t) and not (len(self) and self.times[0, 0] <= t.min() and t.max() <= self.times[-1, 1]):
             span = f"{self.times[0, 0]:g} to {self.times[-1, 1]:g} s" if len(self) else "no time"
-            late = t.max() if len(self) and self.times[0, 0] <= t.min() else t.min()
-            raise InputError(f"at: t must lie in the run, which took {span}; got {late:g} s")
+            outside_time = t.max() if len(self) and self.times[0, 0] <= t.min() else t.min()
+            raise InputError(f"at: t must lie in the run, which took {span}; got {outside_time:g} s")
         sizes = (self.states.shape[2], self.modes.shape[1], len(self.torque) and self.torque.shape[1])
         program, nv = compiled_scene(scene).program, scene.model.nv
         work = len(program.power_names) if self.options.energy else 0

@@ -233,7 +233,7 @@ class Trajectory(RunFields):
         Raises:
             InputError: `count` is not a number of samples.
         """
-        count = whole_number("first: count", count, most=len(self.t))
+        count = whole_number("first: count", count, max_value=len(self.t))
         last = float(self.t[count - 1]) if count else -np.inf
         events = [e for e in self.events if e.time <= last]
         return dataclasses.replace(self.samples(slice(count)), events=events)

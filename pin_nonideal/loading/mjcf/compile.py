@@ -159,7 +159,7 @@ def _assets(
     assets = [*spec.meshes, *spec.hfields]
     homes = [Path(spec.modelfiledir or "."), *_homes(path)]
     places = {_shape(asset): _place(spec, asset, homes) for asset in assets if asset.file}
-    lost = {shape for shape, place in places.items() if place is None}
+    missing_shapes = {shape for shape, place in places.items() if place is None}
     broken = {_shape(a) for a in assets if probe and not _is_readable(mujoco, a, places.get(_shape(a)))}
     files = {_shape(asset): asset.file for asset in assets}
     absent, unread = [], []
@@ -169,12 +169,12 @@ def _assets(
         if not shape:
             continue
         if _carries_mass(mujoco, spec, geom) or geom.name in wrapping:
-            if shape in lost:  # MuJoCo rejects undeclared assets and broken files itself
+            if shape in missing_shapes:  # MuJoCo rejects undeclared assets and broken files itself
                 raise LoadingError(
                     f'"{path}": body "{geom.parent.name}" has its mass from mesh "{files[shape]}", which was '
                     "not found; put the mesh there or give the body an <inertial>"
                 )
-        elif shape in lost | broken:
+        elif shape in missing_shapes | broken:
             absent.append(geom)
         elif not meshes:
             unread.append(geom)
@@ -183,8 +183,8 @@ def _assets(
         geom.meshname = geom.hfieldname = ""
         geom.plugin.active, geom.mass = False, 0.0
     _drop_unused(spec)
-    for shape in (s for s in files if s in lost | broken):
-        what = "was not found" if shape in lost else "cannot be read"
+    for shape in (s for s in files if s in missing_shapes | broken):
+        what = "was not found" if shape in missing_shapes else "cannot be read"
         notes.append(f'mesh "{files[shape]}" {what}; its shape is left out')
     return absent, unread
 

@@ -37,9 +37,9 @@ def mass_diagnosis(model: Model, q: ArrayLike | None = None) -> str | None:
     M = runner.terms(q, np.zeros(model.nv))[0].reshape(model.nv, model.nv)
     diagonal = M.diagonal()
     largest = float(diagonal.max())
-    bare = [i for i in range(model.nv) if not diagonal[i] > MIN_EIGENVALUE**2 * max(largest, 0.0)]
-    if bare:
-        joints = _joints_of(model, bare)
+    weightless_dofs = [i for i in range(model.nv) if not diagonal[i] > MIN_EIGENVALUE**2 * max(largest, 0.0)]
+    if weightless_dofs:
+        joints = _joints_of(model, weightless_dofs)
         return (
             f"{_quote('joint', [model.names[j] for j in joints])} {'moves' if len(joints) == 1 else 'move'} "
             f"no inertia: give {_quote('link', _links_beyond(model, joints))} a mass and a moment of "

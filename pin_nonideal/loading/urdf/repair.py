@@ -75,15 +75,19 @@ def _remove_foreign(root: ElementTree.Element) -> list[str]:
 
 def _remove_stray_shapes(root: ElementTree.Element) -> list[str]:
     """Remove elements of a `<geometry>` other than its shape."""
-    lost: dict[str, None] = {}
+    ignored_elements: dict[str, None] = {}
     for link in root.findall("link"):
         for geometry in (g for kind in ("visual", "collision") for g in link.findall(f"{kind}/geometry")):
             stray = [e for e in geometry if e.tag not in SHAPES]
             if len(geometry) - len(stray) == 1:
                 for element in stray:
                     geometry.remove(element)
-                    lost[f'<{element.tag}> in link "{link.get("name")}"'] = None
-    return [f"elements beside the shape of a <geometry> are not read: {', '.join(lost)}"] if lost else []
+                    ignored_elements[f'<{element.tag}> in link "{link.get("name")}"'] = None
+    return (
+        [f"elements beside the shape of a <geometry> are not read: {', '.join(ignored_elements)}"]
+        if ignored_elements
+        else []
+    )
 
 
 def _world(root: ElementTree.Element) -> list[str]:

@@ -154,9 +154,9 @@ def _closest(program: core.Program, q: Array, v: Array, t: Array, far: float) ->
     Newton's method starts from residuals up to `far`; others are returned as they are.
     """
     if not any(block.moves_in_time for block in program.constraints):
-        none: Any = np.zeros((len(q), 0))
+        no_values: Any = np.zeros((len(q), 0))
         closed, _, after, _ = core.nearest_states(
-            program, q, v, t=float(t[0]), far=far, threads=1, names=[], values=none
+            program, q, v, t=float(t[0]), far=far, threads=1, names=[], values=no_values
         )
         return np.array(closed).reshape(q.shape), np.asarray(after)
     projected, residual, runner = q.copy(), np.full(len(q), np.nan), program.runner()

@@ -211,8 +211,10 @@ class _Frames:
     def _divisible(self) -> NDArray[np.bool_]:
         """Return the intervals with a positive length and sufficient sampling."""
         last = len(self.well_sampled) - 1
-        alone = self.before[:-1] == np.where(self.part[1:] == 0.0, self.before[1:] - 1, self.before[1:])
-        is_resolved = ~alone | (self.well_sampled[np.clip(self.before[:-1], 0, last)] if last >= 0 else False)
+        is_adjacent = self.before[:-1] == np.where(self.part[1:] == 0.0, self.before[1:] - 1, self.before[1:])
+        is_resolved = ~is_adjacent | (
+            self.well_sampled[np.clip(self.before[:-1], 0, last)] if last >= 0 else False
+        )
         return np.asarray((np.diff(self.times()) > 1e-12 * (1.0 + abs(self.t[-1]))) & is_resolved)
 
     def _middle(self, where: NDArray[np.int64]) -> tuple[NDArray[np.int64], Array]:

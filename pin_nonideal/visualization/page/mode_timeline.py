@@ -51,9 +51,9 @@ def bands_of(run: Trajectory) -> list[tuple[str, Bands]]:
     """
     named_bands: list[tuple[str, Bands]] = []
     if run.modes is not None:
-        met = np.any(np.asarray(run.modes) != OPEN, axis=0)
+        is_ever_closed = np.any(np.asarray(run.modes) != OPEN, axis=0)
         struck = {str(event.element) for event in run.events}
-        named = zip(run.element_names, mode_bands(run.t, run.modes), met, strict=True)
+        named = zip(run.element_names, mode_bands(run.t, run.modes), is_ever_closed, strict=True)
         named_bands = [(name, bands) for name, bands, meets in named if meets or name in struck]
     closed = getattr(run, "closed", None)
     if closed is None:

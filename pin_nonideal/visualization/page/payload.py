@@ -73,7 +73,7 @@ def packed_runs(
     finer, motion = known[0]
     stage("shapes")
     ends = [(m.joint1, m.point1) for m in marks] + [(m.joint2, m.point2) for m in marks]
-    visuals, bare = _drawn(scene, motion, ends)
+    visuals, has_no_shapes = _drawn(scene, motion, ends)
     visuals = visuals + contact_surfaces(finer, motion, visuals, up_direction(model))
     guides = guides_of(finer, motion)
     shapes = Shapes(payload)
@@ -108,7 +108,7 @@ def packed_runs(
             for mark in [*marks, *contact_point_marks(touches, motion, marks)]
         ],
         "guides": [_stored_guide(payload, guide) for guide in guides],
-        "trails": [{"joint": j, "point": point} for j, point in _trails(model, guides, bare)],
+        "trails": [{"joint": j, "point": point} for j, point in _trails(model, guides, has_no_shapes)],
         "arrows": [_stored_arrow(payload, motion, arrow) for arrow in arrows],
         "plots": _plots(payload, runs, [one for one, _ in known], names, curves, rounding),
         "events": _events(payload, run),
@@ -242,10 +242,10 @@ def _joints(payload: Payload, model: pin.Model, motion: Motion) -> list[Table]:
     return joints
 
 
-def _trails(model: pin.Model, guides: list[Guide], bare: bool) -> list[tuple[int, list[float]]]:
+def _trails(model: pin.Model, guides: list[Guide], has_no_shapes: bool) -> list[tuple[int, list[float]]]:
     """Return the points with drawn paths: points on guides, and the ends of a model without shapes."""
     trails = {guide.joint: guide.point.tolist() for guide in guides}
-    for joint in range(1, model.njoints) if bare else ():
+    for joint in range(1, model.njoints) if has_no_shapes else ():
         if not len(model.children[joint]):
             trails.setdefault(joint, np.asarray(model.inertias[joint].lever).tolist())
     return list(trails.items())

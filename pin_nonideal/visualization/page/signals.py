@@ -211,8 +211,8 @@ def _in_joints(title: str, model: pin.Model, t: Array, tau: Array) -> list[Plot]
             name, unit = str(model.names[joint]), "N m" if joint_axis(model, joint)[1] else "N"
             torques.append(Coordinate(name, name, unit, tau[:, model.joints[joint].idx_v]))
     acting = [c for c in torques if np.any(c.values)] or torques
-    idle = len(torques) - len(acting)
-    note = f"zero in {idle} other joint{'s' if idle > 1 else ''}" if idle else ""
+    zero_count = len(torques) - len(acting)
+    note = f"zero in {zero_count} other joint{'s' if zero_count > 1 else ''}" if zero_count else ""
     plots = _by_unit(title, t, acting)
     return [replace(plot, note=", ".join(filter(None, [plot.note, note]))) for plot in plots]
 

@@ -7,7 +7,7 @@ namespace pn {
 namespace {
 
 constexpr int max_flight_newton = 20;    // Newton steps for the angular velocity
-constexpr double turn_rounding = 1e-15;  // change of the angular velocity that counts as rounding, relative to the angular velocity
+constexpr double turn_rounding = 1e-15;  // change that counts as rounding, relative to the angular velocity
 
 using Eigen::Matrix3d;
 using Eigen::Quaterniond;
