@@ -2,8 +2,8 @@
 
 const ICONS = { play: "M7 4.5v15l13-7.5z", pause: "M6 5h4v14H6zM14 5h4v14h-4z" };
 const SPEEDS = Array.from({ length: 27 }, (_, i) => Number(`${[1, 2, 5][i % 3]}e${Math.floor(i / 3) - 4}`)).slice(0, 25);
-const LEAST_CURVE = 100; // minimum height of a curve [pixels]
-const PLAYED = [5, 15]; // shortest and longest duration of playback at the default speed [s]
+const MIN_CURVE_HEIGHT = 100; // minimum height of a curve [pixels]
+const PLAY_SECONDS = [5, 15]; // shortest and longest duration of playback at the default speed [s]
 const element = (id) => document.getElementById(id);
 
 class Player {
@@ -35,8 +35,8 @@ class Player {
 
   /** Speed at which the run takes 5 to 15 s; 1 if its duration is in this range. */
   usualSpeed() {
-    const length = this.end - this.start, fits = (speed) => length / speed >= PLAYED[0] && length / speed <= PLAYED[1];
-    return !(length > 0) || fits(1) ? 1 : SPEEDS.find(fits) || (length / SPEEDS[0] < PLAYED[0] ? SPEEDS[0] : SPEEDS[SPEEDS.length - 1]);
+    const length = this.end - this.start, fits = (speed) => length / speed >= PLAY_SECONDS[0] && length / speed <= PLAY_SECONDS[1];
+    return !(length > 0) || fits(1) ? 1 : SPEEDS.find(fits) || (length / SPEEDS[0] < PLAY_SECONDS[0] ? SPEEDS[0] : SPEEDS[SPEEDS.length - 1]);
   }
 
   writeTexts() {
@@ -277,7 +277,7 @@ class Player {
     plots.style.removeProperty("--tall");
     if (!this.dock || !last || last.box.offsetTop !== this.plots[0].box.offsetTop) return;
     const more = plots.clientHeight - last.box.offsetTop + plots.offsetTop - last.box.offsetHeight;
-    plots.style.setProperty("--tall", `${Math.max(LEAST_CURVE, last.canvas.clientHeight + more)}px`);
+    plots.style.setProperty("--tall", `${Math.max(MIN_CURVE_HEIGHT, last.canvas.clientHeight + more)}px`);
   }
 
   resize() {
