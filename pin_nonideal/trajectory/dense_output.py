@@ -32,7 +32,7 @@ class DenseOutput:
         modes: modes of the friction elements during each step, (n, ne).
         directions: slip directions of the elements at the points of each step, (n, points, 3 ne), or without
             columns if each element slips along one direction. Steps that did not solve for directions store
-            those at their end.
+            the directions at their end.
         sought: whether each step solved for the slip direction of each element, as in slow slip, (n, ne).
         torque: torque that each step holds constant, (n, nv), NaN for steps without one; (0, nv) if no step
             has one.

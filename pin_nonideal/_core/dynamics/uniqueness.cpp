@@ -82,7 +82,7 @@ std::vector<VecX> motions_of(Unknowns& u, const ReactionEquation& equation, cons
     return list;
 }
 
-// Check if all sticking elements hold in the motion of a solution. If one slips, the motion has other modes.
+// Check if all sticking elements hold in the motion of a solution. If one of them slips, the motion has other modes.
 bool holds(Unknowns& u, const VecX& y) {
     const ReleasedZeroLoads free(u.w);
     u.set(y);
