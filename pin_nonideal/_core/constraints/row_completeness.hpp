@@ -60,13 +60,13 @@ constexpr bool is_complete() {
     static_assert(answers<K>([](const auto& k) -> ComparableRows<decltype(k)> { return {}; }),
                   "a kind needs `static constexpr bool comparable_rows`: components of one vector");
     static_assert(answers<K>([](const auto& k) -> ShownAs<decltype(k)> { return {}; }),
-                  "a kind needs `static constexpr Shown shown`: what a replay shows of it");
+                  "a kind needs `static constexpr DisplayKind shown`: what a replay shows of it");
     static_assert(answers<K>([](const auto& k) -> decltype(k.residual(given<At>(), given<RowValues&>())) {}),
                   "a kind needs `residual`: phi(q, t) of each row, with phi_t and phi_tt where it moves");
     static_assert(places<K, At> || answers<K>([](const auto& k) -> decltype(k.rows(given<At>(), given<RowValues&>())) {}),
                   "a kind needs `rows`: unit wrenches, or A itself; or `place`: residual and rows at once");
     static_assert(answers<K>([](const auto& k) -> decltype(k.rate_and_bias(given<At>(), given<RowValues&>())) {}),
-                  "a kind needs `rate_and_drift`: A v + phi_t, and its rate at zero acceleration");
+                  "a kind needs `rate_and_bias`: A v + phi_t, and its rate at zero acceleration");
     return true;
 }
 

@@ -194,7 +194,7 @@ void bind_enums(nb::module_& m) {
         .value("sticking", sticking)
         .value("slip_plus", slip_plus)
         .value("unloaded", unloaded, "carries no friction: its contact is open, or what asks does so without it");
-    nb::enum_<DisplayKind>(m, "DisplayKind", "What a replay shows of a constraint.")
+    nb::enum_<DisplayKind>(m, "DisplayKind", "Display of a constraint in a replay.")
         .value("nothing", DisplayKind::nothing)
         .value("anchor", DisplayKind::anchor)
         .value("rod", DisplayKind::rod)
