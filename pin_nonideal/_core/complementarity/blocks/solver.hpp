@@ -28,7 +28,7 @@ public:
 
     // Prepare the problem once its nodes and elements are set. Returns false if an inertia is not positive definite.
     bool pose();
-    // Solve for the forces f from a guess, usually those of the last step. Return the largest error of an element,
+    // Solve for the forces f from a guess, usually the forces of the last step. Return the largest error of an element,
     // relative to its forces. Forces that share a load stay close to the guess.
     double solve(VecX& f);
     // Compute the motion under the forces f.
@@ -37,7 +37,7 @@ public:
     // response to its forces if that is larger.
     ConeResiduals residuals(const VecX& f) const;
 
-    // Element that misses the laws most in its own units, and the velocity by which it misses them.
+    // Element with the largest error of the laws in its own units, and this error as a velocity.
     struct Miss { int element = -1; double velocity = 0.0; };
     const Miss& miss() const { return miss_; }
     double error() const { return error_; }  // largest relative error of an element
