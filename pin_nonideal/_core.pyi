@@ -118,8 +118,8 @@ class Mode(enum.IntEnum):
     carries no friction: its contact is open, or what asks does so without it
     """
 
-class Shown(enum.Enum):
-    """What a replay shows of a constraint."""
+class DisplayKind(enum.Enum):
+    """Display of a constraint in a replay."""
 
     nothing = 0
 
@@ -300,7 +300,7 @@ class ConstraintRows:
     def moves_in_time(self) -> bool: ...
 
     @property
-    def shown(self) -> Shown: ...
+    def shown(self) -> DisplayKind: ...
 
 class Instant:
     @property

@@ -18,7 +18,7 @@ Array = NDArray[np.floating[Any]]
 
 # Velocities below this part of the velocity scale count as zero in the names of the modes only.
 AT_REST = 1e-9
-LARGEST = 3  # maximum number of rows of a contact: normal and two slip directions
+MAX_ROWS = 3  # maximum number of rows of a contact: normal and two slip directions
 
 
 @dataclass(frozen=True)
@@ -145,11 +145,11 @@ def _contacts(rows: int, mu: Array, dims: ArrayLike | None) -> tuple[list[int], 
     elif mu.ndim == 1 and len(mu) > 0:
         count = len(mu)
     else:
-        count = rows // (LARGEST if sizes is None else max(int(sizes), 1)) if rows > 0 else 0
+        count = rows // (MAX_ROWS if sizes is None else max(int(sizes), 1)) if rows > 0 else 0
     if sizes is None:
-        sizes = np.asarray(rows // count if count else LARGEST)
+        sizes = np.asarray(rows // count if count else MAX_ROWS)
     each = [int(d) for d in np.broadcast_to(sizes, (count,))]
-    if sum(each) != rows or any(not 1 <= d <= LARGEST for d in each) or (sizes != sizes.astype(int)).any():
+    if sum(each) != rows or any(not 1 <= d <= MAX_ROWS for d in each) or (sizes != sizes.astype(int)).any():
         raise InputError(
             f"dims must be 1, 2 or 3 a contact and add up to the {rows} rows of contacts in w0, got {each};"
             " pass dims, or as many coefficients mu as there are contacts"

@@ -32,25 +32,25 @@ def load_core() -> ModuleType:
     try:
         core = importlib.import_module("pin_nonideal._core")
     except ModuleNotFoundError:
-        raise ImportError(_missing()) from None
+        raise ImportError(_missing_core_message()) from None
     except ImportError as error:
         raise ImportError(
             f"the compiled core of pin_nonideal does not load beside Pinocchio {installed} ({error}); "
-            f"{_again()}"
+            f"{_reinstall_message()}"
         ) from error
     # A source folder named _core imports as an empty namespace package when nothing is compiled.
     if getattr(core, "__file__", None) is None:
-        raise ImportError(_missing())
+        raise ImportError(_missing_core_message())
     built = str(core.pinocchio_version)
     if built.split(".")[:2] != installed.split(".")[:2]:
         raise ImportError(
             f"the compiled core of pin_nonideal was built for Pinocchio {built}, and "
-            f"Pinocchio {installed} is installed; {_again()}"
+            f"Pinocchio {installed} is installed; {_reinstall_message()}"
         )
     return core
 
 
-def _again() -> str:
+def _reinstall_message() -> str:
     from importlib import metadata
 
     try:
@@ -60,7 +60,7 @@ def _again() -> str:
     return _AGAIN.format(*needed, "pin")
 
 
-def _missing() -> str:
+def _missing_core_message() -> str:
     folder = Path(__file__).parent
     return (
         f"the compiled core of pin_nonideal is missing in {folder}: this is the source folder, "

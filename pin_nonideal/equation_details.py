@@ -1,6 +1,6 @@
 """The quantities from which the paper builds Eq. (40), on plain arrays.
 
-`solve` computes accelerations and forces by the shortest way.  `solve_details` returns the matrices of the
+`solve` computes accelerations and forces without these matrices.  `solve_details` returns the matrices of the
 paper beside them: the symmetric root of M, B, V, J and the generalized inverse of B.
 
 Source: F. E. Udwadia, R. E. Kalaba, P. Phohomsiri, "Mechanical systems with nonideal constraints: explicit

@@ -18,18 +18,18 @@ NAME_MAX = 64  # characters of a name that is compared with known names
 
 
 class PinNonidealError(Exception):
-    """Root of all errors raised by this package."""
+    """Base class of all errors raised by this package."""
 
     def __reduce__(self) -> tuple[object, ...]:
         # The constructor cannot be used, since its arguments differ from `args`.
-        return _made_again, (type(self), self.args, dict(self.__dict__))
+        return _rebuild_error, (type(self), self.args, dict(self.__dict__))
 
     def __str__(self) -> str:
         # KeyError prints the repr of its message; all classes here print the message itself.
-        return _shortened(str(self.args[0]), MESSAGE_MAX, MESSAGE_END) if self.args else ""
+        return _shorten(str(self.args[0]), MESSAGE_MAX, MESSAGE_END) if self.args else ""
 
 
-def _made_again(
+def _rebuild_error(
     kind: type[PinNonidealError], args: tuple[object, ...], state: dict[str, object]
 ) -> PinNonidealError:
     """Rebuild an error from another process."""
@@ -233,7 +233,7 @@ def nearest(name: str, names: Iterable[str]) -> str:
                 return f'; nearest: "{close}"'
     if not known:
         return "; there is none"
-    shown = ", ".join(f'"{_shortened(n, NAME_MAX)}"' for n in known[:8])
+    shown = ", ".join(f'"{_shorten(n, NAME_MAX)}"' for n in known[:8])
     return f"; known: {shown}" + (", ..." if len(known) > 8 else "")
 
 
@@ -254,7 +254,7 @@ def short_repr(value: object) -> str:
         return text
     if type(value) in (list, tuple, dict, set, frozenset):
         text = _parts.repr(value)
-    return _shortened(text, VALUE_MAX, VALUE_MAX // 4)
+    return _shorten(text, VALUE_MAX, VALUE_MAX // 4)
 
 
 _parts = reprlib.Repr()
@@ -262,7 +262,7 @@ _parts.maxlist = _parts.maxtuple = _parts.maxdict = _parts.maxset = _parts.maxfr
 _parts.maxlevel, _parts.maxstring, _parts.maxother = 3, 30, 30
 
 
-def _shortened(text: str, most: int, end: int = 0) -> str:
+def _shorten(text: str, most: int, end: int = 0) -> str:
     """Return a text, or its beginning and its last `end` characters around " ... "."""
     if len(text) <= most:
         return text

@@ -26,7 +26,7 @@ def table(title: str, rows: Sequence[Sequence[object]], header: Sequence[str] = 
     top = f"<tr>{''.join(_cell('th', x) for x in header)}</tr>" if header else ""
     lines = [_cell("th", row[0]) + "".join(_cell("td", x) for x in row[1:]) for row in rows]
     body = "".join(f"<tr>{line}</tr>" for line in lines)
-    return f"<table><caption>{_escaped(title)}</caption>{top}{body}</table>"
+    return f"<table><caption>{_escape(title)}</caption>{top}{body}</table>"
 
 
 def names(listed: Sequence[str]) -> str:
@@ -51,9 +51,9 @@ def numbers(values: NDArray[np.generic]) -> str:
 
 
 def _cell(tag: str, value: object) -> str:
-    return f'<{tag} style="text-align: left">{_escaped(str(value))}</{tag}>'
+    return f'<{tag} style="text-align: left">{_escape(str(value))}</{tag}>'
 
 
-def _escaped(text: str) -> str:
+def _escape(text: str) -> str:
     cut = text if len(text) <= CELL_MAX else f"{text[:CELL_MAX]} ..."
     return html.escape(cut).replace("\n", "<br>")

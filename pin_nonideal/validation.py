@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from .errors import InputError, nearest, short_repr
 
-FEW = 100  # up to this size a Python sum is faster than NumPy; a finite sum implies finite numbers
+MAX_PYTHON_SUM = 100  # up to this size a Python sum is faster than NumPy; a finite sum implies finite numbers
 
 Vector3 = tuple[float, float, float]
 
@@ -134,18 +134,18 @@ def flag(what: str, value: object) -> bool:
     return bool(value)
 
 
-def count(what: str, value: object, *, least: int = 0, most: int = 1_000_000_000) -> int:
-    """Return an integer from `least` to `most`.
+def count(what: str, value: object, *, min_value: int = 0, max_value: int = 1_000_000_000) -> int:
+    """Return an integer from `min_value` to `max_value`.
 
     Raises:
         InputError: `value` is no integer, too small or too large.
     """
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
         raise InputError(f"{what} must be an integer; got {short_repr(value)}")
-    if value < least:
-        raise InputError(f"{what} must be at least {least}; got {value}")
-    if value > most:
-        raise InputError(f"{what} must be at most {most}; got {value}")
+    if value < min_value:
+        raise InputError(f"{what} must be at least {min_value}; got {value}")
+    if value > max_value:
+        raise InputError(f"{what} must be at most {max_value}; got {value}")
     return int(value)
 
 
@@ -217,7 +217,7 @@ def floats(
         result = np.array(source, dtype=float, copy=copy or None) if source.dtype.kind in kinds else None
     except (TypeError, ValueError):  # rows of unequal length, or objects that are no numbers
         result = None
-    if result is None or (result.size <= FEW and math.isfinite(sum(result.ravel().tolist()))):
+    if result is None or (result.size <= MAX_PYTHON_SUM and math.isfinite(sum(result.ravel().tolist()))):
         return result, None
     if np.count_nonzero(np.isfinite(result)) == result.size:  # faster than all()
         return result, None

@@ -18,7 +18,7 @@ import pin_nonideal as pn
 from pin_nonideal.errors import InputError, PinNonidealError, RunInterrupted
 from pin_nonideal.loading.library.example_robots import example_robots
 from pin_nonideal.loading.robot_files import robots
-from pin_nonideal.scene.evaluation import SEVERAL
+from pin_nonideal.scene.evaluation import SEVERAL_CHOICES
 from pin_nonideal.trajectory.trajectory import Trajectory
 from pin_nonideal.types import Table
 from pin_nonideal.visualization.rendering import render
@@ -111,7 +111,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     run.add_argument(
         "--several",
-        choices=SEVERAL,
+        choices=SEVERAL_CHOICES,
         help="if friction admits several motions: stop with an error (default), or continue with the nearest",
     )
     run.add_argument(

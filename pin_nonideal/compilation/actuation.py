@@ -14,7 +14,7 @@ from pin_nonideal.description.scene_spec import SceneSpec
 from pin_nonideal.errors import InputError
 from pin_nonideal.states.joint_layout import joint_places
 from pin_nonideal.states.parsing import (
-    joint_named,
+    find_joint,
     named_configuration,
     named_joint_samples,
     named_joint_values,
@@ -22,17 +22,17 @@ from pin_nonideal.states.parsing import (
 from pin_nonideal.types import Array, Mask, Model
 from pin_nonideal.validation import by_name
 
-from .callbacks import checked
+from .callbacks import checked_function
 from .delay import DelayedTorque
 from .effort_limits import effort_limits
 from .resolver import Resolver, words
 from .sampled_control import commanded_by_control, initial_torque, named_torques, sampled_torque
 from .torques import (
-    Called,
-    Constant,
+    ConstantTorque,
     Part,
     Spring,
-    Timed,
+    TimedTorque,
+    TorqueFunction,
     kind_of_drive,
     sum_of_torques,
 )
@@ -68,13 +68,13 @@ def lower_actuation(
     if limits is not None:
         out.limit_effort(least=limits[0], most=limits[1])
     parts = [part for part, _ in lowered]
-    return [part.prepare for part in parts if isinstance(part, Called) and part.prepare is not None]
+    return [part.prepare for part in parts if isinstance(part, TorqueFunction) and part.prepare is not None]
 
 
 def _lowered_drives(drives: Sequence[object], resolver: Resolver, spec: SceneSpec) -> list[tuple[Part, Mask]]:
     listed = len(drives) > 1
     return [
-        _lowered(drive, resolver, spec, f"actuation[{k}]" if listed else "actuation")
+        _lower_drive(drive, resolver, spec, f"actuation[{k}]" if listed else "actuation")
         for k, drive in enumerate(drives)
     ]
 
@@ -85,9 +85,9 @@ def _sum(parts: Sequence[Part], drives: Sequence[object], model: Model) -> Part:
 
 def _write(part: Part, out: core.Builder) -> None:
     """Set the torques of the program."""
-    if isinstance(part, Constant):
+    if isinstance(part, ConstantTorque):
         out.set_constant_torque(tau=part.tau)
-    elif isinstance(part, Timed):
+    elif isinstance(part, TimedTorque):
         out.set_torque_table(part.times.tolist(), np.ascontiguousarray(part.values))
     elif isinstance(part, Spring):
         out.set_hold_position(kp=part.kp, kd=part.kd, q=part.q)
@@ -103,38 +103,40 @@ def _write(part: Part, out: core.Builder) -> None:
 # --- one drive ----------------------------------------------------------------------------------------------
 
 
-def _lowered(u: object, resolver: Resolver, spec: SceneSpec, who: str) -> tuple[Part, Mask]:
+def _lower_drive(u: object, resolver: Resolver, spec: SceneSpec, who: str) -> tuple[Part, Mask]:
     """Return the torques of one drive, and the mask of the degrees of freedom that it commands, (nv,)."""
     model, everything = resolver.model, np.ones(resolver.model.nv, dtype=bool)
     if isinstance(u, SampledControl):
         acts = commanded_by_control(u, model)
         if u.delay_in_samples:  # runs have their own delayed torques, see `delayed_torque`
             initial = initial_torque(u, model)
-            return Called(lambda t, q, v: initial, u.period), acts
-        return Called(sampled_torque(u, model), u.period), acts
+            return TorqueFunction(lambda t, q, v: initial, u.period), acts
+        return TorqueFunction(sampled_torque(u, model), u.period), acts
     if isinstance(u, SceneDrive):
         function, acts, breaks, prepare = u.bound(model, resolver.q0, spec)
-        torques = _Identified(checked(function, words(u), (model.nv,)), u)
-        return Called(torques, u.period, breaks, prepare=prepare), acts
+        torques = _IdentifiedFunction(checked_function(function, words(u), (model.nv,)), u)
+        return TorqueFunction(torques, u.period, breaks, prepare=prepare), acts
     if isinstance(u, HoldPosition):
         q = resolver.q0 if u.q is None else named_configuration(model, u.q, resolver.q0, f"{words(u)}: q")
         kp, kd = (gains_of(model, getattr(u, key), f"{words(u)}: {key}") for key in ("kp", "kd"))
         _require_vectors(model, kp, f"{words(u)}: kp")
-        acts = commanded(model, u.kp) | commanded(model, u.kd)
+        acts = command_mask(model, u.kp) | command_mask(model, u.kd)
         return Spring(kp, kd, np.ascontiguousarray(q)), acts
     if isinstance(u, Table):
         times = np.asarray(u.times)
         values = named_joint_samples(model, u.values, times.size, f"{words(u)}: values")
-        timed = Timed(times, values) if u.interpolation == "linear" else _held(times, values)
-        return timed, commanded(model, u.values)
+        timed = TimedTorque(times, values) if u.interpolation == "linear" else _zero_order_hold(times, values)
+        return timed, command_mask(model, u.values)
     if callable(u):
-        return Called(checked(named_torques(u, model, who), who, (model.nv,)), None), everything
-    return Constant(named_joint_values(model, u, who)), commanded(model, u)
+        return TorqueFunction(
+            checked_function(named_torques(u, model, who), who, (model.nv,)), None
+        ), everything
+    return ConstantTorque(named_joint_values(model, u, who)), command_mask(model, u)
 
 
 def delayed_torque(
     u: SampledControl, resolver: Resolver, spec: SceneSpec, t0: float, by_thread: bool
-) -> tuple[DelayedTorque, Called]:
+) -> tuple[DelayedTorque, TorqueFunction]:
     """Return the delayed torques of one run or of the runs of a rollout, and their sum with other drives.
 
     Args:
@@ -148,15 +150,17 @@ def delayed_torque(
     function, initial = sampled_torque(u, model), initial_torque(u, model)
     delayed = DelayedTorque(function, u.delay_in_samples, initial, t0, by_thread)
     if len(drives) == 1:
-        return delayed, Called(delayed, u.period)
+        return delayed, TorqueFunction(delayed, u.period)
     parts = [part for part, _ in _lowered_drives(drives, resolver, spec)]
-    parts = [Called(delayed, u.period) if d is u else part for d, part in zip(drives, parts, strict=True)]
+    parts = [
+        TorqueFunction(delayed, u.period) if d is u else part for d, part in zip(drives, parts, strict=True)
+    ]
     total = _sum(parts, drives, model)
-    assert isinstance(total, Called)
+    assert isinstance(total, TorqueFunction)
     return delayed, total
 
 
-class _Identified:
+class _IdentifiedFunction:
     """A function of torques that is equal to those of the same drive only, see `parameter_overrides`.
 
     Args:
@@ -171,15 +175,15 @@ class _Identified:
         return self.function(t, q, v)
 
 
-def _held(times: Array, values: Array) -> Timed:
+def _zero_order_hold(times: Array, values: Array) -> TimedTorque:
     """Return a zero-order hold: each value ends one floating-point spacing before the next time.
 
-    A step of the core ends there and at the next time, so that no stage of a step sees both values.
+    A step of the core ends at both times, so that no stage of a step has both values.
     """
     ends = times[1:] - np.spacing(np.maximum(np.abs(times[1:]), np.diff(times)))
     both = np.column_stack([times[:-1], np.maximum(ends, times[:-1])]).ravel()
     values = np.vstack([np.repeat(values[:-1], 2, axis=0), values[-1:]])
-    return Timed(np.append(both, times[-1]), values, held=True)
+    return TimedTorque(np.append(both, times[-1]), values, held=True)
 
 
 def gains_of(model: Model, gain: object, who: str) -> Array:
@@ -195,11 +199,11 @@ def gains_of(model: Model, gain: object, who: str) -> Array:
         UnknownNameError: there is no such joint.
     """
     if isinstance(gain, float):
-        return np.where(commanded(model, gain), gain, 0.0)
+        return np.where(command_mask(model, gain), gain, 0.0)
     return named_joint_values(model, gain, who)
 
 
-def commanded(model: Model, torques: object) -> Mask:
+def command_mask(model: Model, torques: object) -> Mask:
     """Return the mask of the degrees of freedom that torques, samples or gains command, (nv,).
 
     A table by joint name commands its joints. A number commands the joints with one degree of freedom, and an
@@ -213,7 +217,7 @@ def commanded(model: Model, torques: object) -> Mask:
     table = by_name(torques)
     if table is None and not isinstance(torques, float):
         return ~acts
-    names = None if table is None else {joint_named(model, name, "actuation") for name in table}
+    names = None if table is None else {find_joint(model, name, "actuation") for name in table}
     for j, place in enumerate(joint_places(model), start=1):
         if place.nv == 1 if names is None else j in names:
             acts[place.v_first : place.v_first + place.nv] = True
@@ -221,7 +225,7 @@ def commanded(model: Model, torques: object) -> Mask:
 
 
 def _require_vectors(model: Model, kp: Array, who: str) -> None:
-    """Check that a stiffness acts on no joint whose configuration is no vector.
+    """Check that a stiffness acts only on joints whose configuration is a vector.
 
     Raises:
         InputError: see above.

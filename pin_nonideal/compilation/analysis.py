@@ -29,10 +29,10 @@ from pin_nonideal.validation import array
 Rows = NDArray[np.bool_]
 
 # Functions of time without user code.
-KNOWN = (Constant, Polynomial, Sinusoid, Spline)
+CORE_FUNCTIONS = (Constant, Polynomial, Sinusoid, Spline)
 # A row vanishes structurally if its length stays below this part of its greatest possible length at random
 # states. The value covers rounding of the kinematics.
-STRUCTURAL = 1e-11
+VANISHING_LENGTH = 1e-11
 # Right-hand side of a vanishing row, relative to the largest right-hand side: rounding of long sums.
 SUM_ROUNDING = 1e-9
 # Tolerance between derivatives of user functions and central differences: relative error of the differences.
@@ -41,7 +41,7 @@ DERIVATIVE_TOLERANCE = 1e-4
 # User functions are unlikely to have a corner at this time.
 DIFFERENCE, AFTER_START = 1e-5, 0.21
 # Scales of random displacements [rad or m] around a start. If a function raises, the next smaller is tried.
-AROUND = (0.1, 1e-2, 1e-3, 1e-4)
+START_DISPLACEMENTS = (0.1, 1e-2, 1e-3, 1e-4)
 
 
 def check_model(model: Model) -> None:
@@ -118,9 +118,9 @@ def _without_function(c: object, nv: int) -> Any:
         )
     if isinstance(c, UserFriction):
         return replace(c, direction=lambda t, q: np.zeros(nv))
-    if isinstance(c, PrescribedMotion) and not isinstance(c.function, KNOWN):
+    if isinstance(c, PrescribedMotion) and not isinstance(c.function, CORE_FUNCTIONS):
         return replace(c, function=Constant(0.0))
-    if isinstance(c, Distance) and callable(c.length) and not isinstance(c.length, KNOWN):
+    if isinstance(c, Distance) and callable(c.length) and not isinstance(c.length, CORE_FUNCTIONS):
         return replace(c, length=Constant(1.0))
     return c
 
@@ -164,7 +164,7 @@ def zero_rows(
         v = generator.standard_normal(model.nv)
         samples.append(rows_at(runner, q, v, 0.37)[:3])
         own, greatest = (row_lengths(runner, q, v, 0.37, own=own)[: len(owners)] for own in (True, False))
-        vanishing &= own <= STRUCTURAL * greatest
+        vanishing &= own <= VANISHING_LENGTH * greatest
     wide = np.hstack([A for A, _, _ in samples])
     right = np.column_stack([b for _, b, _ in samples])
     gaps = np.abs(np.column_stack([phi for _, _, phi in samples])).max(axis=1)
@@ -231,8 +231,8 @@ def check_user_functions(
         if not has_rates(c):
             continue
         moves = [generator.standard_normal(model.nv) for _ in range(3)]
-        for part in AROUND:
-            q, t = pin.integrate(model, q0, part * moves[0]), t0 + part / AROUND[0] * AFTER_START
+        for part in START_DISPLACEMENTS:
+            q, t = pin.integrate(model, q0, part * moves[0]), t0 + part / START_DISPLACEMENTS[0] * AFTER_START
             with suppress(UserFunctionError), np.errstate(all="ignore"):
                 _check_derivatives(model, runner, q, v0 + moves[1], moves[2], t, slices[name], name, c)
                 break

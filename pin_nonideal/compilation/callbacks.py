@@ -21,11 +21,13 @@ from pin_nonideal.validation import array, floats
 PROBES = (0.01371, 0.21317, 0.71753)
 PROBE_STEP = 1e-6
 FLOATS = np.dtype(float)
-COARSE = 0.1  # relative tolerance: separately interpolated tables of value and derivatives stay below it
-ROUNDING = 1e-7  # absolute tolerance: above the rounding of a difference quotient over two steps
+DERIVATIVE_RTOL = 0.1  # separately interpolated tables of value and derivatives stay below it
+DERIVATIVE_ATOL = 1e-7  # above the rounding of a difference quotient over two steps
 
 
-def checked(function: Callable[..., object], who: str, *shapes: tuple[int, ...]) -> Callable[..., Any]:
+def checked_function(
+    function: Callable[..., object], who: str, *shapes: tuple[int, ...]
+) -> Callable[..., Any]:
     """Wrap a user function: contiguous finite results of the given shapes, and errors that name it.
 
     Args:
@@ -33,7 +35,7 @@ def checked(function: Callable[..., object], who: str, *shapes: tuple[int, ...])
         who: words for messages.
         shapes: shape of the result, or of each part of a tuple of results.
     """
-    ask = named(function, who)
+    ask = named_function(function, who)
 
     def call(*arguments: object) -> object:
         value = ask(*arguments)
@@ -43,17 +45,19 @@ def checked(function: Callable[..., object], who: str, *shapes: tuple[int, ...])
                 return value
         parts = (value,) if len(shapes) == 1 else value
         if not isinstance(parts, (tuple, list)) or len(parts) != len(shapes):
-            raise _failed(f"{who} must return {len(shapes)} values; got {type(value).__name__}", arguments)
+            raise _function_error(
+                f"{who} must return {len(shapes)} values; got {type(value).__name__}", arguments
+            )
         try:
             results = [numbers_of(part, shape, who) for part, shape in zip(parts, shapes, strict=True)]
         except UserFunctionError as error:
-            raise _failed(str(error), arguments) from None
+            raise _function_error(str(error), arguments) from None
         return results[0] if len(shapes) == 1 else tuple(results)
 
     return call
 
 
-def named(function: Callable[..., object], who: str) -> Callable[..., Any]:
+def named_function(function: Callable[..., object], who: str) -> Callable[..., Any]:
     """Wrap a user function so that errors name it.
 
     Args:
@@ -67,12 +71,12 @@ def named(function: Callable[..., object], who: str) -> Callable[..., Any]:
         except RunError:
             raise
         except Exception as error:
-            raise _failed(f"{who} raised {type(error).__name__}: {error}", arguments) from error
+            raise _function_error(f"{who} raised {type(error).__name__}: {error}", arguments) from error
 
     return call
 
 
-def _failed(message: str, arguments: Sequence[object]) -> UserFunctionError:
+def _function_error(message: str, arguments: Sequence[object]) -> UserFunctionError:
     """Return the error of a user function; it includes the time if the first argument is a float."""
     time = float(arguments[0]) if arguments and isinstance(arguments[0], float) else None
     return UserFunctionError(message if time is None else f"{message} (at t = {time:.6g} s)")
@@ -106,7 +110,7 @@ def checked_limits(function: Callable[..., object], who: str) -> Callable[..., t
         function: the user's function; it returns one number for both directions, or two.
         who: words for messages.
     """
-    ask = named(function, who)
+    ask = named_function(function, who)
 
     def call(*arguments: object) -> tuple[float, float]:
         value = ask(*arguments)
@@ -116,7 +120,7 @@ def checked_limits(function: Callable[..., object], who: str) -> Callable[..., t
         try:
             numbers = numbers_of(value, (2,) if two else (), who).reshape(-1).tolist()
         except UserFunctionError as error:
-            raise _failed(str(error), arguments) from None
+            raise _function_error(str(error), arguments) from None
         if min(numbers) < 0.0:
             raise UserFunctionError(f"{who} must not be negative; got {min(numbers):g}")
         return numbers[0], numbers[-1]
@@ -142,7 +146,7 @@ def time_function(function: Any, who: str) -> Any:
         return ("sinusoid", [function.amplitude, function.omega, function.phase, function.offset])
     if isinstance(function, Spline):
         return ("spline", function.breaks.tolist(), function.coefficients.ravel().tolist())
-    jet = checked(function, f"{who}: function of time", (), (), ())
+    jet = checked_function(function, f"{who}: function of time", (), (), ())
     _check_derivatives(jet, who)
     return lambda t: tuple(float(x) for x in jet(t))
 
@@ -188,7 +192,8 @@ def _check_derivatives(jet: Callable[..., Any], who: str) -> None:
         wrong = [
             (t, difference, stated)
             for t, difference, stated, size in rows
-            if abs(difference - stated) > COARSE * max(abs(difference), abs(stated)) + ROUNDING * (1.0 + size)
+            if abs(difference - stated)
+            > DERIVATIVE_RTOL * max(abs(difference), abs(stated)) + DERIVATIVE_ATOL * (1.0 + size)
         ]
         if wrong and len(wrong) == len(rows):
             t, difference, stated = wrong[0]
@@ -246,8 +251,8 @@ class Reactions:
     def wrench(self, name: str) -> Array:
         """[force; moment] that a joint or an anchor exerts, (6,) [N; N m].
 
-        A joint acts on the body that it moves: axes and moment point are those of the joint frame. An anchor
-        acts on the body of frame1: the axes are those of frame2.
+        A joint acts on the body that it moves: the joint frame gives the axes and the moment point. An anchor
+        acts on the body of frame1: frame2 gives the axes.
 
         Args:
             name: a joint of the model, or a constraint.

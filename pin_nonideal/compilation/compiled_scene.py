@@ -178,9 +178,9 @@ class CompiledScene:
         return ""
 
     def _circumstances(self) -> Circumstances:
-        """Return the parts of the scene that errors of its runs name."""
+        """Return the names of the parts of the scene that error messages of its runs need."""
         spec = self.spec
-        sources = ("the actuation", _quoted("force", spec.forces), _quoted("law", spec.laws))
+        sources = ("the actuation", _quote("force", spec.forces), _quote("law", spec.laws))
         used_names: set[str] = set()
         unique_names(spec.constraints, used_names)
         names = unique_names(spec.contacts, used_names)
@@ -197,7 +197,7 @@ def _frames_of(contact: object) -> tuple[str, str]:
     return (str(first or ""), str(second or ""))
 
 
-def _quoted(kind: str, descriptions: Sequence[object]) -> str:
+def _quote(kind: str, descriptions: Sequence[object]) -> str:
     """Return the names of descriptions of a kind, at most the first few."""
     names = unique_names(descriptions, set())
     shown = ", ".join(f'"{name}"' for name in names[:MAX_QUOTED])

@@ -30,14 +30,14 @@ from pin_nonideal.errors import InputError, UnknownNameError, short_repr
 from pin_nonideal.types import Array, PinocchioConstraint
 from pin_nonideal.validation import axis_triad, unit_axis
 
-from .callbacks import breaks, checked, time_function
+from .callbacks import breaks, checked_function, time_function
 from .resolver import Frame, Resolver, placed_on, words
 
 # Largest denominator of a rational gear ratio for which the coupled angle of endless joints is constrained.
 MAX_GEAR = 64
 # A ratio within this distance of a fraction is treated as that fraction.
 GEAR_ROUNDING = 1e-12
-# Step of central differences in time, relative to max(1 s, |t|): a compromise of rounding and curvature.
+# Step of central differences in time, relative to max(1 s, |t|): a compromise between rounding and curvature.
 TIME_DIFFERENCE = 1e-6
 
 
@@ -182,7 +182,7 @@ def _(c: Rolling, name: str, out: core.Builder, resolver: Resolver) -> None:
 def _(c: UserConstraint, name: str, out: core.Builder, resolver: Resolver) -> None:
     who = words(c, name)
     rows = user_rows(c, c.size, who, resolver)
-    residual = None if c.residual is None else checked(c.residual, f"{who}: residual", (c.size,))
+    residual = None if c.residual is None else checked_function(c.residual, f"{who}: residual", (c.size,))
     rate = user_rate(c, c.size, who, rows, residual)
     out.add_user(name, c.size, rows=rows, residual=residual, rate=rate)
 
@@ -197,7 +197,7 @@ def user_rows(c: UserConstraint | UserContact, size: int, who: str, resolver: Re
         resolver: resolver of the model.
     """
     model = resolver.model
-    function = checked(c.function, f"{who}: function", (size, model.nv), (size,))
+    function = checked_function(c.function, f"{who}: function", (size, model.nv), (size,))
     if getattr(c.function, "needs_data", True) is False:  # functions of this package that need q and v only
         return lambda t, q, v: function(t, q, v, None)
     local = threading.local()
@@ -231,7 +231,7 @@ def user_rate(
         residual: checked function of (t, q).
     """
     if c.rate is not None:
-        return checked(c.rate, f"{who}: rate", (size,))
+        return checked_function(c.rate, f"{who}: rate", (size,))
     if residual is None:
         return None
 

@@ -23,12 +23,12 @@ from pin_nonideal.description.contacts.solids import (
 from pin_nonideal.errors import InputError, UserFunctionError
 from pin_nonideal.types import Array
 
-from .callbacks import checked, named
+from .callbacks import checked_function, named_function
 from .friction import LoweringContext
-from .resolver import Frame, Resolver, turned, words
+from .resolver import Frame, Resolver, rotated_frame, words
 
 # Scales of random displacements from q0 [rad or m] at which a function is called for the shape of its result.
-AROUND = (0.0, 0.1, 1.0)
+SAMPLE_DISPLACEMENTS = (0.0, 0.1, 1.0)
 
 
 def lower_contact_friction(
@@ -94,18 +94,18 @@ def _round_slip(c: Any, name: str, out: core.Builder, resolver: Resolver) -> lis
 def _user_slip(c: Any, name: str, out: core.Builder, resolver: Resolver) -> list[tuple[str, int, float]]:
     """Add slip directions that the user defines; return (name, block, coefficient)."""
     who, nv = f"{words(c, name)}: directions", resolver.model.nv
-    shape = _shape_of_directions(named(c.directions, who), resolver)
+    shape = _shape_of_directions(named_function(c.directions, who), resolver)
     if shape not in ((1, nv), (2, nv)):
         raise InputError(f"{who} must return one or two rows of {nv} numbers each; got shape {shape}")
-    function = checked(c.directions, who, shape)
+    function = checked_function(c.directions, who, shape)
     block = out.add_user_slip(name, shape[0], lambda t, q: function(t, q).ravel())
     return [(name, block, c.mu)]
 
 
-def _shape_of_directions(directions: Callable[..., Any], resolver: Resolver) -> tuple[int, ...]:
+def _shape_of_directions(directions: Callable[..., Array], resolver: Resolver) -> tuple[int, ...]:
     """Return the shape of the directions at q0, or near q0 if the function raises there."""
     generator = np.random.default_rng(5)
-    for part in AROUND:
+    for part in SAMPLE_DISPLACEMENTS:
         with suppress(UserFunctionError):
             move = part * generator.standard_normal(resolver.model.nv)
             return np.shape(directions(0.0, pin.integrate(resolver.model, resolver.q0, move)))
@@ -116,9 +116,9 @@ def _flat_slip(c: Any, name: str, out: core.Builder, resolver: Resolver) -> list
     """Add the slip directions of a contact with a plane; return (name, block, coefficient) per element."""
     f1, f2, (t1, t2, n) = resolver.contact(c, words(c, name))
     if isinstance(c, EllipsoidContact):
-        body, along = turned(f1, c.rpy), {"tangent1": t1, "tangent2": t2, "normal": n}
+        body, along = rotated_frame(f1, c.rpy), {"tangent1": t1, "tangent2": t2, "normal": n}
         return [(name, out.add_ellipsoid_slip(name, body, f2, semiaxes=c.semiaxes, **along), c.mu)]
-    level, sliding = _turned(f2, np.column_stack([t1, t2, n])), getattr(c, "mu", 0.0)
+    level, sliding = _rotated_frame(f2, np.column_stack([t1, t2, n])), getattr(c, "mu", 0.0)
     elements = []
     if sliding:
         block = out.add_contact_slip(name, f1, f2, radius=c.radius, tangent1=t1, tangent2=t2, normal=n)
@@ -130,7 +130,7 @@ def _flat_slip(c: Any, name: str, out: core.Builder, resolver: Resolver) -> list
     return elements
 
 
-def _turned(frame: Frame, axes: Array) -> Frame:
+def _rotated_frame(frame: Frame, axes: Array) -> Frame:
     """Return the frame with new axes, which are the columns of `axes` in the old axes."""
     joint, R, p = frame
     return joint, (np.reshape(R, (3, 3)) @ axes).ravel().tolist(), p

@@ -28,9 +28,9 @@ from pin_nonideal.description.contacts.solids import (
 from pin_nonideal.errors import InputError, short_repr
 from pin_nonideal.types import Model
 
-from .callbacks import checked
+from .callbacks import checked_function
 from .constraints import user_rate, user_rows
-from .resolver import Resolver, turned, words
+from .resolver import Resolver, rotated_frame, words
 
 RoundContact = HullContact | BoxContact | RevolvedContact | SphereContact | CapsuleContact
 
@@ -86,14 +86,14 @@ def lower_gaps(c: Contact, name: str, out: core.Builder, resolver: Resolver) -> 
         return [_on_plane(c, name, out, resolver)]
     if isinstance(c, UserContact):
         who = words(c, name)
-        rows, gap = user_rows(c, 1, who, resolver), checked(c.gap, f"{who}: gap", (1,))
+        rows, gap = user_rows(c, 1, who, resolver), checked_function(c.gap, f"{who}: gap", (1,))
         block = out.add_user_gap(name, rows=rows, gap=gap, rate=user_rate(c, 1, who, rows, gap))
         out.let_open(restitution=c.restitution)
         return [block]
     who = words(c, name)
     if isinstance(c, EllipsoidContact):
         f1, f2, (_, _, normal) = resolver.contact(c, who)
-        axes = turned(f1, c.rpy)
+        axes = rotated_frame(f1, c.rpy)
         block = out.add_ellipsoid(name, axes, f2, normal=normal, semiaxes=c.semiaxes)
     elif isinstance(c, CylinderContact):
         f1, f2, solid, half1 = resolver.cylinder(c, who)

@@ -17,7 +17,7 @@ from pin_nonideal.types import Array, Mask, Model
 from .resolver import words
 
 # Efforts from here on are unlimited: Pinocchio stores the largest float for no limit.
-UNBOUNDED = 1e300
+UNLIMITED_EFFORT = 1e300
 
 
 def effort_limits(u: object, model: Model, acts: Sequence[Mask]) -> tuple[Array, Array] | None:
@@ -57,6 +57,6 @@ def _efforts(u: EffortLimits, model: Model) -> tuple[Array, Array]:
         return -most, most
     least, most = model.lowerEffortLimit.copy(), model.upperEffortLimit.copy()
     unstated = least >= most
-    least[unstated | (least <= -UNBOUNDED)] = -np.inf
-    most[unstated | (most >= UNBOUNDED)] = np.inf
+    least[unstated | (least <= -UNLIMITED_EFFORT)] = -np.inf
+    most[unstated | (most >= UNLIMITED_EFFORT)] = np.inf
     return np.ascontiguousarray(least), np.ascontiguousarray(most)

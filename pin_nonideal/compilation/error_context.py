@@ -29,7 +29,7 @@ from pin_nonideal.types import Model
 MAX_NAMED = 4  # names in a message
 
 
-def opened(name: str, gaps: dict[str, float], t: float, after: str = "") -> LoopClosureError:
+def open_loop_error(name: str, gaps: dict[str, float], t: float, after: str = "") -> LoopClosureError:
     """Return the exception of a run that has left its constraints.
 
     Args:
@@ -53,7 +53,9 @@ def singular_position(names: Sequence[str], t: float) -> StepSizeError:
         names: constraints with dependent rows.
         t: time [s].
     """
-    who = f"constraint {_listed(names)} is" if len(names) == 1 else f"constraints {_listed(names)} are"
+    who = (
+        f"constraint {_list_names(names)} is" if len(names) == 1 else f"constraints {_list_names(names)} are"
+    )
     rows = "its rows" if len(names) == 1 else "their rows"
     return StepSizeError(
         f"{who} in a singular position at t = {t:.6g} s, such as full stretch or a dead point, where {rows} "
@@ -102,20 +104,20 @@ def named_failure(
     if kind is kinds.not_converged:
         names = [program.element_names[i] for i in failure.elements]
         blocks = block_names(program)
-        return _unresolved(names or [blocks[i] for i in program.contacts], t)
+        return _modes_error(names or [blocks[i] for i in program.contacts], t)
     if kind is kinds.closure:
         name = program.constraints[failure.elements[0]].name
-        return opened(name, {name: value}, t)
+        return open_loop_error(name, {name: value}, t)
     if kind is kinds.interrupted:
         return RunInterrupted(f"the run was interrupted at t = {t:.4g} s", time=t)
     if kind is kinds.impact_energy:
         blocks = block_names(program)
         names = [blocks[i] for i in failure.elements]
-        return _gained(names, value, t, _touching(model, names, around.pairs))
+        return _impact_energy_error(names, value, t, _contact_bodies(model, names, around.pairs))
     if kind is kinds.stiff:
-        return _stiff(model, failure.elements[0], value, t, around.explicit_only)
+        return _stiffness_error(model, failure.elements[0], value, t, around.explicit_only)
     if kind is kinds.growing:
-        return _growing(model, failure.elements[0], around.sources[failure.elements[1]], value, t)
+        return _divergence_error(model, failure.elements[0], around.sources[failure.elements[1]], value, t)
     if kind is kinds.steps:
         return StepSizeError(
             f"the run has taken all of its max_steps = {value:.0f} steps by t = {t:.4g} s; allow more, "
@@ -131,7 +133,7 @@ def named_failure(
     return _stuck(value, t, around.explicit_only)
 
 
-def _listed(names: Sequence[str]) -> str:
+def _list_names(names: Sequence[str]) -> str:
     """Return names for a message: each in quotes, and the number of those beyond the first few."""
     shown = [f'"{name}"' for name in names[:MAX_NAMED]]
     if len(names) > MAX_NAMED:
@@ -139,7 +141,7 @@ def _listed(names: Sequence[str]) -> str:
     return shown[0] if len(shown) == 1 else f"{', '.join(shown[:-1])} and {shown[-1]}"
 
 
-def _touching(model: Model, names: Sequence[str], pairs: dict[str, tuple[str, str]]) -> str:
+def _contact_bodies(model: Model, names: Sequence[str], pairs: dict[str, tuple[str, str]]) -> str:
     """Return the two bodies of the first contact for a message, or an empty text if it has no frames."""
     frames = next((pairs[name] for name in names if name in pairs), None)
     if frames is None:
@@ -169,9 +171,9 @@ def _body(model: Model, name: str) -> str:
     return f'body "{frame.name}"'
 
 
-def _gained(names: Sequence[str], gain: float, t: float, bodies: str) -> RunError:
+def _impact_energy_error(names: Sequence[str], gain: float, t: float, bodies: str) -> RunError:
     return ImpactEnergyError(
-        f"the impact at {_listed(names)}{bodies} at t = {t:.6g} s gains {gain:.3g} J, as Newton's law of "
+        f"the impact at {_list_names(names)}{bodies} at t = {t:.6g} s gains {gain:.3g} J, as Newton's law of "
         'restitution with friction may; use Scene(..., impact="poisson"), a smaller restitution, or '
         "strict=False",
         element=", ".join(names),
@@ -180,7 +182,7 @@ def _gained(names: Sequence[str], gain: float, t: float, bodies: str) -> RunErro
     )
 
 
-def _growing(model: Model, dof: int, source: str, rate: float, t: float) -> RunError:
+def _divergence_error(model: Model, dof: int, source: str, rate: float, t: float) -> RunError:
     joint = str(model.names[joint_of(model, dof)])
     return DivergenceError(
         f'the speed of joint "{joint}" grows without bound by t = {t:.4g} s, by a factor of e every '
@@ -193,7 +195,7 @@ def _growing(model: Model, dof: int, source: str, rate: float, t: float) -> RunE
     )
 
 
-def _stiff(model: Model, dof: int, rate: float, t: float, explicit_only: str) -> RunError:
+def _stiffness_error(model: Model, dof: int, rate: float, t: float, explicit_only: str) -> RunError:
     joint = str(model.names[joint_of(model, dof)])
     ways_out = (
         "look at its damping, stiffness and inertia, or allow the steps with max_steps, since "
@@ -252,7 +254,7 @@ def _paradox(names: Sequence[str], failure: core.CoreFailure) -> RunError:
     }.get(failure.solutions, ("no solution or several", "reduce mu,"))
     limits = " and ".join(", ".join(f"{x:.4g}" for x in each) for each in failure.limits)
     return FrictionParadoxError(
-        f"friction of {_listed(names)} has {solutions} at t = {t:.4g} s: "
+        f"friction of {_list_names(names)} has {solutions} at t = {t:.4g} s: "
         + (f"limits of {limits} (N m or N), " if limits else "")
         + f'det(I - d lam\'/d lam) = {failure.value:.3g}; {way_out} or use reaction="ideal"',
         element=", ".join(names),
@@ -263,10 +265,11 @@ def _paradox(names: Sequence[str], failure: core.CoreFailure) -> RunError:
     )
 
 
-def _unresolved(names: Sequence[str], t: float) -> RunError:
+def _modes_error(names: Sequence[str], t: float) -> RunError:
     return FrictionConvergenceError(
-        f"it was not found at t = {t:.4g} s whether {_listed(names)} sticks or slips, although a motion may "
-        'exist; change an initial value a little, tighten rtol, use method="moreau", or give modes to solve',
+        f"it was not found at t = {t:.4g} s whether {_list_names(names)} sticks or slips, although a motion "
+        'may exist; change an initial value a little, tighten rtol, use method="moreau", or give modes to '
+        "solve",
         element=", ".join(names),
         time=t,
     )
@@ -290,9 +293,9 @@ def _stuck(steps: float, t: float, explicit_only: str) -> RunError:
 def _inconsistent(
     names: Sequence[str], residual: float, t: float, model: Model, pairs: dict[str, tuple[str, str]]
 ) -> RunError:
-    quoted = _listed(names)
+    quoted = _list_names(names)
     if residual == 0.0:  # the failure of an impact has no residual
-        bodies = _touching(model, names, pairs)
+        bodies = _contact_bodies(model, names, pairs)
         return InconsistentConstraintsError(
             f"no impulses part the bodies at {quoted}{bodies} as their restitution asks at t = {t:.2f} s: "
             "other constraints keep them from moving apart; lower restitution, or use "

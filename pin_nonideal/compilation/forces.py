@@ -8,7 +8,7 @@ from pin_nonideal.core_loader import core
 from pin_nonideal.description.forces import JointSpring, SpringDamper, UserForce, Wrench
 from pin_nonideal.errors import InputError, short_repr
 
-from .callbacks import checked
+from .callbacks import checked_function
 from .resolver import Resolver, words
 
 
@@ -43,11 +43,11 @@ def _(f: JointSpring, out: core.Builder, resolver: Resolver) -> None:
 def _(f: Wrench, out: core.Builder, resolver: Resolver) -> None:
     frame = resolver.frame(f.frame, words(f))
     if callable(f.value):
-        out.add_wrench(frame, function=checked(f.value, f"{words(f)}: value", (6,)))
+        out.add_wrench(frame, function=checked_function(f.value, f"{words(f)}: value", (6,)))
     else:
         out.add_wrench(frame, value=list(f.value))
 
 
 @lower_force.register
 def _(f: UserForce, out: core.Builder, resolver: Resolver) -> None:
-    out.add_user_force(checked(f.function, f"{words(f)}: function", (resolver.model.nv,)))
+    out.add_user_force(checked_function(f.function, f"{words(f)}: function", (resolver.model.nv,)))

@@ -9,7 +9,7 @@ from pin_nonideal.description.laws import Drag, JointFriction, LuGre, SigmoidFri
 from pin_nonideal.errors import InputError, short_repr
 from pin_nonideal.types import Array
 
-from .callbacks import Reactions, checked, checked_limits
+from .callbacks import Reactions, checked_function, checked_limits
 from .friction import LoweringContext, friction_joint, lower_joint_friction
 from .resolver import words
 
@@ -71,7 +71,7 @@ def _(law: Drag, name: str, out: core.Builder, context: LoweringContext) -> None
 def _(law: UserLaw, name: str, out: core.Builder, context: LoweringContext) -> None:
     nv, names = context.resolver.model.nv, context.reactions
     shapes = ((nv,), (law.states,)) if law.states else ((nv,),)
-    function = checked(law.function, f"{words(law, name)}: function", *shapes)
+    function = checked_function(law.function, f"{words(law, name)}: function", *shapes)
 
     def call(t: float, q: Array, v: Array, view: core.ReactionView | None, *z: Array) -> object:
         return function(t, q, v, None if view is None else Reactions(view, names), *z)
@@ -83,7 +83,7 @@ def _(law: UserLaw, name: str, out: core.Builder, context: LoweringContext) -> N
 @lower_law.register
 def _(law: UserFriction, name: str, out: core.Builder, context: LoweringContext) -> None:
     who, names = words(law, name), context.reactions
-    direction = checked(law.direction, f"{who}: direction", (context.resolver.model.nv,))
+    direction = checked_function(law.direction, f"{who}: direction", (context.resolver.model.nv,))
     limits = checked_limits(law.limit, f"{who}: limit")
 
     def bounds(t: float, q: Array, v: Array, view: core.ReactionView) -> tuple[float, float]:

@@ -64,12 +64,12 @@ def lower(spec: SceneSpec, builder: core.Builder, resolver: Resolver) -> Lowered
     Raises:
         InputError, UnknownNameError: a frame, joint or constraint does not exist or does not fit.
     """
-    items = list(lowered(spec, builder, resolver))
+    items = list(lower_stepwise(spec, builder, resolver))
     described = {each.name: each.description for each in items if each.kind in ("constraint", "contact")}
     return LoweredScene(described, [prepare for each in items for prepare in each.prepare])
 
 
-def lowered(spec: SceneSpec, builder: core.Builder, resolver: Resolver) -> Iterator[LoweredItem]:
+def lower_stepwise(spec: SceneSpec, builder: core.Builder, resolver: Resolver) -> Iterator[LoweredItem]:
     """Add one scene to the core's builder and yield each description after it is added.
 
     A contact is yielded twice: after its normal rows and after its friction.

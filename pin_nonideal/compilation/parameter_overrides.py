@@ -15,11 +15,11 @@ from pin_nonideal.types import Array, Table
 from pin_nonideal.validation import array, label
 
 from .compiled_scene import CompiledScene
-from .lowering import LoweredItem, lowered
+from .lowering import LoweredItem, lower_stepwise
 from .resolver import Resolver
 
 NUMBERS = (float, list, np.ndarray)  # types of keyword arguments that may differ between runs
-WRITES = ("add_", "set_", "let_")  # prefixes of builder methods that modify the program
+WRITER_PREFIXES = ("add_", "set_", "let_")  # prefixes of builder methods that modify the program
 # Negative principal moments down to this value times the largest are accepted: rounding of a thin rod.
 ROUNDING = 1e-9
 
@@ -116,7 +116,7 @@ def _parts(compiled: CompiledScene) -> dict[str, list[tuple[LoweredItem, _Relowe
     parts: dict[str, list[tuple[LoweredItem, _Relower]]] = {}
     kinds: dict[str, str] = {}
     begin = 0
-    for item in lowered(spec, builder, Resolver(compiled.model, compiled.q0)):
+    for item in lower_stepwise(spec, builder, Resolver(compiled.model, compiled.q0)):
         kind = kinds.setdefault(item.name, item.kind)
         name = item.name if kind == item.kind else f"{item.kind} {item.name}"
         parts.setdefault(name, []).append((item, _Relower(builder, builder.calls[begin:])))
@@ -234,7 +234,7 @@ class _Recorder:
 
     def __getattr__(self, name: str) -> object:
         method = getattr(self._builder, name)
-        if not name.startswith(WRITES):
+        if not name.startswith(WRITER_PREFIXES):
             return method
 
         def call(*positional: object, **named: object) -> object:
@@ -280,7 +280,7 @@ class _Relower:
         return self._arguments
 
     def __getattr__(self, name: str) -> object:
-        if not name.startswith(WRITES):
+        if not name.startswith(WRITER_PREFIXES):
             return getattr(self._builder, name)
 
         def call(*positional: object, **named: object) -> object:
@@ -290,18 +290,18 @@ class _Relower:
                 self._differs = True
                 return -1
             fixed = {key: value for key, value in expected.named.items() if not isinstance(value, NUMBERS)}
-            self._differs |= not _same(expected.positional, positional)
-            self._differs |= not all(_same(value, named[key]) for key, value in fixed.items())
+            self._differs |= not _are_equal(expected.positional, positional)
+            self._differs |= not all(_are_equal(value, named[key]) for key, value in fixed.items())
             self._arguments.append(named)
             return expected.result
 
         return call
 
 
-def _same(a: object, b: Any) -> bool:
+def _are_equal(a: object, b: Any) -> bool:
     """Check if two arguments are equal; any two functions count as equal unless their sources differ."""
     if isinstance(a, (tuple, list)):
-        return isinstance(b, (tuple, list)) and len(a) == len(b) and all(map(_same, a, b))
+        return isinstance(b, (tuple, list)) and len(a) == len(b) and all(map(_are_equal, a, b))
     if isinstance(a, np.ndarray):
         return bool(np.array_equal(a, b))
     if callable(a) and callable(b):

@@ -11,7 +11,7 @@ from pin_nonideal.types import Model
 
 from .compiled_scene import CompiledScene
 
-UNLIMITED = 1e3  # position limits from here on are never reached [rad or m]
+MAX_POSITION_LIMIT = 1e3  # position limits from here on are never reached [rad or m]
 
 
 def report(scene: CompiledScene, name: str, rank: int, notes: Sequence[str]) -> str:
@@ -36,7 +36,7 @@ def report(scene: CompiledScene, name: str, rank: int, notes: Sequence[str]) -> 
         lines.append(f"  law {name}")
     lines += [f"  force {_label(force)}" for force in scene.spec.forces]
     lines += [f"  actuation {_label(drive)}" for drive in drives_of(scene.spec.actuation)]
-    limited = [str(model.names[i]) for i in _passed(scene)]
+    limited = [str(model.names[i]) for i in _joints_without_stops(scene)]
     if limited:
         lines.append(f"  limits, which the motion may pass: {', '.join(limited)}")
     lines.append(f"rows {rows}, rank {rank}, mobility {model.nv - rank}")
@@ -47,7 +47,7 @@ def report(scene: CompiledScene, name: str, rank: int, notes: Sequence[str]) -> 
     redundant = rows - sum(name not in opening for name, _, _ in scene.dropped) - rank
     if redundant > 0:
         lines.append(f"  redundant: {redundant} further rows, decided at every step")
-    lines.append("skipped: " + (", ".join(_skipped(scene)) or "nothing"))
+    lines.append("skipped: " + (", ".join(_skipped_parts(scene)) or "nothing"))
     return "\n".join([*lines, *notes])
 
 
@@ -60,7 +60,7 @@ def _label(spec: object) -> str:
     return f"{name} ({kind})" if isinstance(name, str) else {"function": "function (t, q, v)"}.get(kind, kind)
 
 
-def _skipped(scene: CompiledScene) -> list[str]:
+def _skipped_parts(scene: CompiledScene) -> list[str]:
     """Return the parts of an evaluation that this scene skips."""
     skipped = []
     if not scene.slices:
@@ -74,20 +74,24 @@ def _skipped(scene: CompiledScene) -> list[str]:
         skipped.append("reactions (no law reads them)")
     if not spec.forces and spec.actuation is None:
         skipped.append("given forces (none)")
-    if _passed(scene):
+    if _joints_without_stops(scene):
         skipped.append("limits of joints (the motion may pass them)")
     return skipped
 
 
-def _passed(scene: CompiledScene) -> list[int]:
+def _joints_without_stops(scene: CompiledScene) -> list[int]:
     """Return the joints with position limits that are no stops of the scene."""
     stops = {c.joint for c in scene.spec.contacts if isinstance(c, JointLimit)}
     model = scene.model
-    return [i for i in range(1, model.njoints) if _limited(model, i) and str(model.names[i]) not in stops]
+    return [
+        i
+        for i in range(1, model.njoints)
+        if _has_position_limit(model, i) and str(model.names[i]) not in stops
+    ]
 
 
-def _limited(model: Model, joint: int) -> bool:
+def _has_position_limit(model: Model, joint: int) -> bool:
     """Check if a joint with one position coordinate has a reachable position limit."""
     i = model.idx_qs[joint]
     bounds = (model.lowerPositionLimit[i], model.upperPositionLimit[i])
-    return model.nqs[joint] == 1 and any(abs(bound) < UNLIMITED for bound in bounds)
+    return model.nqs[joint] == 1 and any(abs(bound) < MAX_POSITION_LIMIT for bound in bounds)

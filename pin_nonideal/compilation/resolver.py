@@ -128,7 +128,11 @@ class Resolver:
         frame = self.frame(c.frame, who)
         if frame[0] == plane[0]:
             raise InputError(f"{who}: frame and plane are on the same body, which cannot touch itself")
-        return moved(frame, getattr(c, "offset", (0.0, 0.0, 0.0))), moved(plane, level), axes
+        return (
+            translated_frame(frame, getattr(c, "offset", (0.0, 0.0, 0.0))),
+            translated_frame(plane, level),
+            axes,
+        )
 
     def capsules(self, c: SphereContact | CapsuleContact, who: str) -> tuple[Frame, Frame, float, float]:
         """Return frames at the segment centers, z along the segments, and the half lengths [m]."""
@@ -149,14 +153,14 @@ class Resolver:
         """Return frames at the centers of sphere and box, and half edges minus the rounding radius [m]."""
         first, second = self._two_bodies(c, who)
         half = [0.5 * edge - c.radius2 for edge in c.size]
-        return moved(first, c.offset), turned(moved(second, c.xyz), c.rpy), half
+        return translated_frame(first, c.offset), rotated_frame(translated_frame(second, c.xyz), c.rpy), half
 
     def hull(
         self, c: HullContact, who: str
     ) -> tuple[Frame, Frame, tuple[list[float], list[float], list[int]]]:
         """Return the frame at the sphere's center, the frame of the hull, and the hull in the core's form."""
         first, second = self._two_bodies(c, who)
-        return moved(first, c.offset), second, core_hull(c)
+        return translated_frame(first, c.offset), second, core_hull(c)
 
     def cylinder(
         self, c: CylinderContact, who: str
@@ -169,19 +173,29 @@ class Resolver:
         first, second = self._two_bodies(c, who)
         above = c.below if c.above is None else c.above
         first, half1 = along(first, np.array([c.offset, c.offset if c.end is None else c.end]), who)
-        return first, turned(moved(second, c.xyz), c.rpy), (0.5 * c.length, c.below, above), half1
+        return (
+            first,
+            rotated_frame(translated_frame(second, c.xyz), c.rpy),
+            (0.5 * c.length, c.below, above),
+            half1,
+        )
 
     def rim(self, c: RimContact, who: str) -> tuple[Frame, Frame, tuple[list[float], list[float], list[int]]]:
         """Return the frame at the disk's center, z along its axis, the frame of the hull, and the hull."""
         first, second = self._two_bodies(c, who)
-        return turned(moved(first, c.offset), c.rpy), second, core_hull(c)
+        return rotated_frame(translated_frame(first, c.offset), c.rpy), second, core_hull(c)
 
     def rims(self, c: RevolvedContact, who: str) -> tuple[Frame, Frame, Vector3, Vector3]:
         """Return frames at both centers, z along the axes, and (half length, radius, radius) of both [m]."""
         first, second = self._two_bodies(c, who)
         (length1, *radii1), (length2, *radii2) = c.solid1, c.solid2
         one, other = (0.5 * length1, radii1[0], radii1[1]), (0.5 * length2, radii2[0], radii2[1])
-        return turned(moved(first, c.xyz1), c.rpy1), turned(moved(second, c.xyz2), c.rpy2), one, other
+        return (
+            rotated_frame(translated_frame(first, c.xyz1), c.rpy1),
+            rotated_frame(translated_frame(second, c.xyz2), c.rpy2),
+            one,
+            other,
+        )
 
     def _two_bodies(self, c: Any, who: str) -> list[Frame]:
         ends = [self.frame(c.frame1, who), self.frame(c.frame2, who)]
@@ -213,7 +227,7 @@ class Resolver:
         return core.Load.prismatic, (lin / np.linalg.norm(lin)).tolist()
 
 
-def moved(frame: Frame, by: Sequence[float] | Array) -> Frame:
+def translated_frame(frame: Frame, by: Sequence[float] | Array) -> Frame:
     """Return the frame translated on its body.
 
     Args:
@@ -234,14 +248,14 @@ def along(frame: Frame, ends: Array, who: str) -> tuple[Frame, float]:
     """
     first, last = ends
     half = 0.5 * float(np.linalg.norm(last - first))
-    joint, R, p = moved(frame, 0.5 * (first + last))
+    joint, R, p = translated_frame(frame, 0.5 * (first + last))
     if half > 0.0:
         triad = axis_triad(unit_axis(who, last - first))
         R = (np.reshape(R, (3, 3)) @ np.column_stack(triad)).ravel().tolist()
     return (joint, R, p), half
 
 
-def turned(frame: Frame, rpy: Sequence[float] | Array) -> Frame:
+def rotated_frame(frame: Frame, rpy: Sequence[float] | Array) -> Frame:
     """Return the frame rotated about its origin.
 
     Args:

@@ -11,13 +11,13 @@ from pin_nonideal.description.drive_kinds import held_tables, sampled_drives
 from pin_nonideal.errors import InputError, UserFunctionError
 from pin_nonideal.states.joint_layout import joint_places
 from pin_nonideal.states.parsing import (
-    joint_named,
+    find_joint,
     named_joint_values,
 )
 from pin_nonideal.types import Array, Mask, Model
 from pin_nonideal.validation import by_name
 
-from .callbacks import checked
+from .callbacks import checked_function
 from .resolver import words
 from .torques import (
     SAMPLE_ROUNDING,
@@ -57,7 +57,7 @@ def sampled_torque(u: SampledControl, model: Model) -> Callable[..., object]:
         model: pinocchio.Model.
     """
     who = f"{words(u)}: function"
-    function = checked(named_torques(u.function, model, who), who, (model.nv,))
+    function = checked_function(named_torques(u.function, model, who), who, (model.nv,))
     if u.joints is None:
         return function
     others = ~commanded_by_control(u, model)
@@ -90,7 +90,7 @@ def commanded_by_control(u: SampledControl, model: Model) -> Mask:
     """
     acts = np.full(model.nv, u.joints is None)
     for name in u.joints or ():
-        j = joint_named(model, name, f"{words(u)}: joints")
+        j = find_joint(model, name, f"{words(u)}: joints")
         acts[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]] = True
     return acts
 

@@ -129,7 +129,7 @@ def describe(scene: CompiledScene, name: str) -> Description:
         for key, s in scene.slices.items()
     ]
     held = len(spec.constraints)
-    kinds = [_made(each) for each in (*spec.constraints, *spec.contacts)]
+    kinds = [_kind_and_arguments(each) for each in (*spec.constraints, *spec.contacts)]
     tables = [{**row, **kind} for row, kind in zip(rows, kinds, strict=True)]
     names = unique_names(spec.laws, set())
     return Description(
@@ -137,9 +137,9 @@ def describe(scene: CompiledScene, name: str) -> Description:
         joints=_joints(scene.model, scene),
         constraints=tables[:held],
         contacts=tables[held:],
-        laws=[{"name": n, **_made(law)} for n, law in zip(names, spec.laws, strict=True)],
-        forces=[_made(force) for force in spec.forces],
-        actuation=None if spec.actuation is None else _made(spec.actuation),
+        laws=[{"name": n, **_kind_and_arguments(law)} for n, law in zip(names, spec.laws, strict=True)],
+        forces=[_kind_and_arguments(force) for force in spec.forces],
+        actuation=None if spec.actuation is None else _kind_and_arguments(spec.actuation),
     )
 
 
@@ -181,7 +181,7 @@ def _limit(x: float) -> float | None:
     return float(x) if np.isfinite(x) and abs(x) < NO_LIMIT else None
 
 
-def _made(spec: object) -> Table:
+def _kind_and_arguments(spec: object) -> Table:
     """Return the kind of a description and its arguments as plain values; functions appear by name."""
     fields = (
         {f.name: getattr(spec, f.name) for f in dataclasses.fields(spec)}
@@ -190,23 +190,23 @@ def _made(spec: object) -> Table:
     )
     kind, drives = type(spec).__name__, drives_of(spec)
     if drives and drives[0] is not spec:
-        kind, fields = DRIVES, {"drives": [_made(drive) for drive in drives]}
+        kind, fields = DRIVES, {"drives": [_kind_and_arguments(drive) for drive in drives]}
     elif kind in ("ndarray", "list", "tuple"):
         kind, fields = "constant torques", {"torque": spec}
     elif isinstance(spec, Mapping):
         kind, fields = "constant torques", dict(spec)
     elif kind == "function":
         kind, fields = "function (t, q, v)", {"function": spec}
-    return {"kind": kind, "made_with": {key: _plain(x) for key, x in fields.items()}}
+    return {"kind": kind, "made_with": {key: _plain_value(x) for key, x in fields.items()}}
 
 
-def _plain(x: object) -> object:
+def _plain_value(x: object) -> object:
     if isinstance(x, np.ndarray):
         return x.tolist()
     if isinstance(x, (list, tuple)):
-        return [_plain(each) for each in x]
+        return [_plain_value(each) for each in x]
     if isinstance(x, Mapping):
-        return {str(name): _plain(each) for name, each in x.items()}
+        return {str(name): _plain_value(each) for name, each in x.items()}
     if isinstance(x, np.generic):
         return x.item()
     if x is None or isinstance(x, (bool, int, float, str)):

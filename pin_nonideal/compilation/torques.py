@@ -14,13 +14,13 @@ from pin_nonideal.types import Array, Model
 from pin_nonideal.validation import by_name, label
 
 
-class Constant(NamedTuple):
+class ConstantTorque(NamedTuple):
     """Constant torques tau, (nv,)."""
 
     tau: Array
 
 
-class Timed(NamedTuple):
+class TimedTorque(NamedTuple):
     """Torques `values`, (nt, nv), at `times` [s], (nt,), linear in between. Steps end at every time.
 
     With `held` the times come in pairs with equal values, one pair for each value of a zero-order hold.
@@ -39,7 +39,7 @@ class Spring(NamedTuple):
     q: Array
 
 
-class Called(NamedTuple):
+class TorqueFunction(NamedTuple):
     """Torques of a function (t, q, v) -> tau, held between samples of `period` [s] if it is not None.
 
     Steps end at the times `breaks` [s], (n,), where torques that are not held may jump. The torques of the
@@ -49,11 +49,11 @@ class Called(NamedTuple):
     function: Callable[..., Any]
     period: float | None
     breaks: Array = np.zeros(0)
-    beside: Timed | None = None
+    beside: TimedTorque | None = None
     prepare: Callable[[], object] | None = None
 
 
-Part = Constant | Timed | Spring | Called
+Part = ConstantTorque | TimedTorque | Spring | TorqueFunction
 
 # Samples of a control and times of a held table that differ by less than this part of a period are equal.
 SAMPLE_ROUNDING = 1e-9
@@ -81,20 +81,22 @@ def sum_of_torques(parts: Sequence[Part], drives: Sequence[object], model: Model
     Raises:
         InputError: sampled torques cannot be added to torques that change between their samples.
     """
-    if all(isinstance(part, Constant) for part in parts):
-        return Constant(np.sum([part.tau for part in parts], axis=0))  # type: ignore[union-attr]
-    if all(isinstance(part, (Constant, Timed)) for part in parts):
+    if all(isinstance(part, ConstantTorque) for part in parts):
+        return ConstantTorque(np.sum([part.tau for part in parts], axis=0))  # type: ignore[union-attr]
+    if all(isinstance(part, (ConstantTorque, TimedTorque)) for part in parts):
         return _sum_of_tables(parts)
     springs = [part for part in parts if isinstance(part, Spring)]
     if len(springs) == len(parts):
         return _sum_of_springs(springs, model)
-    periods = sorted({part.period for part in parts if isinstance(part, Called) and part.period is not None})
+    periods = sorted(
+        {part.period for part in parts if isinstance(part, TorqueFunction) and part.period is not None}
+    )
     if periods:
         _require_steady(parts, drives)
-    late = SAMPLE_ROUNDING * periods[0] if periods else 0.0
-    linear = [part for part in parts if periods and isinstance(part, Timed) and not part.held]
+    time_shift = SAMPLE_ROUNDING * periods[0] if periods else 0.0
+    linear = [part for part in parts if periods and isinstance(part, TimedTorque) and not part.held]
     functions = [
-        _function_of(part, model, late) for part in parts if not any(part is table for table in linear)
+        _function_of(part, model, time_shift) for part in parts if not any(part is table for table in linear)
     ]
 
     def total(t: float, q: Array, v: Array) -> Array:
@@ -104,22 +106,22 @@ def sum_of_torques(parts: Sequence[Part], drives: Sequence[object], model: Model
         return tau
 
     if periods:
-        return Called(total, periods[0], beside=_sum_of_tables(linear) if linear else None)
-    times = [part.times for part in parts if isinstance(part, Timed)]
-    times += [part.breaks for part in parts if isinstance(part, Called)]
-    return Called(total, None, np.unique(np.concatenate([np.zeros(0), *times])))
+        return TorqueFunction(total, periods[0], beside=_sum_of_tables(linear) if linear else None)
+    times = [part.times for part in parts if isinstance(part, TimedTorque)]
+    times += [part.breaks for part in parts if isinstance(part, TorqueFunction)]
+    return TorqueFunction(total, None, np.unique(np.concatenate([np.zeros(0), *times])))
 
 
 def _require_steady(parts: Sequence[Part], drives: Sequence[object]) -> None:
-    """Check that torques beside sampled torques are those of tables, or constant between the samples.
+    """Check that torques in addition to sampled torques come from tables, or are constant between samples.
 
     Raises:
         InputError: see above.
     """
-    periods = [part.period if isinstance(part, Called) else None for part in parts]
+    periods = [part.period if isinstance(part, TorqueFunction) else None for part in parts]
     sampled = next(k for k, period in enumerate(periods) if period is not None)
     for part, period, drive in zip(parts, periods, drives, strict=True):
-        if isinstance(part, (Constant, Timed)) or period == periods[sampled]:
+        if isinstance(part, (ConstantTorque, TimedTorque)) or period == periods[sampled]:
             continue
         got = kind_of_drive(drive) + ("" if period is None else f" with a period of {period:g} s")
         raise InputError(
@@ -129,20 +131,20 @@ def _require_steady(parts: Sequence[Part], drives: Sequence[object]) -> None:
         )
 
 
-def _sum_of_tables(parts: Sequence[Part]) -> Timed:
+def _sum_of_tables(parts: Sequence[Part]) -> TimedTorque:
     """Return the sum of tables and constant torques: a table with all times."""
-    tables = [part for part in parts if isinstance(part, Timed)]
+    tables = [part for part in parts if isinstance(part, TimedTorque)]
     times = np.unique(np.concatenate([table.times for table in tables]))
     values = np.zeros((times.size, tables[0].values.shape[1]))
     for part in parts:
-        if isinstance(part, Timed):
-            values += np.array([_interpolated(part, float(t)) for t in times])
-        elif isinstance(part, Constant):
+        if isinstance(part, TimedTorque):
+            values += np.array([_table_torque(part, float(t)) for t in times])
+        elif isinstance(part, ConstantTorque):
             values += part.tau
-    return Timed(times, values)
+    return TimedTorque(times, values)
 
 
-def _interpolated(table: Timed, t: float) -> Array:
+def _table_torque(table: TimedTorque, t: float) -> Array:
     """Return the torques of a table at a time, as the core computes them, (nv,)."""
     times, values, held = table
     if t <= times[0] or t >= times[-1]:
@@ -165,12 +167,12 @@ def _sum_of_springs(springs: Sequence[Spring], model: Model) -> Spring:
     return Spring(np.sum([s.kp for s in springs], axis=0), np.sum([s.kd for s in springs], axis=0), q)
 
 
-def _function_of(part: Part, model: Model, late: float) -> Callable[..., object]:
-    """Return the torques of a part as a function (t, q, v) -> tau; a table is read `late` [s] after t."""
-    if isinstance(part, Called):
+def _function_of(part: Part, model: Model, time_shift: float) -> Callable[..., object]:
+    """Return the torques of a part as (t, q, v) -> tau; tables are read `time_shift` [s] after t."""
+    if isinstance(part, TorqueFunction):
         return part.function
-    if isinstance(part, Timed):
-        return lambda t, q, v: _interpolated(part, t + late)
-    if isinstance(part, Constant):
+    if isinstance(part, TimedTorque):
+        return lambda t, q, v: _table_torque(part, t + time_shift)
+    if isinstance(part, ConstantTorque):
         return lambda t, q, v: part.tau
     return lambda t, q, v: part.kp * pin.difference(model, q, part.q) - part.kd * v

@@ -1,8 +1,8 @@
 """Torques tau that drive a scene, in generalized coordinates (shape nv).
 
 A scene accepts None, constant torques, a function (t, q, v) -> tau that is called at every evaluation, one of
-the descriptions below, or a list of drives, whose torques add. Torques are arrays (nv,) or tables by joint
-name, also those of functions.
+the descriptions below, or a list of drives, whose torques add. Torques, also the results of functions, are
+arrays (nv,) or tables by joint name.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ __all__ = [
 ]
 
 MAX_DELAY = 1_000_000_000  # samples
-WHOLE = 1e-9  # a delay this part of a period above a whole number of periods is rounded down
+PERIOD_ROUNDING = 1e-9  # a delay this part of a period above a whole number of periods is rounded down
 Gain = float | Sequence[float] | NDArray[np.float64] | Mapping[str, ArrayLike]
 
 
@@ -54,11 +54,11 @@ class SampledControl:
     torque `initial` acts for the first d samples. Each run starts without earlier samples: each call of
     `simulate`, each run of a `rollout`, and each `Stepper.reset`. Single states and steps
     (`Scene.acceleration`, `Scene.solve`, `Scene.step`) have no earlier samples, so `initial` acts there.
-    Torques that replace the actuation, as those of `Stepper.step` and of a callback, act without delay.
+    Torques that replace the actuation, in `Stepper.step` and in a callback, act without delay.
 
-    A control with `joints` may stand in a list of drives. The others are constant torques, controls and
-    `TrackTrajectory` drives of the same period, and tables. A `Table` with interpolation "hold" has times
-    t0 + k period. A linear one has any times. One control of a list may have a delay.
+    A control with `joints` may stand in a list of drives. The other drives are constant torques, controls and
+    `TrackTrajectory` drives of the same period, and tables. A `Table` with interpolation "hold" has times t0
+    + k period. A linear one has any times. One control of a list may have a delay.
 
     Args:
         function: (t, q, v) -> tau, shape (nv,) or by joint name, called once per period.
@@ -88,7 +88,7 @@ class SampledControl:
         function(f"{who}: function", self.function, "(t, q, v) -> tau")
         object.__setattr__(self, "period", positive(f"{who}: period", self.period))
         object.__setattr__(self, "delay", nonnegative(f"{who}: delay", self.delay))
-        samples = count(f"{who}: delay_samples", self.delay_samples, most=MAX_DELAY)
+        samples = count(f"{who}: delay_samples", self.delay_samples, max_value=MAX_DELAY)
         object.__setattr__(self, "delay_samples", samples)
         if self.delay and samples:
             raise InputError(
@@ -113,7 +113,7 @@ class SampledControl:
     @property
     def delay_in_samples(self) -> int:
         """Delay as a number of samples; a delay in seconds is rounded up."""
-        return self.delay_samples or math.ceil(self.delay / self.period - WHOLE)
+        return self.delay_samples or math.ceil(self.delay / self.period - PERIOD_ROUNDING)
 
 
 @dataclass(frozen=True, eq=False)
@@ -258,9 +258,9 @@ def sample_times(who: str, values: object) -> Array:
     times = array(f"{who}: times", values, (None,))
     if times.size == 0:
         raise InputError(f"{who}: times must hold at least one sample; got none")
-    late = np.flatnonzero(np.diff(times) <= 0.0)
-    if late.size:
-        i = int(late[0])
+    disorder = np.flatnonzero(np.diff(times) <= 0.0)
+    if disorder.size:
+        i = int(disorder[0])
         raise InputError(
             f"{who}: times must increase; times[{i + 1}] = {times[i + 1]:g} does not follow "
             f"times[{i}] = {times[i]:g}"

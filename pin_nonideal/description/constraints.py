@@ -131,7 +131,7 @@ class HingeAnchor:
     """Holds the origins of two frames together and lets them turn about one common axis u: a hinge.
 
     Residual: phi = [R2^T (p1 - p2); t1 . (u x u'); t2 . (u x u')], [m; rad]. u' = R2^T R1 u is the axis fixed
-    in frame1, and t1, t2 are those of `validation.axis_triad(u)`. The last two components are scaled by
+    in frame1, and `validation.axis_triad(u)` gives t1 and t2. The last two components are scaled by
     angle/sine, so they measure the angle between the axes. The axes must point in the same direction. With
     frame2=None, u is replaced by R1(start) u and all components are in world axes.
     Rows: 5, three of position and two of orientation.
@@ -366,7 +366,7 @@ class UserConstraint:
         _name(self)
         who = label(self)
         function(f"{who}: function", self.function, "(t, q, v, data) -> (A, b)")
-        object.__setattr__(self, "size", count(f"{who}: size", self.size, least=1, most=MAX_ROWS))
+        object.__setattr__(self, "size", count(f"{who}: size", self.size, min_value=1, max_value=MAX_ROWS))
         if self.residual is not None:
             function(f"{who}: residual", self.residual, "(t, q) -> phi")
         if self.rate is not None:

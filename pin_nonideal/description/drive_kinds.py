@@ -10,7 +10,7 @@ from .scene_drive import SceneDrive
 
 
 def requesting_drives(actuation: object) -> list[object]:
-    """Return the drives that request torques, those within effort limits included.
+    """Return the drives that request torques, including drives inside `EffortLimits`.
 
     Args:
         actuation: the actuation of a scene, as returned by `given_actuation`.

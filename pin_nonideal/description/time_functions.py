@@ -119,9 +119,9 @@ class Spline:
         if times.size < 2:
             raise InputError(f"Spline: times must hold at least two samples; got {times.size}")
         values = array("Spline: values", self.values, (times.size,))
-        late = np.flatnonzero(np.diff(times) <= 0.0)
-        if late.size:
-            i = int(late[0])
+        disorder = np.flatnonzero(np.diff(times) <= 0.0)
+        if disorder.size:
+            i = int(disorder[0])
             raise InputError(
                 f"Spline: times must increase; times[{i + 1}] = {times[i + 1]:g} does not follow "
                 f"times[{i}] = {times[i]:g}; sort the samples and drop repeated ones"

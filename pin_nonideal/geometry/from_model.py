@@ -34,7 +34,7 @@ from pin_nonideal.validation import (
 
 from .ground import ground as plain_ground
 from .manifold import ManifoldContact, manifold
-from .shapes import Shape, object_named, shape_of
+from .shapes import Shape, geometry_object, shape_of
 
 __all__ = ["GeometryContact", "geometry_contacts", "ground_contacts"]
 
@@ -58,7 +58,7 @@ class GeometryContact:
             need not be in the collision model, such as `ground()`.
         mu: kinetic coefficient of friction.
         static_ratio: static over kinetic friction, at least 1.
-        restitution: rate at which the gap opens after an impact over that at which it closed, 0 to 1.
+        restitution: opening rate of the gap after an impact over its closing rate before, 0 to 1.
         name: name in messages and results; if there are several contact points, their names are numbered.
         rounding: radius of rounded edges [m], for boxes and convex meshes against each other and against
             cylinders or cones. The same length rounds the rims of two cylinders or cones, and is the inset of
@@ -114,7 +114,7 @@ def geometry_contacts(
         links: names of links; only pairs with a shape on one of these links are used. The name of a joint
             selects all shapes that move with this joint. None selects all pairs.
         adjacent: whether the shapes of two bodies with a common joint may touch. The shapes of most robots
-            overlap there; an SRDF file disables these pairs by name.
+            overlap at their joints; an SRDF file disables these pairs by name.
         mu: kinetic coefficient of friction of all contacts.
         static_ratio: static over kinetic friction of all contacts, at least 1.
         restitution: coefficient of restitution of all contacts, 0 to 1.
@@ -194,7 +194,7 @@ def ground_contacts(
     if ground is None:
         ground = plain_ground()
     elif not isinstance(ground, pin.GeometryObject):
-        object_named(who, text(f"{who}: ground", ground), collision_model)
+        geometry_object(who, text(f"{who}: ground", ground), collision_model)
     below = str(ground.name if isinstance(ground, pin.GeometryObject) else ground)
     if links is None:
         shapes = {i: "" for i, item in enumerate(objects) if item.parentJoint and item.name != below}
@@ -202,10 +202,10 @@ def ground_contacts(
             raise InputError(f"{who}: collision_model must have a shape on a moving body; it has none")
     else:
         shapes = _shapes_of_links(who, links, model, objects)
-    alone = [link for link in shapes.values() if link and list(shapes.values()).count(link) == 1]
+    single_links = [link for link in shapes.values() if link and list(shapes.values()).count(link) == 1]
     return [
         GeometryContact(
-            objects[i].name, ground, name=f"{link} on {below}" if link in alone else None, **rubbing
+            objects[i].name, ground, name=f"{link} on {below}" if link in single_links else None, **rubbing
         )
         for i, link in shapes.items()
     ]
@@ -313,4 +313,4 @@ def _manifold(c: GeometryContact, model: Model, geometry: GeometryModel) -> list
 
 def _shape(who: str, item: str | GeometryObject, model: Model, geometry: GeometryModel) -> Shape:
     is_object = isinstance(item, pin.GeometryObject)
-    return shape_of(who, item if is_object else object_named(who, item, geometry), model)
+    return shape_of(who, item if is_object else geometry_object(who, item, geometry), model)

@@ -22,9 +22,9 @@ def ground(
 ) -> GeometryObject:
     """Return the ground, a half-space fixed to the world, as a shape for collision models and contacts.
 
-    The points x with n . x <= height belong to the ground. `GeometryContact("box", pn.ground())` takes it as
-    it is. `collision_model.addGeometryObject(pn.ground())` makes it a shape of the scene, which contacts find
-    by its name. A replay draws the floor of contacts as a grid, and other planes as plates around the
+    The points x with n . x <= height belong to the ground. `GeometryContact("box", pn.ground())` accepts it
+    directly. `collision_model.addGeometryObject(pn.ground())` makes it a shape of the scene, which contacts
+    find by its name. A replay draws the floor of contacts as a grid, and other planes as plates around the
     contact points.
 
     Args:

@@ -129,7 +129,7 @@ def _half_space_contacts(
         for point in face_points(shape, end, radius):
             yield PointContact(shape.frame, offset=point, **level)
         middle = to_joint_frame(shape, 0.0, 0.0, end - np.copysign(inset, end))
-        # The rim is that of a disk, an ellipsoid without thickness.
+        # The rim belongs to a disk, an ellipsoid without thickness.
         yield EllipsoidContact(shape.frame, (radius, radius, 0.0), offset=middle, rpy=rpy, **level)
 
 

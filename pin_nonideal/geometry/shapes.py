@@ -13,7 +13,7 @@ from pin_nonideal.types import Array, CollisionGeometry, GeometryModel, Geometry
 
 # Corners of a box of half edges 1.
 CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))
-KNOWN = "spheres, capsules, boxes, cylinders, cones, ellipsoids, half-spaces and convex meshes"
+SUPPORTED_SHAPES = "spheres, capsules, boxes, cylinders, cones, ellipsoids, half-spaces and convex meshes"
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Shape:
         return self.radius > 0.0
 
 
-def object_named(who: str, name: str, geometry: GeometryModel) -> GeometryObject:
+def geometry_object(who: str, name: str, geometry: GeometryModel) -> GeometryObject:
     """Return the geometry object of a name.
 
     Args:
@@ -122,7 +122,7 @@ def _corners(what: str, mesh: CollisionGeometry, scale: Array) -> Array:
         points = np.array([mesh.point(i) for i in range(mesh.num_points)])
         return convex_hull(points * scale, what).points
     if "BVH" not in kind:
-        raise InputError(f"{what} is a {kind}; {KNOWN} do")
+        raise InputError(f"{what} is a {kind}; {SUPPORTED_SHAPES} do")
     points = np.array(mesh.vertices()) * scale
     triangles = [mesh.tri_indices(i) for i in range(mesh.num_tris)]
     check_convex(points, np.array([[t[k] for k in range(3)] for t in triangles]), what)

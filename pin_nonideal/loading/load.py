@@ -17,7 +17,7 @@ from pin_nonideal.errors import InputError, short_repr
 from pin_nonideal.loading.library.example_robots import example_names
 from pin_nonideal.loading.robot_files import LoadedRobot, find_robot, robot_folders
 from pin_nonideal.loading.urdf.loop_tolerance import remove_dependent_rows
-from pin_nonideal.loading.urdf.xml import listed
+from pin_nonideal.loading.urdf.xml import quote_names
 from pin_nonideal.loading.yaml.assembly import scene_arguments
 from pin_nonideal.loading.yaml.initial_state import Start, held_entries
 from pin_nonideal.scene.scene import Scene, with_origin
@@ -145,14 +145,14 @@ def _add_limits(arguments: Table, used: bool, ranges: Sequence[UserContact]) -> 
     empty = [str(model.names[i]) for i, at in single if low[at] >= high[at]]
     if used:
         if empty:
-            note = f"joints without a range (their bounds are equal) get no stops: {listed(empty)}"
+            note = f"joints without a range (their bounds are equal) get no stops: {quote_names(empty)}"
             arguments["notes"] = (*arguments.get("notes", ()), note)
         stops = [JointLimit(name) for name in bounded]
         arguments["contacts"] = (*arguments.get("contacts", ()), *stops, *ranges)
         return
     unused = [f"of the positions of {len(bounded)} joints"] if bounded else []
     if ranges:
-        unused.append(f"of ball joints and tendons ({listed([str(one.name) for one in ranges])})")
+        unused.append(f"of ball joints and tendons ({quote_names([str(one.name) for one in ranges])})")
     if unused:
         note = f"bounds {' and '.join(unused)} are not used; limits=True makes them stops"
         arguments["notes"] = (*arguments.get("notes", ()), note)
@@ -201,8 +201,8 @@ def _origin(text: str, parameters: Table) -> Table | None:
     recorded, path = dict(parameters), Path(text).expanduser()
     folders = recorded.get("package_dirs")
     if folders is not None:
-        listed = [folders] if isinstance(folders, (str, Path)) else folders
-        recorded["package_dirs"] = [str(Path(folder).resolve()) for folder in listed]
+        quote_names = [folders] if isinstance(folders, (str, Path)) else folders
+        recorded["package_dirs"] = [str(Path(folder).resolve()) for folder in quote_names]
     own = text in (*robot_folders(), *example_names()) or not path.exists()
     try:
         return dict(

@@ -116,13 +116,13 @@ def _file_options(parameters: Table, name: str) -> tuple[Table, bool]:
 def _load_mjcf(path: Path, parameters: Table) -> LoadedRobot:
     # Imported on use, since most programs load no MJCF file.
     from pin_nonideal.loading.mjcf.reader import read_mjcf
-    from pin_nonideal.loading.mjcf.unsupported import ALLOWED
+    from pin_nonideal.loading.mjcf.unsupported import IGNORABLE_FEATURES
 
     check_parameters(parameters, MJCF_PARAMETERS, path.name)
     allow = parameters.get("allow", ())
     allow = (allow,) if isinstance(allow, str) else tuple(sequence("allow", allow))
     for key in allow:
-        choice("allow", key, ALLOWED)
+        choice("allow", key, IGNORABLE_FEATURES)
     return LoadedRobot(read_mjcf(path, **{**parameters, "allow": allow}), {}, path.stem)
 
 
@@ -161,7 +161,7 @@ def _load_folder(folder: Path, parameters: Table) -> LoadedRobot:
     for key in kinds:
         optional_string(entry, key, f'"{yaml_path}": model')
     if "generator" in entry:
-        return _generated(entry, table, parameters, name, yaml_path)
+        return _generate(entry, table, parameters, name, yaml_path)
     if "example_robot_data" in entry:
         check_parameters(parameters, (), name)
         robot = example_robot(entry["example_robot_data"], [])
@@ -192,7 +192,7 @@ def _flag(entry: Table, key: str, name: str) -> bool:
     return value
 
 
-def _generated(entry: Table, table: Table, parameters: Table, name: str, path: Path) -> LoadedRobot:
+def _generate(entry: Table, table: Table, parameters: Table, name: str, path: Path) -> LoadedRobot:
     """Return a robot that a function of this package builds from parameters."""
     key = entry["generator"]
     if key not in GENERATORS:

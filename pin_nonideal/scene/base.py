@@ -25,7 +25,7 @@ from pin_nonideal.states.loop_closure import CLOSURE_TOLERANCE
 from pin_nonideal.types import GeometryModel, Model, State, Table
 from pin_nonideal.validation import choice, nonnegative, optional_text, sequence
 
-from .copying import copied, packed, parts_of, rebuilt
+from .copying import copy_scene, pack, parts_of, rebuilt
 from .evaluation import Evaluator
 from .queries import Queries
 from .shapes import SceneShapes
@@ -143,10 +143,10 @@ class SceneBase:
         super().__setattr__(key, value)
 
     def __reduce__(self) -> tuple[object, ...]:
-        return rebuilt, (type(self), packed(self._parts(), self.name))
+        return rebuilt, (type(self), pack(self._parts(), self.name))
 
     def __deepcopy__(self: S, memo: dict[int, object]) -> S:
-        return copied(self, self._parts(), memo)  # type: ignore[no-any-return]
+        return copy_scene(self, self._parts(), memo)  # type: ignore[no-any-return]
 
     def _parts(self) -> Table:
         return parts_of(self, self._origin, self._origin.shapes or self._shapes.sources, self._states.held)

@@ -15,7 +15,7 @@ from pin_nonideal.validation import label
 LISTS = ("constraints", "laws", "contacts", "forces")
 
 
-class Packed:
+class PickledObject:
     """An object serialized by cloudpickle because pickle does not support it, such as a local function.
 
     Args:
@@ -58,7 +58,7 @@ def rebuilt(kind: type, parts: Table) -> Any:
         kind: Scene, or a class derived from it.
         parts: result of `parts_of`, packed or not.
     """
-    arguments = {key: _unpacked(value) for key, value in parts["made"].items()}
+    arguments = {key: _unpack_object(value) for key, value in parts["made"].items()}
     if parts["order"] is not None:
         remember_order(parts["model"], parts["order"])
     scene = kind(parts["model"], **arguments)
@@ -67,7 +67,7 @@ def rebuilt(kind: type, parts: Table) -> Any:
     return scene
 
 
-def copied(scene: Any, parts: Table, memo: dict[int, object]) -> Any:
+def copy_scene(scene: Any, parts: Table, memo: dict[int, object]) -> Any:
     """Return a deep copy of a scene with a copy of its model; user functions are shared.
 
     Args:
@@ -81,7 +81,7 @@ def copied(scene: Any, parts: Table, memo: dict[int, object]) -> Any:
     return rebuilt(type(scene), parts | {"model": scene.model.copy()})
 
 
-def packed(parts: Table, name: str) -> Table:
+def pack(parts: Table, name: str) -> Table:
     """Return the parts, with cloudpickle applied to objects that pickle does not support.
 
     Args:
@@ -95,13 +95,13 @@ def packed(parts: Table, name: str) -> Table:
     for key in (*LISTS, "actuation", "visual_model", "collision_model"):
         value = arguments[key]
         if isinstance(value, tuple):
-            arguments[key] = tuple(_packed(each, label(each), name) for each in value)
+            arguments[key] = tuple(_pack_object(each, label(each), name) for each in value)
         else:
-            arguments[key] = _packed(value, key, name)
+            arguments[key] = _pack_object(value, key, name)
     return {**parts, "made": arguments}
 
 
-def _packed(value: object, what: str, scene: str) -> object:
+def _pack_object(value: object, what: str, scene: str) -> object:
     if value is None or isinstance(value, str):
         return value
     try:
@@ -113,7 +113,7 @@ def _packed(value: object, what: str, scene: str) -> object:
     try:
         import cloudpickle
 
-        return Packed(cloudpickle.dumps(value))
+        return PickledObject(cloudpickle.dumps(value))
     except ImportError:
         advice += ", or pip install cloudpickle"
     except Exception as error:
@@ -122,7 +122,7 @@ def _packed(value: object, what: str, scene: str) -> object:
     raise InputError(f'scene "{scene}" cannot be pickled: {what} cannot ({reason}); {advice}')
 
 
-def _unpacked(value: object) -> object:
+def _unpack_object(value: object) -> object:
     if isinstance(value, tuple):
-        return tuple(_unpacked(each) for each in value)
-    return pickle.loads(value.content) if isinstance(value, Packed) else value
+        return tuple(_unpack_object(each) for each in value)
+    return pickle.loads(value.content) if isinstance(value, PickledObject) else value

@@ -15,7 +15,7 @@ from pin_nonideal.types import State
 
 from .base import SceneBase
 from .copying import rebuilt
-from .editing import UNCHANGED, Unchanged, on_ground, parts_of_replacement
+from .editing import UNCHANGED, UnchangedType, on_ground, parts_of_replacement
 
 S = TypeVar("S", bound="EditableScene")
 
@@ -35,7 +35,7 @@ class EditableScene(SceneBase):
         add_contacts: Sequence[Contact | GeometryContact] = (),
         add_forces: Sequence[Force] = (),
         remove: Sequence[str] = (),
-        actuation: Actuation | Unchanged | None = UNCHANGED,
+        actuation: Actuation | UnchangedType | None = UNCHANGED,
         q0: State | None = None,
         v0: State | None = None,
         name: str | None = None,

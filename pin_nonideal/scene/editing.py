@@ -22,14 +22,14 @@ from .state import SceneStates
 KINDS = ("constraints", "laws", "contacts", "forces")
 
 
-class Unchanged:
+class UnchangedType:
     """Default of an argument that keeps its present value."""
 
     def __repr__(self) -> str:
         return "unchanged"
 
 
-UNCHANGED = Unchanged()
+UNCHANGED = UnchangedType()
 
 
 def parts_after(
@@ -94,7 +94,7 @@ def parts_of_replacement(
         UnknownNameError: there is no description of a name in `remove`.
     """
     arguments = parts["made"] | parts_after(compiled, lists, added, remove)
-    if not isinstance(others["actuation"], Unchanged):
+    if not isinstance(others["actuation"], UnchangedType):
         arguments["actuation"] = others["actuation"]
     if others["q0"] is not None:
         arguments["q0"] = states.configuration(others["q0"], "replace: q0")
@@ -103,11 +103,11 @@ def parts_of_replacement(
     if others["name"] is not None:
         arguments["name"] = others["name"]
     later = parts["later"] | {"table": None}
-    later["held"] = held_after(compiled.model, states.held, others["q0"], others["v0"])
+    later["held"] = held_entries(compiled.model, states.held, others["q0"], others["v0"])
     return parts | {"made": arguments, "later": later}
 
 
-def held_after(model: Model, held: Held, q0: State | None, v0: State | None) -> Held:
+def held_entries(model: Model, held: Held, q0: State | None, v0: State | None) -> Held:
     """Entries of the initial state that are named after a change.
 
     Args:

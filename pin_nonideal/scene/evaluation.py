@@ -22,7 +22,7 @@ Rest = ParamSpec("Rest")
 Result = TypeVar("Result")
 
 # Behavior if laws and dynamics admit several motions.
-SEVERAL = ("error", "continue")
+SEVERAL_CHOICES = ("error", "continue")
 
 
 class Evaluator:
@@ -67,7 +67,7 @@ class Evaluator:
             InputError: wrong shapes or numbers.
             InconsistentConstraintsError, FrictionParadoxError, SingularMassError: there is no solution.
         """
-        self.runner.continues = choice("solve: several", several, SEVERAL) == "continue"
+        self.runner.continues = choice("solve: several", several, SEVERAL_CHOICES) == "continue"
         prescribed = None if modes is None else self._modes(modes, unilateral)
         now = self.call(self.runner.solve, q, v, t, tau, prescribed)
         used = np.array(now.modes, dtype=np.int8)
@@ -102,8 +102,8 @@ class Evaluator:
             self._states.require_unchanged()
         if self._compiled.unchecked:
             self._states.check_functions_at(q, v, t)
-        if several not in SEVERAL:
-            choice("acceleration: several", several, SEVERAL)
+        if several not in SEVERAL_CHOICES:
+            choice("acceleration: several", several, SEVERAL_CHOICES)
         a = np.empty(self._nv)
         self.runner.continues = several == "continue"
         try:  # arrays of the right shape go straight to the core, which checks sizes, lengths and finiteness

@@ -7,7 +7,7 @@ import pinocchio as pin
 
 from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.errors import InputError
-from pin_nonideal.states.held import Held, changed, changes, held_notes
+from pin_nonideal.states.held import Held, change_note, changes, held_notes
 from pin_nonideal.states.joint_layout import require_resolved, unit_parts
 from pin_nonideal.states.parsing import named_configuration, named_coordinates, named_entries, named_velocity
 from pin_nonideal.states.report import ProjectionReport
@@ -158,7 +158,7 @@ class SceneStates:
         return self._projected(q_in, v_in, t, self._named(q, v, t))
 
     def _named(self, q: State | None, v: State | None, t: float = 0.0) -> Held:
-        """Entries that are named by a state, or by the scene's own, which are those of its own start."""
+        """Return the entries that a given state names, else the named entries of the initial state."""
         return Held(
             self.held.q if q is None else named_coordinates(self._model, q),
             self.held.v if v is None else named_entries(self._model, v),
@@ -181,7 +181,7 @@ class SceneStates:
         held = self._named(None, v).v
         before = self._initial.v if v is None else self.velocity(v, "v")
         if held is None or changes(before, on, held):
-            return changed(self._model, before, on)
+            return change_note(self._model, before, on)
         return held_notes(self._model, before, on, held)
 
     def configuration_notes(self, q: State | None, on: Array) -> list[str]:

@@ -1,4 +1,4 @@
-"""Steps of a scene for loops of one's own: one at a time from any state, or period by period in one run."""
+"""Steps of a scene for user-written loops: single steps from any state, or period by period in one run."""
 
 from __future__ import annotations
 
@@ -19,11 +19,13 @@ from .evaluation import Evaluator
 from .state import SceneStates
 
 # Methods of the core, and its methods with a fixed step.
-STEPPING = tuple(method.name for method in core.methods() if not method.outside)
-FIXED = tuple(method.name for method in core.methods() if not method.outside and not method.adaptive)
+CORE_METHODS = tuple(method.name for method in core.methods() if not method.outside)
+FIXED_STEP_METHODS = tuple(
+    method.name for method in core.methods() if not method.outside and not method.adaptive
+)
 RTOL, ATOL = 1e-8, 1e-10
 # Steps fit into a period if their number differs from a whole number by at most this part.
-WHOLE = 1e-9
+PERIOD_ROUNDING = 1e-9
 
 
 class Stepper:
@@ -149,7 +151,7 @@ class SceneStepper:
         known = isinstance(dt, float) and isinstance(method, str)
         run = self._runs.get((method, dt)) if known else None
         if run is None:
-            choice("step: method", method, FIXED)
+            choice("step: method", method, FIXED_STEP_METHODS)
             length = positive("step: dt", dt)
             run = self._runs[method, length] = self._new_run(
                 self._compiled.program, method, length, length, RTOL, ATOL
@@ -173,15 +175,15 @@ class SceneStepper:
         rtol: float | None,
         atol: float | None,
     ) -> Stepper:
-        """A run that is taken period by period, see `Scene.stepper`."""
-        choice("stepper: method", method, STEPPING)
+        """Return a run that advances period by period, see `Scene.stepper`."""
+        choice("stepper: method", method, CORE_METHODS)
         length = positive("stepper: period", period)
-        if dt is not None and method not in FIXED:
+        if dt is not None and method not in FIXED_STEP_METHODS:
             raise InputError(f'stepper: method "{method}" chooses its own steps; leave dt out')
         size = length if dt is None else positive("stepper: dt", dt)
         if (
-            not length / size >= 1.0 - WHOLE
-            or abs(length / size - round(length / size)) > WHOLE * length / size
+            not length / size >= 1.0 - PERIOD_ROUNDING
+            or abs(length / size - round(length / size)) > PERIOD_ROUNDING * length / size
         ):
             raise InputError(
                 f"stepper: period must be a whole number of steps; got {length:g} s and dt = {size:g} s"

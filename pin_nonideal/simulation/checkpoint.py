@@ -28,7 +28,7 @@ from pin_nonideal.core_loader import core
 from pin_nonideal.description.drive_kinds import delayed_control
 from pin_nonideal.errors import InputError, LoadingError, OutputError
 from pin_nonideal.scene.scene import Scene, compiled_scene, scene_origin
-from pin_nonideal.trajectory.file import UNREADABLE, reason_of
+from pin_nonideal.trajectory.file import READ_ERRORS, reason_of
 from pin_nonideal.types import Table
 from pin_nonideal.validation import nonnegative
 from pin_nonideal.version import __version__
@@ -37,7 +37,7 @@ from .options import RunOptions
 
 FORMAT = 2
 # Largest interval, longer than any run [s].
-FOREVER = 1e8
+MAX_INTERVAL = 1e8
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ class Saver:
         self._path = file_path("simulate: checkpoint", path)
         self._wall = wall_s - time.perf_counter()
         self._written = False
-        self.interval = min(nonnegative("simulate: checkpoint_interval", interval), FOREVER)
+        self.interval = min(nonnegative("simulate: checkpoint_interval", interval), MAX_INTERVAL)
         self._header = {
             "format": FORMAT,
             "version": _version(),
@@ -167,7 +167,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
         )
     except LoadingError:
         raise
-    except UNREADABLE as error:
+    except READ_ERRORS as error:
         raise LoadingError(
             f'cannot read a checkpoint from "{path}": {reason_of(error)}; '
             "it must be a file that simulate(..., checkpoint=path) wrote"
@@ -209,17 +209,17 @@ class _Transcript:
             return method
 
         def record(*arguments: object, **named: object) -> object:
-            call = [name, _plain(arguments), {key: _plain(value) for key, value in named.items()}]
+            call = [name, _json_value(arguments), {key: _json_value(value) for key, value in named.items()}]
             self._digest.update(json.dumps(call).encode())
             return method(*arguments, **named)
 
         return record
 
 
-def _plain(x: object) -> object:
+def _json_value(x: object) -> object:
     """Convert arguments to JSON values; functions become a placeholder."""
     if isinstance(x, (list, tuple, np.ndarray)):
-        return [_plain(each) for each in x]
+        return [_json_value(each) for each in x]
     if isinstance(x, np.generic):
         return x.item()
     if isinstance(x, Enum):

@@ -31,7 +31,7 @@ from pin_nonideal.types import Model, Table
 
 Indices = NDArray[np.intp]
 # Descriptions that act only on the bodies that they name.
-LOCAL = (
+LOCAL_DESCRIPTIONS = (
     *(PointAnchor, FrameAnchor, HingeAnchor, Distance, JointCoupling, PrescribedMotion, KnifeEdge),
     *(JointFriction, SigmoidFriction, Drag, SpringDamper, JointSpring, Wrench),
 )
@@ -81,14 +81,14 @@ def _components(scene: Scene) -> list[Component]:
         or program.states
         or scene.contacts
         or not (held is None or by_position)
-        or any(type(one) not in LOCAL for one in descriptions)
+        or any(type(one) not in LOCAL_DESCRIPTIONS for one in descriptions)
         or sum(parent == 0 for parent in list(model.parents)[1:]) < 2
     )
     if whole:
         return []
     tree = _trees(model)
     anchors = dict(zip(scene.constraint_slices, scene.constraints, strict=False))
-    touched = [_touched(one, model, tree, anchors) for one in descriptions]
+    touched = [_tree_roots(one, model, tree, anchors) for one in descriptions]
     group = {root: root for root in tree[1:]}
     for roots in touched:
         joined = {group[root] for root in roots}
@@ -110,7 +110,7 @@ def _trees(model: Model) -> list[int]:
     return tree
 
 
-def _touched(one: Any, model: Model, tree: Sequence[int], anchors: Table) -> set[int]:
+def _tree_roots(one: Any, model: Model, tree: Sequence[int], anchors: Table) -> set[int]:
     """Return the root joints of the trees that a description acts on."""
     roots: set[int] = set()
     for place in (f.name for f in fields(one) if f.name in PLACES):
@@ -122,7 +122,7 @@ def _touched(one: Any, model: Model, tree: Sequence[int], anchors: Table) -> set
         elif model.existFrame(name):
             roots.add(tree[model.frames[model.getFrameId(name)].parentJoint])
         elif is_dataclass(anchors.get(name)):
-            roots |= _touched(anchors[name], model, tree, {})
+            roots |= _tree_roots(anchors[name], model, tree, {})
     return roots - {0}
 
 
@@ -130,12 +130,12 @@ def _component(
     scene: Scene, descriptions: Sequence[Any], own: Sequence[int], group: Sequence[int | None], of: int
 ) -> Component:
     joints = [joint for joint, each in enumerate(group) if each == of]
-    model, q, v = _alone(scene.model, joints)
+    model, q, v = _separate_model(scene.model, joints)
     of_component = [one for one, each in zip(descriptions, own, strict=True) if each == of]
     held = scene.actuation
     if isinstance(held, HoldPosition) and held.q is not None:
         held = replace(held, q=named_configuration(scene.model, held.q, scene.q0, "q")[q])
-    alone = Scene(
+    component_scene = Scene(
         model,
         constraints=[one for one in of_component if any(one is each for each in scene.constraints)],
         laws=[one for one in of_component if any(one is each for each in scene.laws)],
@@ -147,36 +147,36 @@ def _component(
         terms=scene.terms,
         assembly_tolerance=scene_origin(scene).assembly_tolerance,
     )
-    elements = [scene.element_names.index(name) for name in alone.element_names]
+    elements = [scene.element_names.index(name) for name in component_scene.element_names]
     powers = compiled_scene(scene).program.power_names
-    works = [powers.index(name) for name in compiled_scene(alone).program.power_names]
-    return Component(alone, q, v, np.array(elements, dtype=np.intp), np.array(works, dtype=np.intp))
+    works = [powers.index(name) for name in compiled_scene(component_scene).program.power_names]
+    return Component(component_scene, q, v, np.array(elements, dtype=np.intp), np.array(works, dtype=np.intp))
 
 
-def _alone(model: Model, joints: Sequence[int]) -> tuple[Model, Indices, Indices]:
+def _separate_model(model: Model, joints: Sequence[int]) -> tuple[Model, Indices, Indices]:
     """Return some trees of a model as a separate model, and the indices of its q and v in the whole model."""
-    alone, number = pin.Model(), {0: 0}
-    alone.name, alone.gravity = model.name, model.gravity
+    component_model, number = pin.Model(), {0: 0}
+    component_model.name, component_model.gravity = model.name, model.gravity
     q: list[int] = []
     v: list[int] = []
     for joint in joints:
         kind = model.joints[joint]
         at_q, at_v = slice(kind.idx_q, kind.idx_q + kind.nq), slice(kind.idx_v, kind.idx_v + kind.nv)
-        number[joint] = alone.addJoint(
+        number[joint] = component_model.addJoint(
             number[model.parents[joint]], kind, model.jointPlacements[joint], model.names[joint]
         )
-        alone.appendBodyToJoint(number[joint], model.inertias[joint], pin.SE3.Identity())
-        added = alone.joints[number[joint]]
+        component_model.appendBodyToJoint(number[joint], model.inertias[joint], pin.SE3.Identity())
+        added = component_model.joints[number[joint]]
         to_q, to_v = slice(added.idx_q, added.idx_q + added.nq), slice(added.idx_v, added.idx_v + added.nv)
         for name in ("lowerPositionLimit", "upperPositionLimit"):
-            getattr(alone, name)[to_q] = getattr(model, name)[at_q]
+            getattr(component_model, name)[to_q] = getattr(model, name)[at_q]
         for name in ("armature", "rotorInertia", "rotorGearRatio", "damping", "friction"):
             if hasattr(model, name):
-                getattr(alone, name)[to_v] = getattr(model, name)[at_v]
+                getattr(component_model, name)[to_v] = getattr(model, name)[at_v]
         q.extend(range(at_q.start, at_q.stop))
         v.extend(range(at_v.start, at_v.stop))
     for frame in list(model.frames)[1:]:
-        if frame.parentJoint in number and not alone.existFrame(frame.name, frame.type):
+        if frame.parentJoint in number and not component_model.existFrame(frame.name, frame.type):
             joint = number[frame.parentJoint]
-            alone.addFrame(pin.Frame(frame.name, joint, 0, frame.placement, frame.type), False)
-    return alone, np.array(q, dtype=np.intp), np.array(v, dtype=np.intp)
+            component_model.addFrame(pin.Frame(frame.name, joint, 0, frame.placement, frame.type), False)
+    return component_model, np.array(q, dtype=np.intp), np.array(v, dtype=np.intp)

@@ -53,13 +53,13 @@ def run_together(
     """
     if program is not None and program is not compiled_scene(scene).program:
         return program.runner().simulate(q0, v0, options, **more)
-    idle: list[core.Runner] = scene.__dict__.setdefault("_idle_runners", [])
+    idle_runners: list[core.Runner] = scene.__dict__.setdefault("_idle_runners", [])
     try:
-        runner = idle.pop()
+        runner = idle_runners.pop()
     except IndexError:  # first run, or all workspaces are in use
         runner = compiled_scene(scene).program.runner()
     outcome = runner.simulate(q0, v0, options, **more)
-    idle.append(runner)
+    idle_runners.append(runner)
     return outcome
 
 
@@ -86,7 +86,7 @@ def run_decoupled(
     outcomes = []
     for k, part in enumerate(parts):
         own = _options_of(part, options, len(v0))
-        own_tick = _after(tick, k, len(parts), options)
+        own_tick = _shared_progress(tick, k, len(parts), options)
         outcome = run_together(part.scene, q0[part.q], v0[part.v], own, tick=own_tick)
         if isinstance(outcome.stopped, KeyboardInterrupt):
             return merge_outcomes(scene, [], [], options, outcome.stopped)
@@ -138,7 +138,7 @@ def _options_of(part: Component, options: RunOptions, nv: int) -> RunOptions:
     return replace(silent, atol=atol, dense=True)
 
 
-def _after(
+def _shared_progress(
     tick: Callable[[float], None] | None, k: int, n: int, options: RunOptions
 ) -> Callable[[float], None] | None:
     """Return a progress function for the k-th of n runs that maps its time to the progress of all runs."""

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pin_nonideal.compilation.callbacks import checked, named, numbers_of
+from pin_nonideal.compilation.callbacks import checked_function, named_function, numbers_of
 from pin_nonideal.errors import InputError, short_repr
 from pin_nonideal.types import Array
 from pin_nonideal.validation import count
@@ -34,7 +34,7 @@ class RunRequests(NamedTuple):
     separate: bool
 
 
-NOTHING = RunRequests([], (), False)
+NO_REQUESTS = RunRequests([], (), False)
 
 
 def parse_events(events: object) -> RunRequests:
@@ -47,7 +47,7 @@ def parse_events(events: object) -> RunRequests:
         InputError: an entry is of another type, or `terminal` or `direction` of a function is invalid.
     """
     if events is None:
-        return NOTHING
+        return NO_REQUESTS
     listed = list(events) if isinstance(events, (list, tuple)) else [events]
     functions = [each for each in listed if not (isinstance(each, str) and each == SEPARATE)]
     names: list[str] = []
@@ -70,7 +70,7 @@ def parse_events(events: object) -> RunRequests:
 
 
 def _valued(f: Callable[..., object], who: str) -> Callable[..., float]:
-    call = checked(f, who, ())
+    call = checked_function(f, who, ())
     return lambda t, q, v: float(call(t, q, v))
 
 
@@ -106,7 +106,7 @@ def parse_callback(callback: object, nv: int) -> Callable[[float, Array, Array],
         return None
     if not callable(callback):
         raise InputError(f"simulate: callback must be a function (t, q, v); got {short_repr(callback)}")
-    ask = named(callback, "callback")
+    ask = named_function(callback, "callback")
 
     def call(t: float, q: Array, v: Array) -> object:
         answer = ask(t, q, v)

@@ -133,11 +133,11 @@ def _samples(
         options.energy,
     )
     evaluated = any(records) or program.rows or nq != nv
-    k, none = t.size if evaluated else 0, np.zeros((0, nv))
+    k, no_torques = t.size if evaluated else 0, np.zeros((0, nv))
     y, held, turns, sought_modes = (
         np.ascontiguousarray(x[:k], dtype=float) for x in (states, modes, directions, sought)
     )
-    inside = core.sample_inside(program, options, t[:k], y, held, turns, sought_modes, none, moved[:k])
+    inside = core.sample_inside(program, options, t[:k], y, held, turns, sought_modes, no_torques, moved[:k])
     samples = {name: getattr(inside, name) for name in dir(core.Outcome) if not name.startswith("_")}
     if evaluated:
         return samples

@@ -146,7 +146,9 @@ def step_limit(max_steps: float | None) -> int:
     if isinstance(max_steps, float) and max_steps == np.inf:
         return NO_LIMIT
     whole = isinstance(max_steps, float) and max_steps.is_integer()
-    return count("simulate: max_steps", int(max_steps) if whole else max_steps, least=1, most=NO_LIMIT)
+    return count(
+        "simulate: max_steps", int(max_steps) if whole else max_steps, min_value=1, max_value=NO_LIMIT
+    )
 
 
 def check_clock(scene: Scene, t0: float, duration: float, lengths: dict[str, float]) -> None:

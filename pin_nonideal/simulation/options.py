@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pin_nonideal.errors import InputError
-from pin_nonideal.scene.evaluation import SEVERAL
+from pin_nonideal.scene.evaluation import SEVERAL_CHOICES
 from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.types import Array
 from pin_nonideal.validation import array, choice, flag, nonnegative, number, positive
@@ -163,7 +163,7 @@ def run_options(
         laws="laws" in groups or "forces" in groups,
         reactions="reactions" in groups,
         tau="tau" in groups or "forces" in groups,
-        several=choice("simulate: several", several, SEVERAL),
+        several=choice("simulate: several", several, SEVERAL_CHOICES),
         dense="dense" in groups,
         max_wall=wall_limit(max_wall),
         event_names=event_names,
@@ -217,7 +217,7 @@ def check_values(
     wall_limit(max_wall)
     number("simulate: t0", t0)
     positive("simulate: duration", duration)
-    choice("simulate: several", several, SEVERAL)
+    choice("simulate: several", several, SEVERAL_CHOICES)
     flag("simulate: strict", strict)
 
 

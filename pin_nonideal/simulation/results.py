@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from pin_nonideal.compilation.error_context import opened, singular_position
+from pin_nonideal.compilation.error_context import open_loop_error, singular_position
 from pin_nonideal.core_loader import core
 from pin_nonideal.errors import (
     LoopClosureError,
@@ -21,7 +21,14 @@ from pin_nonideal.errors import (
     UserFunctionError,
 )
 from pin_nonideal.scene.scene import Scene, compiled_scene
-from pin_nonideal.states.rows import DEPENDENT, gap_rows, holonomic_rows, metric_rows, row_slices, rows_at
+from pin_nonideal.states.rows import (
+    MIN_SINGULAR_VALUE,
+    gap_rows,
+    holonomic_rows,
+    metric_rows,
+    row_slices,
+    rows_at,
+)
 from pin_nonideal.trajectory.dense_output import dense_output
 from pin_nonideal.trajectory.fields import with_defaults
 from pin_nonideal.trajectory.outcome import outcome_fields, outcome_stats
@@ -34,10 +41,10 @@ from .options import RunOptions
 
 # Largest residual of a sample on the constraints [m or rad]. Projection after each step reduces residuals to
 # rounding, or to the square root of rounding in singular positions.
-LEFT = 1e-6
+MAX_RESIDUAL = 1e-6
 # Smallest singular value of the rows over that at the start below which a position is singular, and the part
 # of a constraint in the dependence above which an error names it.
-SINGULAR, DEPENDENT_SHARE = 1e-4, 0.1
+SINGULAR_RATIO, DEPENDENT_SHARE = 1e-4, 0.1
 TRAJECTORY_HINT = "the trajectory up to there is in error.trajectory"
 
 
@@ -73,10 +80,10 @@ def finish(
     enters = options.method == "moreau" and bool(compiled_scene(scene).opening_names)
     if (
         not enters
-        and outcome.largest_violation > LEFT
+        and outcome.largest_violation > MAX_RESIDUAL
         and (stopped is None or isinstance(stopped, core.CoreFailure))
     ):
-        raise _opened(scene, shaped())
+        raise _open_loop_failure(scene, shaped())
     if stopped is None:
         return Trajectory.later(fields, stats=stats)
     if isinstance(stopped, OutputError):
@@ -99,7 +106,7 @@ def finish(
         error = UserFunctionError(f"a function of the scene failed at t = {last:.4g} s: {stopped}", time=last)
         cause = stopped
     error.time = last if error.time is None else error.time
-    error.trajectory = _stopped(trajectory, error)
+    error.trajectory = _stopped_trajectory(trajectory, error)
     raise error from cause
 
 
@@ -122,16 +129,16 @@ def _fields(scene: Scene, outcome: core.Outcome, options: RunOptions, notes: lis
     return {name: value for name, value in vars(run).items() if name != "stats"}
 
 
-def _opened(scene: Scene, trajectory: Trajectory) -> LoopClosureError:
+def _open_loop_failure(scene: Scene, trajectory: Trajectory) -> LoopClosureError:
     """Return the error of a run that has left its constraints, with the samples before that time."""
-    k = int((trajectory.violation > LEFT).argmax())
+    k = int((trajectory.violation > MAX_RESIDUAL).argmax())
     t = float(trajectory.t[k])
     runner = compiled_scene(scene).program.runner()
     residual = rows_at(runner, trajectory.q[k], trajectory.v[k], t)[2]
     left = np.where(gap_rows(compiled_scene(scene).program), np.maximum(-residual, 0.0), np.abs(residual))
     gaps = {key: float(left[rows].max()) for key, rows in scene.constraint_slices.items()}
-    stopped = opened(max(gaps, key=lambda key: gaps[key]), gaps, t, f"; {TRAJECTORY_HINT}")
-    stopped.trajectory = _stopped(trajectory.first(k), stopped)
+    stopped = open_loop_error(max(gaps, key=lambda key: gaps[key]), gaps, t, f"; {TRAJECTORY_HINT}")
+    stopped.trajectory = _stopped_trajectory(trajectory.first(k), stopped)
     return stopped
 
 
@@ -145,8 +152,8 @@ def _singular(scene: Scene, trajectory: Trajectory, stopped: BaseException) -> R
     (first, _), (last, shares) = (
         _independence(runner, scene, trajectory, k, rows) for k in (0, len(trajectory) - 1)
     )
-    rank = int((first > DEPENDENT).sum())
-    if not rank or last[rank - 1] > SINGULAR * first[rank - 1]:
+    rank = int((first > MIN_SINGULAR_VALUE).sum())
+    if not rank or last[rank - 1] > SINGULAR_RATIO * first[rank - 1]:
         return None
     weights = np.zeros(len(rows))
     weights[rows] = np.abs(shares[:, rank - 1])
@@ -175,6 +182,6 @@ def _overflow_hint(error: RunError, options: RunOptions) -> str:
     )
 
 
-def _stopped(trajectory: Trajectory, error: RunError) -> Trajectory:
+def _stopped_trajectory(trajectory: Trajectory, error: RunError) -> Trajectory:
     """Return the trajectory with the message of the error that stopped the run."""
     return replace(trajectory, failure=str(error).removesuffix(f"; {TRAJECTORY_HINT}"))

@@ -90,9 +90,9 @@ def rollout(
 
     Raises:
         InputError, UnknownNameError: an argument does not fit.
-        RunError: a run stopped early. The error is that of the first failed run: `index` is its index,
+        RunError: a run stopped early. The first failed run raises its error: `index` is its index,
             `trajectory` has its samples, and `results` holds the trajectories and errors of all runs.
-        RunInterrupted: Ctrl-C ended all runs; the attributes are those of RunError.
+        RunInterrupted: Ctrl-C ended all runs; the attributes are as for RunError.
     """
     require_scene("rollout", scene)
     threads = _threads(jobs)
@@ -118,12 +118,12 @@ def rollout(
 
 
 def _threads(jobs: int) -> int:
-    """Return the number of threads for a number of jobs, of which a negative one counts free processors.
+    """Return the number of threads; negative numbers of jobs count from the number of processors.
 
     Raises:
         InputError: it is zero or no number of jobs.
     """
-    if count("rollout: jobs", jobs, least=-MAX_JOBS) == 0:
+    if count("rollout: jobs", jobs, min_value=-MAX_JOBS) == 0:
         raise InputError("rollout: jobs must not be zero; use 1 for no parallel jobs, -1 for all processors")
     return jobs if jobs > 0 else max(1, (os.cpu_count() or 1) + 1 + jobs)
 

@@ -17,7 +17,7 @@ from pin_nonideal.types import Array
 
 from .decoupled import decoupled_components, rollout_decoupled
 from .options import RunOptions
-from .results import LEFT
+from .results import MAX_RESIDUAL
 
 Number = TypeVar("Number", np.float64, np.int64)
 
@@ -57,9 +57,9 @@ class RunArrays:
     def last(self) -> tuple[Array, Array]:
         """Configurations (n, nq) and velocities (n, nv) of each run's last sample; NaN without samples."""
         runs, at = np.arange(len(self)), np.maximum(self.samples - 1, 0)
-        none = self.samples == 0
+        is_empty = self.samples == 0
         q, v = self.q[runs, at], self.v[runs, at]
-        q[none], v[none] = np.nan, np.nan
+        q[is_empty], v[is_empty] = np.nan, np.nan
         return q, v
 
     def among(self, n: int, runs: NDArray[np.intp], errors: Mapping[int, PinNonidealError]) -> RunArrays:
@@ -157,7 +157,7 @@ def _failures(
             failures[i] = RunInterrupted("the runs were interrupted")
         else:
             failures[i] = UserFunctionError(f"a function of the scene failed: {cause}")
-    for i in map(int, np.flatnonzero(violation > LEFT)):
+    for i in map(int, np.flatnonzero(violation > MAX_RESIDUAL)):
         gap = f"gap {violation[i]:.1e} (m or rad)"
         failures.setdefault(i, LoopClosureError(f"run {i} has left its constraints: {gap}", gaps={}))
     return failures

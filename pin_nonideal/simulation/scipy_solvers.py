@@ -1,7 +1,7 @@
 """SciPy's implicit methods on the core's right-hand side, for stiff scenes.
 
 The state is y = (q, v, states of laws, work of the ledger's columns), with q in ambient coordinates.
-Quaternions and (cos, sin) pairs are plain numbers. The right-hand side is smooth off unit length as well.
+Quaternions and (cos, sin) pairs are plain numbers. The right-hand side is also smooth for other lengths.
 The core monitors the steps: modes of dry friction are fixed within a step, events are located by the method's
 interpolant, and the integrator restarts after each event. Radau is a one-step method and continues from the
 projected state after each step. BDF and LSODA use earlier steps, so only their samples are projected.
@@ -30,7 +30,7 @@ Tick = Callable[[float], None]  # function of the time [s]
 # Smallest relative tolerance that SciPy's methods accept and reach.
 MIN_RTOL = 1e-13
 # Absolute tolerance of work: excludes work from step size control.
-FREE = 1e100
+WORK_ATOL = 1e100
 
 
 class _Run:
@@ -66,7 +66,7 @@ class _Run:
             same = joint.nq == joint.nv
             positions[joint.idx_q : joint.idx_q + joint.nq] = own if same else own.min(initial=np.inf)
         known = np.concatenate([positions, atol[model.nv :]])
-        return np.concatenate([known, np.full(size - known.size, FREE)])
+        return np.concatenate([known, np.full(size - known.size, WORK_ATOL)])
 
     def smooth_stretch(self, method: Any, t_end: float) -> None:
         """Integrate to the next event, to the next break of a function of time, or to the end."""

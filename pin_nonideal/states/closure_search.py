@@ -16,12 +16,12 @@ from pin_nonideal.types import Array, Model
 from .contact_closure import UnilateralClosure
 from .loop_closure import MIN_RCOND, Closure, Rows, Search, conditioning
 from .rows import duplicate_rows, rows_at
-from .scales import VANISHING
+from .scales import MIN_ROW_LENGTH
 
 # Inertia that the metric gains if M is singular, relative to the largest inertia.
 MIN_INERTIA = 1e-9
 # Parts of a displacement at which rows are sampled. If a user function raises, the next part is tried.
-NEARER = (1.0, 0.1, 1e-2, 1e-3)
+SAMPLE_PARTS = (1.0, 0.1, 1e-2, 1e-3)
 
 
 class ClosureSearch:
@@ -88,7 +88,7 @@ class ClosureSearch:
         weighted = A * self.unit
         reach = np.linalg.norm(weighted, axis=1)
         most = np.abs(weighted[:, self._slides]).max(axis=1, initial=0.0)
-        acts = reach > VANISHING * reach.max(initial=0.0)
+        acts = reach > MIN_ROW_LENGTH * reach.max(initial=0.0)
         far = self.length * np.divide(np.abs(phi) * most, reach**2, out=np.zeros_like(phi), where=acts)
         return np.where(self._slides, max(self.length, _largest(far)), 1.0)
 
@@ -105,7 +105,7 @@ class ClosureSearch:
         samples = [self._sample(q, move) for move in moves]
         weighted = np.hstack([A * unit for A, _, _, _ in samples])
         reach = np.abs(weighted).max(axis=1, initial=0.0)
-        used = selected & (reach > VANISHING * reach.max(initial=0.0))
+        used = selected & (reach > MIN_ROW_LENGTH * reach.max(initial=0.0))
         wide = np.hstack([weighted, np.column_stack([phi for _, _, phi, _ in samples])])
         used[[row for row, _, _ in duplicate_rows(wide, used, weighted.shape[1])]] = False
         scale = 1.0 / reach[used]
@@ -118,7 +118,7 @@ class ClosureSearch:
 
     def _sample(self, q: Array, move: Array) -> tuple[Array, Array, Array, Array]:
         """Return the rows after a displacement; it is shortened if a user function raises."""
-        for part in NEARER:
+        for part in SAMPLE_PARTS:
             with suppress(UserFunctionError):
                 moved = pin.integrate(self.model, q, part * move)
                 return rows_at(self._runner, moved, np.zeros(self.model.nv), self._t)

@@ -18,11 +18,11 @@ from pin_nonideal.types import Array
 from .least_distance import LeastDistance, Numbers, solve_ldp
 from .loop_closure import HALVINGS, ROUNDING, Closure, Iterate, Rows, Search
 
-STEPS, SETTLINGS, OPENINGS = 60, 8, 15
+STEPS, MAX_SETTLINGS, OPENINGS = 60, 8, 15
 # Steps end if the next step is shorter than this part of the displacement, since Newton's method squares it.
-SHORT = 1e-7
+MIN_STEP = 1e-7
 # Largest penetration, scaled like its row, that counts as rounding.
-INSIDE = 10.0 * ROUNDING
+PENETRATION_ROUNDING = 10.0 * ROUNDING
 # Minimum decrease of the merit function, relative to the decrease of its linear model.
 MIN_DECREASE = 1e-4
 
@@ -55,15 +55,15 @@ class UnilateralClosure(Search):
 
     def _is_closed(self, iterate: Iterate) -> bool:
         """Check if all rows are satisfied and no contact penetrates."""
-        return super()._is_closed(iterate) and self._depth(iterate) <= INSIDE
+        return super()._is_closed(iterate) and self._depth(iterate) <= PENETRATION_ROUNDING
 
     def _settle(self, iterate: Iterate) -> Closure:
         """Descend to a local minimum of the distance, with an update of the active gaps."""
         known = iterate
-        for _ in range(SETTLINGS):
+        for _ in range(MAX_SETTLINGS):
             self._hold(np.zeros(0, dtype=int))
-            bare = self._place(iterate.q)
-            least = self._least(bare, bare.move)
+            free_iterate = self._place(iterate.q)
+            least = self._least(free_iterate, free_iterate.move)
             if least is None:
                 break
             self._hold(least.touching)
@@ -73,10 +73,13 @@ class UnilateralClosure(Search):
             closure = super()._settle(start)
             self._hold(np.zeros(0, dtype=int))
             iterate = self._place(closure.q)
-            outside, further = self._depth(iterate) <= INSIDE, self._least(iterate, iterate.move)
+            outside, further = (
+                self._depth(iterate) <= PENETRATION_ROUNDING,
+                self._least(iterate, iterate.move),
+            )
             if outside:
                 known = iterate
-            rounding = SHORT * self._distance(iterate) + ROUNDING * self.size
+            rounding = MIN_STEP * self._distance(iterate) + ROUNDING * self.size
             if outside and further is not None and np.linalg.norm(further.x) <= rounding:
                 return closure
             iterate = self._step_out(iterate)
@@ -98,7 +101,7 @@ class UnilateralClosure(Search):
             if step is None:
                 break
             length = float(np.linalg.norm(step.x))
-            if length <= SHORT * self._distance(iterate) + ROUNDING * self.size:
+            if length <= MIN_STEP * self._distance(iterate) + ROUNDING * self.size:
                 break
             self.iterations += 1
             weight = max(weight, 2.0 * step.pull)

@@ -13,17 +13,17 @@ from pin_nonideal.errors import InputError
 from pin_nonideal.types import Array, Model
 
 from .joint_layout import JointPlace, joint_places
-from .rows import DEPENDENT, row_lengths, rows_at, shortest
+from .rows import MIN_SINGULAR_VALUE, minimum_norm, row_lengths, rows_at
 from .scales import coordinate
 
 # Tolerance of row rates over their greatest lengths, relative to the scale of the velocities.
-MISSED = 1e-9
+RATE_TOL = 1e-9
 # Rounding of a projection, relative to the largest velocity or to the unit of a coordinate.
 ROUNDING = 1e-12
 # Changes of free entries are reported above this part of the largest velocity or of a unit.
-LITTLE = 1e-3
+REPORTED_CHANGE = 1e-3
 # Maximum number of Newton steps after a search, which squares the residual in each step.
-SETTLINGS = 8
+MAX_NEWTON_STEPS = 8
 
 
 class Held(NamedTuple):
@@ -58,7 +58,7 @@ def changes(before: Array, after: Array, held: NDArray[np.bool_]) -> bool:
     return bool(change > ROUNDING * np.abs(before).max(initial=0.0))
 
 
-def moving(model: Model, q: Array, on: Array, unit: Array) -> NDArray[np.bool_]:
+def moved_mask(model: Model, q: Array, on: Array, unit: Array) -> NDArray[np.bool_]:
     """Return the mask of coordinates that a projection has moved by more than rounding, (nv,).
 
     Args:
@@ -81,10 +81,10 @@ def moves(model: Model, q: Array, on: Array, held: NDArray[np.bool_], unit: Arra
         held: mask of held coordinates, (nv,).
         unit: unit displacement of each coordinate, (nv,).
     """
-    return bool((moving(model, q, on, unit) & held).any())
+    return bool((moved_mask(model, q, on, unit) & held).any())
 
 
-def settled(
+def polish_free(
     model: Model,
     runner: core.Runner,
     q: Array,
@@ -107,13 +107,13 @@ def settled(
     """
     zero = np.zeros(model.nv)
     gap = np.inf
-    for _ in range(SETTLINGS):
+    for _ in range(MAX_NEWTON_STEPS):
         A, _, phi, _ = rows_at(runner, q, zero, t)
         now = float(np.abs(phi[rows]).max(initial=0.0))
         if not now < gap:
             break
         gap, best, move = now, q, np.zeros(model.nv)
-        move[free] = np.linalg.lstsq(A[np.ix_(rows, free)], -phi[rows], rcond=DEPENDENT)[0]
+        move[free] = np.linalg.lstsq(A[np.ix_(rows, free)], -phi[rows], rcond=MIN_SINGULAR_VALUE)[0]
         q = pin.integrate(model, q, move)
     return best
 
@@ -137,12 +137,12 @@ def with_entries(model: Model, q: Array, source: Array, held: NDArray[np.bool_])
             part = slice(place.q_first, place.q_first + place.nq)
             out[part] = source[part]
             continue
-        for k in np.flatnonzero(own[: _plain(place)]):
+        for k in np.flatnonzero(own[: _coordinate_count(place)]):
             out[place.q_first + k] = source[place.q_first + k]
     return out
 
 
-def _plain(place: JointPlace) -> int:
+def _coordinate_count(place: JointPlace) -> int:
     """Return the number of leading values of a joint that are coordinates and no part of an orientation."""
     if place.nq == place.nv:
         return place.nq
@@ -170,8 +170,8 @@ def require_rounding(
     if not (held & (np.abs(move) > little)).any():
         return
     raise InputError(
-        f"q: no configuration on the constraints has {_listed(model, _coordinates(model, q), held)} at t = "
-        f"{t:.2f} s; name fewer entries, so that the others can follow, or give a configuration that is "
+        f"q: no configuration on the constraints has {_list_names(model, _coordinates(model, q), held)} at t "
+        f"= {t:.2f} s; name fewer entries, so that the others can follow, or give a configuration that is "
         "consistent"
     )
 
@@ -189,17 +189,17 @@ def coordinate_notes(
         unit: unit displacement of each coordinate, (nv,).
     """
     move = np.abs(pin.difference(model, before, after))
-    follows, gave_way = ~held & (move > LITTLE * unit), held & (move > ROUNDING * unit)
+    follows, gave_way = ~held & (move > REPORTED_CHANGE * unit), held & (move > ROUNDING * unit)
     now, notes = _coordinates(model, after), []
     if gave_way.any():
         notes.append(
             "the coordinates that were named are rounded, since the constraints do not allow them together "
-            f"to the last digit: the run starts with {_listed(model, now, gave_way)}"
+            f"to the last digit: the run starts with {_list_names(model, now, gave_way)}"
         )
     if follows.any():
         notes.append(
-            f"the coordinates that were named are held, {_listed(model, now, held)}, and others follow them: "
-            f"{_listed(model, now, follows)}"
+            f"the coordinates that were named are held, {_list_names(model, now, held)}, and others follow "
+            f"them: {_list_names(model, now, follows)}"
         )
     return notes
 
@@ -208,7 +208,7 @@ def _coordinates(model: Model, q: Array) -> Array:
     """Return a configuration as numbers for a message, (nv,): positions, angles, rotation vectors."""
     out: Array = pin.difference(model, pin.neutral(model), q)
     for place in joint_places(model):
-        count = _plain(place)
+        count = _coordinate_count(place)
         out[place.v_first : place.v_first + count] = q[place.q_first : place.q_first + count]
     return out
 
@@ -247,26 +247,26 @@ def holding(
     A, _, _, rate = rows_at(runner, q, v, t)
     lengths, all_root = row_lengths(runner, q, v, t)[: len(A)], np.linalg.cholesky(metric)
     whole = np.linalg.norm(np.linalg.solve(all_root, A.T), axis=0)
-    acting = np.flatnonzero(rows & (lengths > 0.0) & (whole > DEPENDENT * lengths))
+    acting = np.flatnonzero(rows & (lengths > 0.0) & (whole > MIN_SINGULAR_VALUE * lengths))
     A, rate, lengths = A[acting], rate[acting], lengths[acting]
     root = np.linalg.cholesky(metric[np.ix_(free, free)])
     B = np.linalg.solve(root, A[:, free].T).T
-    moved = np.linalg.norm(B, axis=1) > DEPENDENT * lengths
+    moved = np.linalg.norm(B, axis=1) > MIN_SINGULAR_VALUE * lengths
     scale = lengths[moved]
-    x = shortest(B[moved] / scale[:, None], -rate[moved] / scale, np.ones(B.shape[1]))
+    x = minimum_norm(B[moved] / scale[:, None], -rate[moved] / scale, np.ones(B.shape[1]))
     velocity: Array = v.copy()
     velocity[free] += np.linalg.solve(root.T, x)
     missed = np.abs(rows_at(runner, q, velocity, t)[3][acting]) / lengths
     in_play = sum(float(np.linalg.norm(all_root.T @ x)) for x in (v, velocity, unit))  # one unit per second
-    if (missed > MISSED * max(in_play, float(np.abs((rate - A @ v) / lengths).max(initial=0.0)))).any():
+    if (missed > RATE_TOL * max(in_play, float(np.abs((rate - A @ v) / lengths).max(initial=0.0)))).any():
         raise InputError(
-            f"v: no velocity on the constraints has {_listed(model, v, held)} at t = {t:.2f} s; name fewer "
-            "entries, so that the others can follow, or give velocities that are consistent"
+            f"v: no velocity on the constraints has {_list_names(model, v, held)} at t = {t:.2f} s; name "
+            "fewer entries, so that the others can follow, or give velocities that are consistent"
         )
     return velocity
 
 
-def changed(model: Model, before: Array, after: Array) -> list[str]:
+def change_note(model: Model, before: Array, after: Array) -> list[str]:
     """Return a note on a velocity that the projection changed notably, or no note.
 
     Args:
@@ -275,12 +275,12 @@ def changed(model: Model, before: Array, after: Array) -> list[str]:
         after: velocity at the start of the run, (nv,).
     """
     change = np.abs(after - before)
-    much = change > LITTLE * max(np.abs(before).max(initial=0.0), np.abs(after).max(initial=0.0))
+    much = change > REPORTED_CHANGE * max(np.abs(before).max(initial=0.0), np.abs(after).max(initial=0.0))
     if not much.any():
         return []
     return [
         "the initial velocity did not satisfy the constraints and was projected onto them: the run starts "
-        f"with {_listed(model, after, much)}; Scene.project(report=True) says more"
+        f"with {_list_names(model, after, much)}; Scene.project(report=True) says more"
     ]
 
 
@@ -294,16 +294,18 @@ def held_notes(model: Model, before: Array, after: Array, held: NDArray[np.bool_
         held: mask of held entries, (nv,).
     """
     change = np.abs(after - before)
-    follows = ~held & (change > LITTLE * max(np.abs(before).max(initial=0.0), np.abs(after).max(initial=0.0)))
+    follows = ~held & (
+        change > REPORTED_CHANGE * max(np.abs(before).max(initial=0.0), np.abs(after).max(initial=0.0))
+    )
     if not follows.any():
         return []
     return [
-        f"the velocities that were named are held, {_listed(model, after, held)}, and others follow them: "
-        f"{_listed(model, after, follows)}"
+        f"the velocities that were named are held, {_list_names(model, after, held)}, and others follow "
+        f"them: {_list_names(model, after, follows)}"
     ]
 
 
-def _listed(model: Model, v: Array, which: NDArray[np.bool_]) -> str:
+def _list_names(model: Model, v: Array, which: NDArray[np.bool_]) -> str:
     dofs = list(map(int, np.flatnonzero(which)))
     shown = ", ".join(f'"{coordinate(model, dof)}" = {v[dof]:.4g}' for dof in dofs[:4])
     return f"{shown} and {len(dofs) - 4} more" if len(dofs) > 4 else shown

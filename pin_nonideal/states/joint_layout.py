@@ -22,7 +22,7 @@ UNIT_TOLERANCE = 1e-6
 COARSEST_SPACING = 1e-3
 
 # Prefixes of joint kinds whose configuration ends in the cosine and sine of an angle.
-CIRCLES = ("JointModelRUB", "JointModelRevoluteUnbounded", "JointModelPlanar")
+COS_SIN_JOINTS = ("JointModelRUB", "JointModelRevoluteUnbounded", "JointModelPlanar")
 
 
 class JointPlace(NamedTuple):
@@ -76,7 +76,7 @@ def _parts(joint: JointModel) -> Iterator[slice]:
             yield from _parts(part)
     elif joint.nq != joint.nv:  # the joint's values end with a quaternion or (cos, sin)
         end = joint.idx_q + joint.nq
-        yield slice(end - (2 if kind.startswith(CIRCLES) else 4), end)
+        yield slice(end - (2 if kind.startswith(COS_SIN_JOINTS) else 4), end)
 
 
 def configuration(

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pin_nonideal.types import Array
 
 # Singular values of rows below this part of the largest count as zero.
-HELD = 1e-9
+MIN_SINGULAR_VALUE = 1e-9
 # Displacements longer than the deepest penetration by this factor are rejected.
 LONGEST_WAY_OUT = 1e6
 
@@ -35,14 +35,14 @@ class LeastDistance(NamedTuple):
     pull: float
 
 
-def held(B: Array) -> tuple[Array, Array, Array]:
+def row_singular_values(B: Array) -> tuple[Array, Array, Array]:
     """Return the nonzero singular values of the rows, with their vectors U (m, r) and V^T (r, nv).
 
     Args:
         B: rows, (m, nv).
     """
     U, s, Vt = np.linalg.svd(B, full_matrices=False)
-    rank = int(np.count_nonzero(s > HELD * s.max(initial=0.0)))
+    rank = int(np.count_nonzero(s > MIN_SINGULAR_VALUE * s.max(initial=0.0)))
     return U[:, :rank], s[:rank], Vt[:rank]
 
 
@@ -67,7 +67,7 @@ def solve_ldp(B: Array, phi: Array, G: Array, gap: Array, move: Array) -> LeastD
         gap: gaps, (k,).
         move: displacement from the start, (n,).
     """
-    U, s, Vt = held(B)
+    U, s, Vt = row_singular_values(B)
     onto = -Vt.T @ ((U.T @ phi) / s)
     open_directions = complement(Vt)
     back = -open_directions @ (open_directions.T @ move)  # in the null space of the rows

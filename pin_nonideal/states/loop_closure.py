@@ -22,21 +22,21 @@ from numpy.typing import NDArray
 from pin_nonideal.errors import UserFunctionError
 from pin_nonideal.types import Array, Model
 
-from .least_distance import complement, held
+from .least_distance import complement, row_singular_values
 
 # Scaled residual at which the search ends; the core's Newton method squares it.
-CLOSED = 1e-9
+CLOSURE_TOL = 1e-9
 # Residual above which a loop counts as open after projection.
 CLOSURE_TOLERANCE = 1e-8
 CLOSING_STEPS, RETRACTIONS, SLIDES, HALVINGS = 300, 15, 60, 25
 # Damping of the closing steps relative to the mean square of a row: initial value and bounds.
 DAMPING, MIN_DAMPING, MAX_DAMPING = 1e-3, 1e-14, 1e10
 # Relative slope of the distance along the constraints at which a closure is stationary: rounding over gaps.
-STATIONARY = 1e-10
+STATIONARY_SLOPE = 1e-10
 # Rounding of a displacement, relative to a displacement of all coordinates by their units.
 ROUNDING = 1e-13
 # Step of gradient differences [units].
-DIFFERENCE = 1e-6
+DIFFERENCE_STEP = 1e-6
 # A row has a corner nearby if, at a displacement of NEAR_CORNER units, it differs from its linear model by
 # more than CORNER of the displacement.
 NEAR_CORNER, CORNER = 1e-2, 0.1
@@ -47,17 +47,17 @@ MIN_CURVATURE = 1e-2
 # Maximum number of open directions for second derivatives, each of which needs one gradient evaluation.
 MANY_FREEDOMS = 200
 # Maximum number of starts until a closure is found, and number of further starts if its displacement is
-# longer than FAR units (twice as many above VERY_FAR). With at most FEW_FREEDOMS coordinates, starts continue
-# up to MAX_STARTS until the nearest closure was found OFTEN times.
-STARTS, FURTHER_STARTS, FAR, VERY_FAR = 24, 12, 0.05, 0.5
+# longer than FAR_MOVE units (twice as many above VERY_FAR_MOVE). With at most FEW_FREEDOMS coordinates,
+# starts continue up to MAX_STARTS until the nearest closure was found OFTEN times.
+STARTS, FURTHER_STARTS, FAR_MOVE, VERY_FAR_MOVE = 24, 12, 0.05, 0.5
 MAX_STARTS, OFTEN, FEW_FREEDOMS = 60, 4, 12
 SPREADS = (0.1, 0.3, 0.5, 1.0)  # spreads of starts, in turn, over max(1 unit, displacement of best closure)
 # Smallest reciprocal condition number of the mass matrix. Closures below it (gimbal lock) are a fallback.
 MIN_RCOND = 1e-10
 # Smallest divisor.
-TINY = 1e-300
+MIN_NUMBER = 1e-300
 # Relative difference below which two distances are equal, and below which they belong to one closure.
-SAME, SAME_CLOSURE = 1e-9, 1e-6
+DISTANCE_TOL, CLOSURE_DISTANCE_TOL = 1e-9, 1e-6
 TURN = 2.0 * np.pi
 
 Rows = Callable[[Array], tuple[Array, Array]]
@@ -70,14 +70,14 @@ class Closure(NamedTuple):
         q: configuration, (nq,).
         gap: largest scaled residual.
         distance: distance from the start, in the metric of the mass matrix at the start.
-        settled: whether the distance is a local minimum.
+        is_minimum: whether the distance is a local minimum.
         iterations: total number of steps.
     """
 
     q: Array
     gap: float
     distance: float
-    settled: bool
+    is_minimum: bool
     iterations: int
 
 
@@ -170,19 +170,22 @@ class Search:
                 continue
             if best is None:
                 move = self._longest(closure.q)
-                further = FURTHER_STARTS * ((move > FAR) + (move > VERY_FAR))
+                further = FURTHER_STARTS * ((move > FAR_MOVE) + (move > VERY_FAR_MOVE))
                 starts = k + further
-            same = best is not None and abs(closure.distance - best.distance) <= SAME_CLOSURE * best.distance
-            if best is None or closure.distance < best.distance * (1.0 - SAME):
+            same = (
+                best is not None
+                and abs(closure.distance - best.distance) <= CLOSURE_DISTANCE_TOL * best.distance
+            )
+            if best is None or closure.distance < best.distance * (1.0 - DISTANCE_TOL):
                 best, often = closure, often if same else 0
                 same = True
             often += same
         if best is not None:
-            alone = fallback is None or fallback.distance >= best.distance
-            known = best.settled and alone and (often > 1 or not further)
+            is_nearer = fallback is None or fallback.distance >= best.distance
+            known = best.is_minimum and is_nearer and (often > 1 or not further)
             return best._replace(iterations=self.iterations), known
         if fallback is not None:
-            return fallback._replace(iterations=self.iterations), fallback.settled
+            return fallback._replace(iterations=self.iterations), fallback.is_minimum
         lacking = self._lacking(open_iterate)
         return Closure(open_iterate.q, lacking, self._distance(open_iterate), False, self.iterations), False
 
@@ -201,7 +204,7 @@ class Search:
 
     def _is_closed(self, iterate: Iterate) -> bool:
         """Check if all residuals are small enough for the core's Newton method."""
-        return self._lacking(iterate) <= CLOSED
+        return self._lacking(iterate) <= CLOSURE_TOL
 
     def _lacking(self, iterate: Iterate) -> float:
         """Return the largest residual."""
@@ -255,7 +258,7 @@ class Search:
                 break
             self.iterations += 1
             G = iterate.B @ iterate.B.T
-            scale = max(float(np.trace(G)) / len(G), TINY)
+            scale = max(float(np.trace(G)) / len(G), MIN_NUMBER)
             x = -iterate.B.T @ np.linalg.solve(G + damping * scale * np.eye(len(G)), iterate.phi)
             trial = self._place(self._go(iterate, x))
             if np.linalg.norm(trial.phi) < np.linalg.norm(iterate.phi):
@@ -275,34 +278,34 @@ class Search:
             gap = iterate.gap
             if gap <= ROUNDING:
                 break
-            U, s, Vt = held(iterate.B)
+            U, s, Vt = row_singular_values(iterate.B)
             trial = self._place(self._go(iterate, -Vt.T @ ((U.T @ iterate.phi) / s)))
             if not trial.gap < gap:
                 break
             iterate = trial
-        return iterate if iterate.gap <= CLOSED else None
+        return iterate if iterate.gap <= CLOSURE_TOL else None
 
     # --- along the constraints ------------------------------------------------------------------------------
 
     def _settle(self, iterate: Iterate) -> Closure:
         """Descend to a local minimum of the distance; return the start if the descent ends at a corner."""
-        end, settled = self._slide(iterate)
-        if not settled and self._has_corner(end):
+        end, is_minimum = self._slide(iterate)
+        if not is_minimum and self._has_corner(end):
             end = iterate
-        return Closure(end.q, end.gap, self._distance(end), settled, self.iterations)
+        return Closure(end.q, end.gap, self._distance(end), is_minimum, self.iterations)
 
     def _slide(self, iterate: Iterate) -> tuple[Iterate, bool]:
         """Apply Newton's method for the Lagrangian in the open directions; return if it ends in a minimum."""
-        settled = False
+        is_minimum = False
         for _ in range(SLIDES):
-            U, s, Vt = held(iterate.B)
+            U, s, Vt = row_singular_values(iterate.B)
             open_directions = complement(Vt)
             slope = open_directions.T @ iterate.move
             lam = -U @ ((Vt @ iterate.move) / s)
-            flat = np.linalg.norm(slope) <= STATIONARY * self._distance(iterate) + ROUNDING * self.size
+            flat = np.linalg.norm(slope) <= STATIONARY_SLOPE * self._distance(iterate) + ROUNDING * self.size
             curvature, directions = self._curvature(iterate, lam, open_directions)
             if flat and curvature.min(initial=1.0) >= -SADDLE:
-                settled = len(curvature) <= MANY_FREEDOMS
+                is_minimum = len(curvature) <= MANY_FREEDOMS
                 break
             self.iterations += 1
             if flat:
@@ -314,14 +317,14 @@ class Search:
                 trial = self._downhill(iterate, x, float(np.linalg.norm(slope)))
             if trial is None:
                 # Neither distance nor slope decreases, so the remaining slope may be rounding.
-                settled = bool(np.linalg.norm(slope) <= 1e3 * STATIONARY * self._distance(iterate))
+                is_minimum = bool(np.linalg.norm(slope) <= 1e3 * STATIONARY_SLOPE * self._distance(iterate))
                 break
             iterate = trial
-        return iterate, settled
+        return iterate, is_minimum
 
     def _has_corner(self, iterate: Iterate) -> bool:
         """Check if row directions change abruptly, as for a disk that lies flat."""
-        _, _, Vt = held(iterate.B)
+        _, _, Vt = row_singular_values(iterate.B)
         slope = iterate.move - Vt.T @ (Vt @ iterate.move)
         x = NEAR_CORNER * self._unit_length(iterate, slope) * slope
         there = [
@@ -331,7 +334,7 @@ class Search:
 
     def _unit_length(self, iterate: Iterate, x: Array) -> float:
         """Return the factor of x at which the first coordinate moves by its unit."""
-        return 1.0 / max(float((np.abs(np.linalg.solve(iterate.half, x)) / self.unit).max()), TINY)
+        return 1.0 / max(float((np.abs(np.linalg.solve(iterate.half, x)) / self.unit).max()), MIN_NUMBER)
 
     def _downhill(self, iterate: Iterate, x: Array, slope: float) -> Iterate | None:
         """Backtrack along x until the distance falls, or, if it changes by rounding only, the slope falls."""
@@ -341,7 +344,7 @@ class Search:
             if trial is None:
                 continue
             now = self._distance(trial)
-            if now < distance * (1.0 - SAME):
+            if now < distance * (1.0 - DISTANCE_TOL):
                 return trial
             if now <= distance * (1.0 + ROUNDING) and self._slope(trial) < 0.5 * slope:
                 return trial
@@ -349,7 +352,7 @@ class Search:
 
     def _slope(self, iterate: Iterate) -> float:
         """Return the norm of the displacement in the open directions."""
-        _, _, Vt = held(iterate.B)
+        _, _, Vt = row_singular_values(iterate.B)
         return float(np.linalg.norm(iterate.move - Vt.T @ (Vt @ iterate.move)))
 
     def _curvature(self, iterate: Iterate, lam: Array, open_directions: Array) -> tuple[Array, Array]:
@@ -360,7 +363,7 @@ class Search:
         here, H = self._gradient(iterate, lam), np.empty((n, n))
         for k in range(n):
             x = open_directions[:, k]
-            h = DIFFERENCE * self._unit_length(iterate, x)
+            h = DIFFERENCE_STEP * self._unit_length(iterate, x)
             there = self._gradient(self._place(self._go(iterate, h * x)), lam)
             H[:, k] = open_directions.T @ np.linalg.solve(iterate.half.T, (there - here) / h)
         values, vectors = np.linalg.eigh(0.5 * (H + H.T))
@@ -381,6 +384,6 @@ def conditioning(M: Array) -> float:
     """
     if not np.isfinite(M).all():
         return 0.0
-    diagonal = np.sqrt(np.maximum(np.diag(M), TINY))
+    diagonal = np.sqrt(np.maximum(np.diag(M), MIN_NUMBER))
     values = np.linalg.eigvalsh(M / np.outer(diagonal, diagonal))
     return float(values[0] / values[-1])

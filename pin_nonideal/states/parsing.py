@@ -16,7 +16,7 @@ from pin_nonideal.errors import InputError, UnknownNameError, nearest
 from pin_nonideal.types import Array, Model, State
 from pin_nonideal.validation import array, by_name, number
 
-from .joint_layout import CIRCLES, configuration, unit_parts
+from .joint_layout import COS_SIN_JOINTS, configuration, unit_parts
 from .joint_order import describe_order
 
 # A hand-written quaternion within this distance of unit length is normalized; others are errors.
@@ -64,10 +64,10 @@ def named_configuration(
     """Return a configuration from numbers, a table by joint name, or a name, (nq,).
 
     A table maps a joint name to a number, to the joint's values, or to a table of pieces. A floating base has
-    the pieces "xyz" and either "rpy" or "quaternion" [x, y, z, w]. Its name is that of the joint or the body,
-    or "base". A ball joint has "rpy" or "quaternion", a planar joint "xy" and "angle", and a translation
-    joint "xyz". An angle [rad] replaces (cos, sin). Missing entries stay as in `base`. A string is the name
-    of a reference configuration of the model.
+    the pieces "xyz" and either "rpy" or "quaternion" [x, y, z, w]. Its name is the name of the joint or the
+    body, or "base". A ball joint has "rpy" or "quaternion", a planar joint "xy" and "angle", and a
+    translation joint "xyz". An angle [rad] replaces (cos, sin). Missing entries stay as in `base`. A string
+    is the name of a reference configuration of the model.
 
     Args:
         model: pinocchio.Model.
@@ -90,7 +90,7 @@ def named_configuration(
         return configuration(model, state, what, parts)
     q = np.array(base)
     for name, value in state.items():
-        j = joint_named(model, name, what)
+        j = find_joint(model, name, what)
         first, size = model.idx_qs[j], model.nqs[j]
         q[first : first + size] = _values(model, j, 0, value, q[first : first + size], f'{what} of "{name}"')
     return with_unit_lengths(model, q, what)
@@ -118,7 +118,7 @@ def named_velocity(model: Model, state: State, base: Array, what: str) -> Array:
         return np.array(array(what, state, (model.nv,)))
     v = np.array(base)
     for name, value in state.items():
-        j = joint_named(model, name, what)
+        j = find_joint(model, name, what)
         first, size = model.idx_vs[j], model.nvs[j]
         v[first : first + size] = _values(model, j, 1, value, v[first : first + size], f'{what} of "{name}"')
     return v
@@ -145,7 +145,7 @@ def named_joint_values(model: Model, joint_values: object, what: str, others: fl
         return np.array(array(what, joint_values, (model.nv,)))
     values = np.full(model.nv, others)
     for name, value in table.items():
-        j = joint_named(model, name, what)
+        j = find_joint(model, name, what)
         size, words = model.nvs[j], f'{what} of "{name}"'
         if isinstance(value, Mapping):
             part = _values(model, j, 1, value, np.full(size, others), words)
@@ -156,7 +156,7 @@ def named_joint_values(model: Model, joint_values: object, what: str, others: fl
 
 
 def named_joint_samples(model: Model, joint_samples: object, count: int, what: str) -> Array:
-    """Samples of the degrees of freedom from an array or by joint name, (nt, nv); zero for joints left out.
+    """Return samples by degree of freedom from an array or by joint name, zero for missing joints, (nt, nv).
 
     Args:
         model: pinocchio.Model.
@@ -180,7 +180,7 @@ def named_joint_samples(model: Model, joint_samples: object, count: int, what: s
         return values
     values = np.zeros((count, model.nv))
     for name, samples in table.items():
-        j = joint_named(model, name, what)
+        j = find_joint(model, name, what)
         size, words = model.nvs[j], f'{what} of "{name}"'
         part = array(words, samples, (count,) if np.ndim(samples) == 1 and size == 1 else (count, size))
         values[:, model.idx_vs[j] : model.idx_vs[j] + size] = part.reshape(count, size)
@@ -190,7 +190,7 @@ def named_joint_samples(model: Model, joint_samples: object, count: int, what: s
 def named_configuration_samples(
     model: Model, configurations: object, base: Array, count: int, what: str
 ) -> Array:
-    """Samples of a configuration from an array or by joint name, (nt, nq).
+    """Return samples of a configuration from an array or by joint name, (nt, nq).
 
     Args:
         model: pinocchio.Model.
@@ -210,7 +210,7 @@ def named_configuration_samples(
     else:
         samples = np.tile(base, (count, 1))
         for name, values in table.items():
-            j = joint_named(model, name, what)
+            j = find_joint(model, name, what)
             first, size, words = model.idx_qs[j], model.nqs[j], f'{what} of "{name}"'
             part = array(words, values, (count,) if np.ndim(values) == 1 else (count, None))
             for k in range(count):
@@ -244,7 +244,7 @@ def named_coordinates(model: Model, state: State | None) -> NDArray[np.bool_] | 
         return None
     named = np.zeros(model.nv, dtype=bool)
     for name, value in state.items():
-        j = joint_named(model, name, "q")
+        j = find_joint(model, name, "q")
         own = named[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]]
         if not isinstance(value, Mapping):
             own[:] = True
@@ -260,7 +260,7 @@ def named_coordinates(model: Model, state: State | None) -> NDArray[np.bool_] | 
     return named
 
 
-def joint_named(model: Model, name: object, what: str) -> int:
+def find_joint(model: Model, name: object, what: str) -> int:
     """Return the index of a joint; a floating base also has the names "base" and that of its body.
 
     Args:
@@ -300,17 +300,17 @@ def _values(model: Model, j: int, level: int, value: object, now: Array, what: s
     """
     kind = model.joints[j].shortname()
     if isinstance(value, Mapping):
-        return _pieced(kind, level, value, now, what)
+        return _values_of_pieces(kind, level, value, now, what)
     if isinstance(value, pin.SE3) and level == 0 and kind == "JointModelFreeFlyer":
         return np.array(pin.SE3ToXYZQUAT(value))
     plain = np.asarray(value, dtype=object).reshape(-1).tolist()
-    if level == 0 and kind.startswith(CIRCLES) and len(plain) == model.nvs[j]:
+    if level == 0 and kind.startswith(COS_SIN_JOINTS) and len(plain) == model.nvs[j]:
         angle = number(what, plain[-1])
         plain = [*plain[:-1], float(np.cos(angle)), float(np.sin(angle))]
     return array(what, plain, (now.size,))
 
 
-def _pieced(kind: str, level: int, table: Mapping[object, Any], now: Array, what: str) -> Array:
+def _values_of_pieces(kind: str, level: int, table: Mapping[object, Any], now: Array, what: str) -> Array:
     """Return the values of a joint from a table of its pieces."""
     pieces = next((both[level] for start, both in PIECES.items() if kind.startswith(start)), {})
     values = np.array(now)

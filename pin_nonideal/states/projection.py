@@ -22,13 +22,13 @@ from .held import (
     changes,
     coordinate_notes,
     holding,
+    moved_mask,
     moves,
-    moving,
+    polish_free,
     require_rounding,
-    settled,
     with_entries,
 )
-from .loop_closure import CLOSURE_TOLERANCE, FAR, Closure
+from .loop_closure import CLOSURE_TOLERANCE, FAR_MOVE, Closure
 from .report import ProjectionReport, report_of
 from .rows import gap_rows, holonomic_rows, rows_at
 from .scales import chain, coordinate, largest_body, slides
@@ -37,17 +37,18 @@ from .scales import chain, coordinate, largest_body, slides
 RATE_TOLERANCE = 1e-6
 # Newton's method returns the nearest state, to rounding, if no coordinate moves by more than this part of its
 # unit.
-NEARBY = 1e-6
-SURELY = 0.1  # factor of NEARBY in ambient coordinates; a tangent displacement is never ten times as long
+MAX_NEWTON_MOVE = 1e-6
+# Factor of MAX_NEWTON_MOVE in ambient coordinates; a tangent displacement is never ten times as long.
+AMBIENT_FACTOR = 0.1
 # Largest residual from which Newton's method is tried, relative to the length of the mechanism.
 NEWTON_REACH = 1e-3
 # Displacements above this part of a unit are reported.
-LITTLE = 1e-3
+REPORTED_MOVE = 1e-3
 # Penetration up to this part of the size of the scene is rounding.
-INSIDE = 1e-12
+PENETRATION_ROUNDING = 1e-12
 # Largest initial penetration, relative to the length of the mechanism or to 1 m if the mechanism is longer.
 # Deeper penetration cannot be rounding of a pose.
-DEEP = 1e-2
+MAX_PENETRATION = 1e-2
 # Maximum number of degrees of freedom for a search, which takes minutes above it. Newton's method is then
 # tried from any residual.
 MANY_FREEDOMS = 300
@@ -60,7 +61,7 @@ class Projection:
         model: pinocchio.Model.
         program: the core's program.
         q0: configuration that defines the length of the mechanism if its model has no lengths, (nq,).
-        idle: names of contacts that no joint moves.
+        immovable_contacts: names of contacts that no joint moves.
         is_start: whether a run may start at q0. If not, user functions are not called at q0, and the first
             start defines the length.
 
@@ -74,14 +75,14 @@ class Projection:
         model: Model,
         program: core.Program,
         q0: Array,
-        idle: Collection[str] = (),
+        immovable_contacts: Collection[str] = (),
         is_start: bool = True,
     ) -> None:
         self.model, self.program = model, program
         self._slides = slides(model)
         self._chain = chain(model)
         self._measured = self._chain > 0.0 or is_start
-        self._gaps = gap_rows(program, idle)
+        self._gaps = gap_rows(program, immovable_contacts)
         self._loops = holonomic_rows(program)
         self._measure(self._chain or (self._length_at(q0) if self._measured else 0.0))
         self._has_gaps = bool(self._gaps.any())
@@ -138,15 +139,15 @@ class Projection:
         self.measure_at(q)
         runner = self.program.runner()
         phi = rows_at(runner, q, v, t)[2]
-        refuse_deep_starts(phi, self.program, DEEP * min(1.0, self.length), t)
+        refuse_deep_starts(phi, self.program, MAX_PENETRATION * min(1.0, self.length), t)
         on, v_on, before, after, rate = runner.project(q, v, t, self._reached())
-        iterations, nearest, met = 0, True, after <= self._closed
-        if not (met and self._is_nearby(q, on) and self._stays_outside(runner, q, on, t)):
-            closure, nearest = self._search(runner, q, t, on if met else None)
+        iterations, nearest, is_closed = 0, True, after <= self._closed
+        if not (is_closed and self._is_nearby(q, on) and self._stays_outside(runner, q, on, t)):
+            closure, nearest = self._search(runner, q, t, on if is_closed else None)
             iterations = closure.iterations
             on, v_on, after, rate = self._polished(runner, closure.q, v, t)
-            met = after <= self._closed or closure.gap <= CLOSURE_TOLERANCE
-            self._require_met(runner, q, closure.q, met, nearest, t)
+            is_closed = after <= self._closed or closure.gap <= CLOSURE_TOLERANCE
+            self._require_met(runner, q, closure.q, is_closed, nearest, t)
         if held.q is not None and held.q.any():
             on, search = self._hold(runner, q, on, held.q, held.firm_q, t)
             if search is not None:
@@ -198,16 +199,16 @@ class Projection:
         if moves(self.model, q, on, held, self.unit):
             closure, nearest = self._search(runner, q, t, None, ~held)
             search = closure.iterations, nearest
-            there = settled(self.model, runner, closure.q, ~held, self._loops, t)
+            there = polish_free(self.model, runner, closure.q, ~held, self._loops, t)
             phi = self._residuals(runner, there, t)
             if _largest(phi[self._loops]) <= self._closed and self._is_outside(there, phi):
                 on = there
             elif firm:
-                require_rounding(self.model, q, on, held, LITTLE * self.unit, t)
-        return with_entries(self.model, on, q, held & ~moving(self.model, q, on, self.unit)), search
+                require_rounding(self.model, q, on, held, REPORTED_MOVE * self.unit, t)
+        return with_entries(self.model, on, q, held & ~moved_mask(self.model, q, on, self.unit)), search
 
     def _require_met(
-        self, runner: core.Runner, q: Array, projected: Array, met: bool, nearest: bool, t: float
+        self, runner: core.Runner, q: Array, projected: Array, is_closed: bool, nearest: bool, t: float
     ) -> None:
         """Check that a search ended on the constraints, and near its start if only contacts were violated.
 
@@ -215,7 +216,7 @@ class Projection:
             runner: a workspace of the core.
             q: start of the search, (nq,).
             projected: end of the search, (nq,).
-            met: whether all constraints are satisfied at the end.
+            is_closed: whether all constraints are satisfied at the end.
             nearest: whether the search confirms the end as nearest.
             t: time [s].
 
@@ -225,10 +226,10 @@ class Projection:
         """
         phi, now = self._residuals(runner, q, t), self._residuals(runner, projected, t)
         inside = not self._is_outside(q, phi) and widest_loop(phi, self.program)[1] <= self._closed
-        far = (np.abs(pin.difference(self.model, q, projected)) > FAR * self.unit).any()
-        if inside and (not met or (far and not nearest)):
+        far = (np.abs(pin.difference(self.model, q, projected)) > FAR_MOVE * self.unit).any()
+        if inside and (not is_closed or (far and not nearest)):
             raise penetration_error(phi, self.program, t)
-        if not met:
+        if not is_closed:
             raise open_loops(now, self.program, t)
 
     def _polished(
@@ -271,10 +272,12 @@ class Projection:
         )
         on, v_on = found_q.reshape(q.shape), found_v.reshape(v.shape)
         met = rate <= RATE_TOLERANCE * min(1.0, self.length) * (1.0 + np.abs(v_on).max(axis=1, initial=0.0))
-        hardly = np.abs(on - q).max(axis=1, initial=0.0) <= SURELY * NEARBY * self.unit.min(initial=np.inf)
+        hardly = np.abs(on - q).max(axis=1, initial=0.0) <= AMBIENT_FACTOR * MAX_NEWTON_MOVE * self.unit.min(
+            initial=np.inf
+        )
         sure = (after <= self._closed) & met & hardly
         if self._has_gaps:
-            sure &= (after <= INSIDE) & (on == q).all(axis=1)
+            sure &= (after <= PENETRATION_ROUNDING) & (on == q).all(axis=1)
         for i in map(int, np.flatnonzero(~sure)):
             own = copy(self)
             if names:
@@ -294,7 +297,7 @@ class Projection:
         """
         away = pin.difference(self.model, pin.neutral(self.model), q)[self._slides]
         phi = rows_at(self.program.runner(), q, np.zeros(self.model.nv), 0.0)[2]
-        phi = phi[~(self._gaps & (phi <= INSIDE))]
+        phi = phi[~(self._gaps & (phi <= PENETRATION_ROUNDING))]
         return max(_largest(away), _largest(phi), largest_body(self.model))
 
     def _reached(self) -> float:
@@ -309,14 +312,14 @@ class Projection:
         """Check if no contact penetrates by more than rounding."""
         away = pin.difference(self.model, pin.neutral(self.model), q)[self._slides]
         size = max(1.0, self.length, _largest(away))
-        return bool(phi[self._gaps].min(initial=0.0) >= -INSIDE * size)
+        return bool(phi[self._gaps].min(initial=0.0) >= -PENETRATION_ROUNDING * size)
 
     def _stays_outside(self, runner: core.Runner, q: Array, on: Array, t: float) -> bool:
         """Check if no contact penetrates before and after a displacement."""
         return not self._has_gaps or all(self._is_outside(x, self._residuals(runner, x, t)) for x in (q, on))
 
     def _is_nearby(self, q: Array, on: Array) -> bool:
-        return bool((np.abs(pin.difference(self.model, q, on)) <= NEARBY * self.unit).all())
+        return bool((np.abs(pin.difference(self.model, q, on)) <= MAX_NEWTON_MOVE * self.unit).all())
 
     def _search(
         self,
@@ -359,7 +362,7 @@ class Projection:
         if held is not None:
             return coordinate_notes(self.model, q, on, held, self.unit)
         move = pin.difference(self.model, q, on)
-        if not (np.abs(move) > LITTLE * self.unit).any():
+        if not (np.abs(move) > REPORTED_MOVE * self.unit).any():
             return []
         dof = self._furthest(move)
         unit = "m" if self._slides[dof] else "rad"

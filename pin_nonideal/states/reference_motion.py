@@ -14,7 +14,7 @@ from .joint_layout import joint_places
 # Times this close to an end of the samples count as the end: relative, and in seconds below 1 s.
 TIME_ROUNDING = 1e-12
 # Step of the difference for the rate of a Jacobian, in the unit of the displacement.
-DIFFERENCE = 1e-5
+DIFFERENCE_STEP = 1e-5
 
 
 class ReferenceMotion:
@@ -72,7 +72,7 @@ class ReferenceMotion:
         q = np.asarray(pin.integrate(self._model, start, x))
         if not self._curved:
             return q, rate, change
-        step = DIFFERENCE / max(1.0, float(np.abs(rate).max()))
+        step = DIFFERENCE_STEP / max(1.0, float(np.abs(rate).max()))
         before, at, after = (_jacobian(self._model, start, x + d * rate) for d in (-step, 0.0, step))
         return q, at @ rate, at @ change + (after - before) @ rate / (2.0 * step)
 

@@ -22,7 +22,7 @@ class ProjectionReport:
     Attributes:
         distance: sqrt(d^T M(q) d) of the displacement d = q' - q in tangent coordinates [sqrt(kg) m].
         coordinate: name of the coordinate with the largest displacement over its unit, a radian or the length
-            of the mechanism. The name is that of the joint, with an index from 0 if the joint has several
+            of the mechanism. The name is the joint's name, with an index from 0 if the joint has several
             coordinates. Empty without a displacement.
         moved: displacement of this coordinate [rad or m].
         gap: largest residual before [m or rad, in the scale of its row].
@@ -77,8 +77,8 @@ def report_of(
     """
     (q, v), (on, v_on) = start, projected
     move, change = pin.difference(model, q, on), v_on - v
-    distance, most, moved = _farthest(model, unit, mass, q, move)
-    velocity_distance, fastest, changed = _farthest(model, unit, mass, on, change)
+    distance, most, moved = _largest_change(model, unit, mass, q, move)
+    velocity_distance, fastest, changed = _largest_change(model, unit, mass, on, change)
     return ProjectionReport(
         distance,
         most,
@@ -94,7 +94,7 @@ def report_of(
     )
 
 
-def _farthest(
+def _largest_change(
     model: Model, unit: Array, mass: Callable[[Array], Array], q: Array, change: Array
 ) -> tuple[float, str, float]:
     """Return the length of a change in the metric of M(q), and name and change of its largest coordinate."""

@@ -38,16 +38,16 @@ def holonomic_rows(program: core.Program) -> NDArray[np.bool_]:
     return out
 
 
-def gap_rows(program: core.Program, idle: Collection[str] = ()) -> NDArray[np.bool_]:
+def gap_rows(program: core.Program, immovable_contacts: Collection[str] = ()) -> NDArray[np.bool_]:
     """Return the mask of rows that are gaps of unilateral contacts, (m,).
 
     Args:
         program: the core's program.
-        idle: names of contacts that no joint moves, which are excluded.
+        immovable_contacts: names of contacts that no joint moves, which are excluded.
     """
     out = np.zeros(program.rows, dtype=bool)
     for c in program.constraints[program.first_gap :]:
-        out[c.first : c.first + c.count] = c.name not in idle
+        out[c.first : c.first + c.count] = c.name not in immovable_contacts
     return out
 
 
@@ -83,7 +83,7 @@ def row_lengths(runner: core.Runner, q: Array, v: Array, t: float, *, own: bool 
 
 # Singular value of rows over their greatest lengths below which rows are dependent or vanish. Closures and
 # rounding give about 1e-12; directions of light mechanisms lie above 1e-7.
-DEPENDENT = 1e-9
+MIN_SINGULAR_VALUE = 1e-9
 
 
 def metric_rows(runner: core.Runner, M: Array, q: Array, v: Array, t: float) -> Array:
@@ -106,7 +106,7 @@ def metric_rows(runner: core.Runner, M: Array, q: Array, v: Array, t: float) -> 
     return scaled
 
 
-def shortest(scaled: Array, y: Array, lengths: Array) -> Array:
+def minimum_norm(scaled: Array, y: Array, lengths: Array) -> Array:
     """Solve min |scaled diag(lengths) x - y| for the x of least norm, (n,).
 
     Args:
@@ -117,10 +117,10 @@ def shortest(scaled: Array, y: Array, lengths: Array) -> Array:
     used = lengths > 0.0
     x = np.zeros(len(lengths))
     left, values, right = np.linalg.svd(scaled[:, used])
-    rank = int((values > DEPENDENT).sum())
+    rank = int((values > MIN_SINGULAR_VALUE).sum())
     solution = right[:rank].T @ ((left.T[:rank] @ y) / values[:rank]) / lengths[used]
-    idle = right[rank:].T / lengths[used][:, None]
-    x[used] = solution - idle @ np.linalg.lstsq(idle, solution, rcond=None)[0]
+    null_basis = right[rank:].T / lengths[used][:, None]
+    x[used] = solution - null_basis @ np.linalg.lstsq(null_basis, solution, rcond=None)[0]
     return x
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pin_nonideal.types import Model
 
 # Rows and axes below this part of the largest are rounding.
-VANISHING = 1e-11
+MIN_ROW_LENGTH = 1e-11
 
 
 def chain(model: Model) -> float:
@@ -47,7 +47,7 @@ def slides(model: Model) -> NDArray[np.bool_]:
         data = joint.createData()
         joint.calc(data, q)
         turning = np.asarray(data.S).reshape(6, joint.nv)[3:]
-        sliding[joint.idx_v : joint.idx_v + joint.nv] = np.abs(turning).max(axis=0) < VANISHING
+        sliding[joint.idx_v : joint.idx_v + joint.nv] = np.abs(turning).max(axis=0) < MIN_ROW_LENGTH
     return sliding
 
 

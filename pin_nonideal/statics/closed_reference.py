@@ -10,9 +10,9 @@ from pin_nonideal.description.scene_spec import SceneSpec
 from pin_nonideal.errors import InputError, PinNonidealError
 from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.states.errors import widest_loop
-from pin_nonideal.states.held import Held, settled
+from pin_nonideal.states.held import Held, polish_free
 from pin_nonideal.states.reference_motion import TIME_ROUNDING, ReferenceMotion
-from pin_nonideal.states.rows import DEPENDENT, holonomic_rows, rows_at
+from pin_nonideal.states.rows import MIN_SINGULAR_VALUE, holonomic_rows, rows_at
 from pin_nonideal.states.scales import coordinate, slides
 from pin_nonideal.types import Array, Model
 
@@ -22,13 +22,13 @@ from .residual import AtRest
 Mask = NDArray[np.bool_]
 
 # Velocities of a coordinate below this part of the admitted ones depend on the coordinates chosen before.
-INDEPENDENT = 1e-6
-LONGEST = 0.1  # move of a given coordinate between two closures, in rad or relative to the scene's length
+MIN_INDEPENDENT_VELOCITY = 1e-6
+MAX_MOVE = 0.1  # move of a given coordinate between two closures, in rad or relative to the scene's length
 LOG_ROUNDING = 1e-3  # largest move of a given coordinate, in rad or relative to the scene's length
 # Largest change of a given velocity over the largest given velocity. Differences of logged positions stay
 # below it.
 RATE_ROUNDING = 0.1
-CLOSED = 1e-9  # residual of a reference on the constraints, relative to the scene's length or 1 m
+CLOSURE_TOL = 1e-9  # residual of a reference on the constraints, relative to the scene's length or 1 m
 
 
 class ClosedReference:
@@ -69,20 +69,20 @@ class ClosedReference:
         compiled = compiled_scene(scene)
         self._program = compiled.program
         self._runner, self._rows = self._program.runner(), holonomic_rows(self._program)
-        self._allowed = CLOSED * max(1.0, compiled.projection.length)
+        self._allowed = CLOSURE_TOL * max(1.0, compiled.projection.length)
         still = np.zeros(scene.model.nv)
         try:
             start = compiled.project(q[0], still, float(times[0]), Held(q=stated & dofs))[0]
         except PinNonidealError:
             self._free = ~(stated & dofs)
-            start = self._settled(q[0], float(times[0]))  # raises an error that names the loop
+            start = self._configuration_on(q[0], float(times[0]))  # raises an error that names the loop
         basis = AtRest(scene, still, float(times[0]), start).free(start)
-        self._free = ~self._independent(basis, [stated & dofs, stated])
+        self._free = ~self._independent_mask(basis, [stated & dofs, stated])
         on = np.array(q)
-        on[0] = self._settled(start, float(times[0]))
+        on[0] = self._configuration_on(start, float(times[0]))
         unit = np.where(slides(scene.model), compiled.projection.length or 1.0, 1.0)
         for k in range(1, len(on)):
-            on[k] = self._followed(on[k - 1], q[k], stated, times[k - 1 : k + 1], unit)
+            on[k] = self._follow_sample(on[k - 1], q[k], stated, times[k - 1 : k + 1], unit)
         self._require_reference(on, q, times, stated, unit)
         on_rates = None if v is None else np.array(v)
         if v is not None and on_rates is not None:
@@ -94,18 +94,18 @@ class ClosedReference:
     def __call__(self, t: float) -> tuple[Array, Array, Array]:
         """Return q (nq,), v (nv,) and a (nv,) on the constraints at time t [s]."""
         q, v, a = self._motion(t)
-        q = self._settled(q, t)
+        q = self._configuration_on(q, t)
         v = self._velocity(q, v, t)
         A, b, _, _ = rows_at(self._runner, q, v, t)
         a = np.array(a)
-        a[self._free] += self._solved(A, b - A @ a, t)
+        a[self._free] += self._solve_dependent(A, b - A @ a, t)
         return q, v, a
 
     def torques(self, q: Array, v: Array, a: Array, t: float) -> Array:
         """Return the torques of the driven joints for a motion on the constraints, (nv,)."""
         return inverse_dynamics(self._scene, q, v, a, self._driven, t=t).tau
 
-    def _followed(self, before: Array, q: Array, stated: Mask, times: Array, unit: Array) -> Array:
+    def _follow_sample(self, before: Array, q: Array, stated: Mask, times: Array, unit: Array) -> Array:
         """Return a sample on the constraints, followed from the sample before it in short moves, (nq,).
 
         Args:
@@ -120,10 +120,10 @@ class ClosedReference:
         def way() -> Array:
             return np.where(stated, pin.difference(model, before, q), 0.0)
 
-        count = max(1, int(np.ceil(np.abs(way() / unit).max(initial=0.0) / LONGEST)))
+        count = max(1, int(np.ceil(np.abs(way() / unit).max(initial=0.0) / MAX_MOVE)))
         for left in range(count, 0, -1):
             t = float(times[1] - (left - 1) / count * (times[1] - times[0]))
-            before = self._settled(pin.integrate(model, before, way() / left), t)
+            before = self._configuration_on(pin.integrate(model, before, way() / left), t)
         return before
 
     def _require_reference(self, on: Array, q: Array, times: Array, stated: Mask, unit: Array) -> None:
@@ -173,14 +173,14 @@ class ClosedReference:
             f"the constraints, or only as many joints by name as these leave free, {np.sum(~self._free)} here"
         )
 
-    def _independent(self, basis: Array, groups: list[Mask]) -> Mask:
+    def _independent_mask(self, basis: Array, groups: list[Mask]) -> Mask:
         """Return the mask of coordinates that determine the motion, (nv,), from the first groups first."""
         chosen, left = np.zeros(len(basis), dtype=bool), basis.copy()
         for group in groups:
             while chosen.sum() < basis.shape[1]:
                 sizes = np.where(group & ~chosen, np.linalg.norm(left, axis=1), 0.0)
                 best = int(np.argmax(sizes))
-                if sizes[best] < INDEPENDENT:
+                if sizes[best] < MIN_INDEPENDENT_VELOCITY:
                     break
                 chosen[best] = True
                 along = left[best] / sizes[best]
@@ -193,9 +193,9 @@ class ClosedReference:
             )
         return chosen
 
-    def _settled(self, q: Array, t: float) -> Array:
+    def _configuration_on(self, q: Array, t: float) -> Array:
         """Return the configuration on the constraints with the independent coordinates of q, (nq,)."""
-        on = settled(self._scene.model, self._runner, q, self._free, self._rows, t)
+        on = polish_free(self._scene.model, self._runner, q, self._free, self._rows, t)
         phi = rows_at(self._runner, on, np.zeros(len(self._free)), t)[2]
         if not np.abs(phi[self._rows]).max(initial=0.0) <= self._allowed:
             name, gap = widest_loop(phi, self._program)
@@ -209,13 +209,13 @@ class ClosedReference:
         """Return the velocity on the constraints with the independent entries of v, (nv,)."""
         A, _, _, rate = rows_at(self._runner, q, v, t)
         closed = np.array(v)
-        closed[self._free] -= self._solved(A, rate, t)
+        closed[self._free] -= self._solve_dependent(A, rate, t)
         return closed
 
-    def _solved(self, A: Array, b: Array, t: float) -> Array:
+    def _solve_dependent(self, A: Array, b: Array, t: float) -> Array:
         """Solve A x = b for the dependent coordinates."""
         own = A[np.ix_(self._rows, self._free)]
-        x, _, rank, _ = np.linalg.lstsq(own, b[self._rows], rcond=DEPENDENT)
+        x, _, rank, _ = np.linalg.lstsq(own, b[self._rows], rcond=MIN_SINGULAR_VALUE)
         if rank < own.shape[1]:
             raise InputError(
                 f"{self._who}: the reference passes a singular position at t = {t:g} s, where the given "

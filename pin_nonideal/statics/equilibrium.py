@@ -19,18 +19,18 @@ from .residual import AtRest, Balance, weight
 
 # Step of central differences of forces [units]: the cube root of rounding, at which the errors by rounding
 # and by curvature are equal.
-DIFFERENCE = 6e-6
+DIFFERENCE_STEP = 6e-6
 # Longest step [units, see `AtRest.units`], shortest step, and maximum number of steps.
-LONGEST, SHORTEST, MOST = 0.5, 1e-13, 300
+MAX_STEP, MIN_STEP, MAX_STEPS = 0.5, 1e-13, 300
 CLOSINGS = 20  # maximum number of iterations to the configuration at which a contact closes
 # Newton step at which an equilibrium is found [units].
-CLOSE = 1e-9
-# A direction is neutral if its stiffness is below NEUTRAL times the force scale over a unit displacement, or
-# below CANCELED times the stiffnesses that cancel in it.
-NEUTRAL, CANCELED = 1e-7, 1e-10
+CONVERGED_STEP = 1e-9
+# A direction is neutral if its stiffness is below NEUTRAL_STIFFNESS times the force scale over a unit
+# displacement, or below CANCELLATION_TOL times the stiffnesses that cancel in it.
+NEUTRAL_STIFFNESS, CANCELLATION_TOL = 1e-7, 1e-10
 MIN_RATE = 1e-12  # smallest divisor of neutral directions [1/s^2]
 # Tolerance of balanced forces relative to the force scale, and rounding of a stiffness relative to its size.
-BALANCED, ROUNDING = 1e-9, 1e-14
+BALANCE_TOL, ROUNDING = 1e-9, 1e-14
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +106,7 @@ def equilibrium(
     downhill = choice("equilibrium: stable", stable, (True, False))
     still = np.zeros(scene.model.nv)
     torque = None if tau is None else named_velocity(scene.model, tau, still, "equilibrium: tau")
-    time, attempts = number("equilibrium: t", t), count("equilibrium: starts", starts, least=1)
+    time, attempts = number("equilibrium: t", t), count("equilibrium: starts", starts, min_value=1)
     start = scene.project(q, still, time)[0]
     search = _Search(AtRest(scene, torque, time, start), downhill)
     best: Equilibrium | None = None
@@ -149,12 +149,12 @@ class _Search:
         """Search from one configuration; None if the search fails."""
         self.rest.begin(q)
         self.unit = self.rest.units(self.rest.mass(q), self.rest.free(q))
-        now, longest = self.rest.balance(q), LONGEST
-        for _ in range(MOST):
+        now, longest = self.rest.balance(q), MAX_STEP
+        for _ in range(MAX_STEPS):
             self.note(q, now)
             stiffness = self.stiffness(q, now)
-            move, distance, unopposed = self.move(q, now, stiffness)
-            if distance <= CLOSE and not unopposed:
+            move, distance, is_unopposed = self.move(q, now, stiffness)
+            if distance <= CONVERGED_STEP and not is_unopposed:
                 q, now = self.polished(q, now, move)
                 return self.result(q, now, self.stiffness(q, now), start)
             size = float(np.abs(move / self.unit).max(initial=0.0))
@@ -164,8 +164,8 @@ class _Search:
                 q, now = next_state
                 if self.rest.touch(q):
                     now = self.rest.balance(q)
-                longest = min(LONGEST, 2.0 * max(longest, scale * size))
-            elif (longest := min(longest, scale * size) / 4.0) < SHORTEST:
+                longest = min(MAX_STEP, 2.0 * max(longest, scale * size))
+            elif (longest := min(longest, scale * size) / 4.0) < MIN_STEP:
                 break
         return None
 
@@ -217,7 +217,7 @@ class _Search:
         """Compute - free^T d(F + A^T lam)/dq free at constant lam, by central differences."""
         columns = []
         for direction in now.free.T:
-            ends, part = [], DIFFERENCE / float(np.linalg.norm(direction / self.unit))
+            ends, part = [], DIFFERENCE_STEP / float(np.linalg.norm(direction / self.unit))
             for sign in (1.0, -1.0):
                 there = pin.integrate(self.model, q, sign * part * direction)
                 ends.append(self.rest.forces(there) + self.rest.rows(there).T @ now.lam)
@@ -229,7 +229,9 @@ class _Search:
         """Return the stiffness of each shape (column) below which it is neutral, from its own terms, (k,)."""
         size = np.abs(shapes)
         motion = np.linalg.norm(now.free / self.unit[:, None], axis=0)
-        canceled = CANCELED * np.abs(stiffness) + NEUTRAL * np.diag(motion * self.in_play(now, inertia))
+        canceled = CANCELLATION_TOL * np.abs(stiffness) + NEUTRAL_STIFFNESS * np.diag(
+            motion * self.in_play(now, inertia)
+        )
         return np.asarray(np.einsum("ik,ij,jk->k", size, canceled, size))
 
     def move(self, q: Array, now: Balance, stiffness: Array) -> tuple[Array, float, bool]:
@@ -242,13 +244,13 @@ class _Search:
         rates, shapes = eigh(0.5 * (stiffness + stiffness.T), 0.5 * (inertia + inertia.T))
         pull, least = shapes.T @ now.left, self.neutral(now, inertia, stiffness, shapes)
         neutral = np.abs(rates) <= least
-        rounding = BALANCED * self.in_play(now, inertia) + ROUNDING * np.abs(stiffness).sum(axis=1)
+        rounding = BALANCE_TOL * self.in_play(now, inertia) + ROUNDING * np.abs(stiffness).sum(axis=1)
         pushed = neutral & (np.abs(pull) > np.abs(shapes).T @ rounding)
         steps = np.where(neutral & ~pushed, 0.0, pull / np.where(neutral, least + MIN_RATE, np.abs(rates)))
         away = now.free @ (shapes @ np.where(neutral, 0.0, steps))
         distance = float(np.abs(away / self.unit).max(initial=0.0))
         if not self.downhill:
-            steps = np.linalg.lstsq(stiffness, now.left, rcond=CANCELED)[0]
+            steps = np.linalg.lstsq(stiffness, now.left, rcond=CANCELLATION_TOL)[0]
             return now.free @ steps, distance, bool(pushed.any())
         return now.free @ (shapes @ steps), distance, bool(pushed.any())
 

@@ -12,18 +12,18 @@ from numpy.typing import NDArray
 
 from pin_nonideal.core_loader import core
 from pin_nonideal.scene.scene import Scene, compiled_scene
-from pin_nonideal.states.rows import DEPENDENT
+from pin_nonideal.states.rows import MIN_SINGULAR_VALUE
 from pin_nonideal.types import Array
 
 from .limit_cones import LimitCones
 from .residual import AtRest
 
 # Tolerance of the ends of a band relative to the largest force, and maximum number of iterations to an end.
-SETTLED, MAX_PASSES = 1e-12, 60
+BAND_TOL, MAX_PASSES = 1e-12, 60
 # Torque, relative to the largest force, beyond which friction counts as growing without bound.
-BEYOND = 1e9
+UNBOUNDED_TORQUE = 1e9
 # Velocity at which slip of several directions is evaluated, relative to the unit motion of the joint.
-SLOW = 1e-8
+SLIP_VELOCITY = 1e-8
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ def _friction_joints(scene: Scene, at_rest: AtRest, q: Array) -> dict[str, int]:
         own = D[first : first + size]
         first += size
         if law < len(scene.laws):  # laws come before the friction of contacts
-            acts |= (own > DEPENDENT * own.max(axis=1, initial=0.0, keepdims=True)).any(axis=0)
+            acts |= (own > MIN_SINGULAR_VALUE * own.max(axis=1, initial=0.0, keepdims=True)).any(axis=0)
     return {
         str(model.names[j]): int(model.idx_vs[j])
         for j in range(1, model.njoints)
@@ -175,12 +175,12 @@ class _Joint:
         return None
 
     def end(self, inside: float, side: int) -> float:
-        """Return an end x of the band, the end that the limits at x themselves give."""
+        """Return an end x of the band that equals the end under the friction limits at x."""
         sign = (-1.0, 1.0)[side]
         within = inside
         for k in range(MAX_PASSES):
             x, limits = self.ends(within).at(side), self.ends(within).limits
-            if not math.isfinite(x) or abs(x - within) <= SETTLED * (self.scale + abs(x)):
+            if not math.isfinite(x) or abs(x - within) <= BAND_TOL * (self.scale + abs(x)):
                 return x
             if self.same_limits(x, limits):
                 return x
@@ -189,15 +189,15 @@ class _Joint:
                 return self.between(within, x)
             within = x
             if k == 0:
-                far = inside + sign * BEYOND * self.scale
+                far = inside + sign * UNBOUNDED_TORQUE * self.scale
                 if sign * (self.ends(far).at(side) - far) >= 0.0:
                     return sign * math.inf
-        return self.between(within, inside + sign * BEYOND * self.scale)
+        return self.between(within, inside + sign * UNBOUNDED_TORQUE * self.scale)
 
     def same_limits(self, x: float, limits: Array) -> bool:
         """Check if the friction limits at a torque are the given ones."""
         return bool(
-            np.allclose(self.ends(x).limits, limits, rtol=SETTLED, atol=SETTLED * (self.scale + abs(x)))
+            np.allclose(self.ends(x).limits, limits, rtol=BAND_TOL, atol=BAND_TOL * (self.scale + abs(x)))
         )
 
     def between(self, within: float, outside: float) -> float:
@@ -209,7 +209,7 @@ class _Joint:
                 within = middle
             else:
                 outside = middle
-            if abs(outside - within) <= SETTLED * (self.scale + abs(within)):
+            if abs(outside - within) <= BAND_TOL * (self.scale + abs(within)):
                 break
         return within
 
@@ -222,7 +222,7 @@ class _Joint:
             return math.nan
         way, opens = direction
         modes, several = self.modes(way)
-        speed = SLOW * way if several or opens else self.rest.still
+        speed = SLIP_VELOCITY * way if several or opens else self.rest.still
         torque = self.tau.copy()
 
         def power(x: float) -> float:
@@ -255,7 +255,7 @@ class _Joint:
             way = self._way(sign)
         finally:
             self.rest.open = before
-        if way is None or (rows @ way < -DEPENDENT).any():
+        if way is None or (rows @ way < -MIN_SINGULAR_VALUE).any():
             return None
         return way, True
 
@@ -263,14 +263,14 @@ class _Joint:
         free = self.rest.free(self.q)
         own = free[self.dof]
         part = float(own @ own)
-        return None if part <= DEPENDENT else np.asarray(sign * (free @ own) / part)
+        return None if part <= MIN_SINGULAR_VALUE else np.asarray(sign * (free @ own) / part)
 
     def modes(self, way: Array) -> tuple[list[core.Mode], bool]:
         """Return the modes of all elements in a motion, and whether one with several directions slips."""
         rows = self.rest.directions(self.q)[0]
         sizes = list(self.rest.program.element_sizes)
         slip, first, modes, several = rows @ way, 0, [], False
-        quiet = DEPENDENT * (1.0 + float(np.abs(way).max()))
+        quiet = MIN_SINGULAR_VALUE * (1.0 + float(np.abs(way).max()))
         limits = self.limits()
         for e, size in enumerate(sizes):
             own = slip[first : first + size]
@@ -310,12 +310,12 @@ def _root(power: Callable[[float], float], start: float, sign: float, scale: flo
     toward = -sign if at > 0.0 else sign
     for _ in range(MAX_PASSES):
         there = power(x)
-        if abs(there) <= SETTLED * (scale + abs(x)) * 0.01:
+        if abs(there) <= BAND_TOL * (scale + abs(x)) * 0.01:
             return x
         if (there > 0.0) != (at > 0.0):
-            return float(brentq(power, start, x, xtol=SETTLED * scale, rtol=4.0 * np.finfo(float).eps))
+            return float(brentq(power, start, x, xtol=BAND_TOL * scale, rtol=4.0 * np.finfo(float).eps))
         step *= 2.0
         x = start + toward * step
-        if abs(x) > BEYOND * (scale + abs(start)):
+        if abs(x) > UNBOUNDED_TORQUE * (scale + abs(start)):
             break
     return math.copysign(math.inf, toward)

@@ -15,12 +15,12 @@ from pin_nonideal.core_loader import core
 from pin_nonideal.errors import FrictionConvergenceError, InputError, short_repr
 from pin_nonideal.scene.scene import Scene, require_scene
 from pin_nonideal.states.parsing import (
-    joint_named,
+    find_joint,
     named_configuration,
     named_joint_values,
     named_velocity,
 )
-from pin_nonideal.states.rows import DEPENDENT, rows_at, shortest
+from pin_nonideal.states.rows import MIN_SINGULAR_VALUE, minimum_norm, rows_at
 from pin_nonideal.types import Array, State, Table
 from pin_nonideal.validation import array, by_name, number, sequence
 
@@ -28,13 +28,13 @@ from .holding import HoldingTorque, holding_torques
 from .residual import AtRest, weight
 
 # Tolerance of A a = b, relative to its terms.
-FOLLOWS = 1e-6
-ROUNDING = 1e-6  # acceleration scale without weight [m/s^2 or rad/s^2], multiplied by FOLLOWS
+ACCELERATION_TOL = 1e-6
+ROUNDING = 1e-6  # acceleration scale without weight [m/s^2 or rad/s^2], multiplied by ACCELERATION_TOL
 # Slip rates and slip accelerations below this part of 1 + the largest velocity or acceleration count as zero.
 AT_REST = 1e-9
 # Maximum number of iterations for load-dependent friction, and their relative tolerance.
-PASSES, BALANCED = 200, 1e-13
-DIFFERENCE = 1e-6  # step along the motion for the time derivative of slip rows [s]
+MAX_PASSES, FRICTION_TOL = 200, 1e-13
+DIFFERENCE_STEP = 1e-6  # step along the motion for the time derivative of slip rows [s]
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,9 +83,9 @@ def inverse_dynamics(
 
     The torques satisfy free^T (M a - F - C - tau) = 0 along the motions `free` that the constraints admit.
     They act on the actuated joints only. Friction C follows from the reactions under these torques. The
-    scene's actuation is ignored. A sticking element that stays at rest exerts no friction; at rest, `holding`
-    has the torques that friction holds around tau. Contacts that are open, or that the motion opens, exert no
-    force.
+    scene's actuation is ignored. A sticking element that stays at rest exerts no friction. At rest, `holding`
+    has the band of torques around tau in which friction holds the scene. Contacts that are open, or that the
+    motion opens, exert no force.
 
     Args:
         scene: the scene.
@@ -116,7 +116,7 @@ def inverse_dynamics(
     rest = AtRest(scene, still, time, at)
     A, b, _, rate = rows_at(rest.runner, at, speed, time)
     if len(A):
-        allowed = _allowed(rest, at, A, b, acceleration)
+        allowed = _allowed_residual(rest, at, A, b, acceleration)
         _open_contacts(rest, A, b, rate, acceleration, allowed)
         _check_follows(scene, A, b, acceleration, rest.open, allowed)
     result = _Torques(rest, at, speed, acceleration, dofs).solve(limits)
@@ -132,8 +132,7 @@ def _driven(scene: Scene, actuated: Sequence[str] | None) -> list[int]:
     if isinstance(actuated, str):
         raise InputError(f"inverse_dynamics: actuated must be a list of joints; got {short_repr(actuated)}")
     joints = [
-        joint_named(scene.model, name, "inverse_dynamics: actuated")
-        for name in sequence("actuated", actuated)
+        find_joint(scene.model, name, "inverse_dynamics: actuated") for name in sequence("actuated", actuated)
     ]
     return [int(scene.model.idx_vs[j]) + k for j in joints for k in range(scene.model.nvs[j])]
 
@@ -168,10 +167,10 @@ def _bounds(scene: Scene, bounds: object, dofs: list[int]) -> tuple[Array, Array
     return least, largest
 
 
-def _allowed(rest: AtRest, q: Array, A: Array, b: Array, a: Array) -> Array:
+def _allowed_residual(rest: AtRest, q: Array, A: Array, b: Array, a: Array) -> Array:
     """Return the allowed residual of each row of A a = b, relative to its terms and to gravity, (m,)."""
     falls = rest.scaled_rows(q, rest.root(q))[1] * weight(rest.scene)
-    return np.asarray(FOLLOWS * (np.abs(A) @ np.abs(a) + np.abs(b) + falls + ROUNDING))
+    return np.asarray(ACCELERATION_TOL * (np.abs(A) @ np.abs(a) + np.abs(b) + falls + ROUNDING))
 
 
 def _open_contacts(rest: AtRest, A: Array, b: Array, rate: Array, a: Array, allowed: Array) -> None:
@@ -211,10 +210,10 @@ class _Torques:
         """Return modes from slip, or its acceleration at rest, and a velocity at which all elements slip."""
         runner, t, v, model = self.rest.runner, self.rest.t, self.v, self.rest.scene.model
         rows = [
-            runner.slip_rows(pin.integrate(model, self.q, s * DIFFERENCE * v), v, t).reshape(-1, len(v))
+            runner.slip_rows(pin.integrate(model, self.q, s * DIFFERENCE_STEP * v), v, t).reshape(-1, len(v))
             for s in (-1.0, 0.0, 1.0)
         ]
-        gained = (rows[2] - rows[0]) @ v / (2.0 * DIFFERENCE)
+        gained = (rows[2] - rows[0]) @ v / (2.0 * DIFFERENCE_STEP)
         slip, change = rows[1] @ v, rows[1] @ self.a + gained
         quiet = AT_REST * (1.0 + np.abs(v).max(initial=0.0))
         quiet_change = AT_REST * (1.0 + np.abs(self.a).max(initial=0.0))
@@ -238,11 +237,11 @@ class _Torques:
         scaled = np.linalg.solve(root, G) / self.lengths
         moments = None if limits is None else (limits[0] * self.arms, limits[1] * self.arms)
         tau, before = np.zeros(len(self.v)), np.inf
-        for _ in range(PASSES):
+        for _ in range(MAX_PASSES):
             now = self.rest.runner.solve(self.q, self.slipping, self.rest.t, tau, self.modes)
             undriven = now.F - tau + now.C  # forces without the torques
             needed = self.free.T @ (self.M @ self.a - undriven)
-            u = _least(scaled, np.linalg.solve(root, needed), self.lengths, moments)
+            u = _bounded_least_squares(scaled, np.linalg.solve(root, needed), self.lengths, moments)
             change = self.select @ (u / self.arms) - tau
             tau = self.select @ (u / self.arms)
             scale = float(
@@ -251,13 +250,13 @@ class _Torques:
                 + np.abs(self.M @ self.a).max()
             )
             size = float(np.abs(change).max(initial=0.0))
-            if size <= BALANCED * scale or (size >= before and size <= 1e3 * BALANCED * scale):
+            if size <= FRICTION_TOL * scale or (size >= before and size <= 1e3 * FRICTION_TOL * scale):
                 break
             before = size
         else:
             raise FrictionConvergenceError(
-                f"inverse_dynamics: friction and torques did not settle in {PASSES} passes; the friction of "
-                f'"{self.rest.scene.name}" depends too much on the torques here',
+                f"inverse_dynamics: friction and torques did not settle in {MAX_PASSES} passes; the friction "
+                f'of "{self.rest.scene.name}" depends too much on the torques here',
                 element=", ".join(self.rest.scene.element_names),
             )
         lam = self.rest.runner.solve(self.q, self.slipping, self.rest.t, tau, self.modes).lam
@@ -265,21 +264,23 @@ class _Torques:
         return InverseDynamics(tau, np.asarray(lam), left)
 
 
-def _least(scaled: Array, needed: Array, lengths: Array, limits: tuple[Array, Array] | None) -> Array:
+def _bounded_least_squares(
+    scaled: Array, needed: Array, lengths: Array, limits: tuple[Array, Array] | None
+) -> Array:
     """Solve min |scaled (lengths u) - needed| for the u of least norm; active limits hold exactly."""
-    u = shortest(scaled, needed, lengths)
+    u = minimum_norm(scaled, needed, lengths)
     if limits is None or ((limits[0] <= u) & (u <= limits[1])).all():
         return np.asarray(u)
     from scipy.optimize import lsq_linear
 
     least, largest = limits
     left, values, right = np.linalg.svd(scaled, full_matrices=False)
-    G = left @ (np.where(values > DEPENDENT, values, 0.0)[:, None] * right) * lengths
+    G = left @ (np.where(values > MIN_SINGULAR_VALUE, values, 0.0)[:, None] * right) * lengths
     weight = 1e4 * max(1.0, float(np.linalg.norm(G)))
     rows = np.vstack([weight * G, np.eye(G.shape[1])])
     near = lsq_linear(rows, np.append(weight * needed, np.zeros(G.shape[1])), limits, method="bvls").x
     room = 1e-9 * (largest - least)
     free = (near > least + room) & (near < largest - room)
     u = np.where(near <= least + room, least, np.where(near >= largest - room, largest, 0.0))
-    u[free] = shortest(scaled[:, free], needed - G[:, ~free] @ u[~free], lengths[free])
+    u[free] = minimum_norm(scaled[:, free], needed - G[:, ~free] @ u[~free], lengths[free])
     return np.asarray(np.clip(u, least, largest))

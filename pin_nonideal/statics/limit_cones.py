@@ -11,7 +11,7 @@ import numpy as np
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.constraints import Rolling
 from pin_nonideal.scene.scene import Scene, compiled_scene
-from pin_nonideal.states.rows import DEPENDENT
+from pin_nonideal.states.rows import MIN_SINGULAR_VALUE
 from pin_nonideal.types import Array
 
 from .residual import AtRest, weight
@@ -19,15 +19,15 @@ from .residual import AtRest, weight
 # Tolerance of cone violations relative to the largest force, and maximum number of rounds of cuts.
 CUT, MAX_CUTS = 1e-9, 60
 # Number of initial cut directions of a disk.
-FIRST = 8
+INITIAL_CUTS = 8
 # Tolerance of the margin, and friction factor above which no friction suffices.
 FOUND, MAX_FACTOR = 1e-9, 1e6
 # Smallest force scale, relative to the weight; forces balance to CUT times the force scale.
-LIGHT = 1e-3
+MIN_FORCE_SCALE = 1e-3
 PARTS = ("", "torsional", "rolling")  # suffixes of the names of a contact's friction elements
 # Distance from a limit, in the units of the unknowns, within which an element counts as at its limit.
 AT_LIMIT = 1e-6
-ENDLESS = 1e9  # factor of limits that stands for friction of any size
+INFINITE_FACTOR = 1e9  # factor of limits that stands for friction of any size
 
 
 class LimitCones:
@@ -46,7 +46,7 @@ class LimitCones:
     Attributes:
         A: rows of constraints and contacts, (m, nv).
         parts: slice of each element's forces in the unknowns.
-        lengths: length of each unknown, which is multiplied by it.
+        lengths: factor of each unknown, the length of its row.
         unit: largest force, by which the unknowns are divided.
         constant: limits of the elements that do not depend on the unknowns, in the units of the unknowns.
         balance: forces of the unknowns along an orthonormal basis of their span, (r, m + d).
@@ -81,10 +81,10 @@ class LimitCones:
             np.linalg.solve(root, -at_rest.forces(q)),
         )
         largest = float(np.linalg.norm(acting))
-        self.unit = max(largest, CUT * float(limits.max(initial=0.0)), LIGHT * weight(scene)) or 1.0
+        self.unit = max(largest, CUT * float(limits.max(initial=0.0)), MIN_FORCE_SCALE * weight(scene)) or 1.0
         self.constant = limits / self.unit
         reached, values, _ = np.linalg.svd(scaled.T)
-        reached = reached[:, : int((values > DEPENDENT).sum())].T
+        reached = reached[:, : int((values > MIN_SINGULAR_VALUE).sum())].T
         self.balance, self.load = reached @ scaled.T, reached @ acting / self.unit
         left = acting - reached.T @ (reached @ acting)
         self.holds = bool(np.linalg.norm(left) <= CUT * self.unit)
@@ -161,7 +161,7 @@ class LimitCones:
         ]
 
     def missing(self) -> tuple[dict[int, float], dict[int, float]]:
-        """Return the forces that are missing where limits of any size cannot hold the scene.
+        """Return the missing forces of a scene that limits of any size cannot hold.
 
         Their sum is least. Only for loads that the unknowns can balance with any signs.
 
@@ -184,7 +184,7 @@ class LimitCones:
             return pulled, {}
         cuts, elements = [], []
         for e, n in self.cuts:
-            part, constant = self._limit(e, ENDLESS)
+            part, constant = self._limit(e, INFINITE_FACTOR)
             row = -part
             row[self.parts[e]] += n
             cuts.append((row, constant))
@@ -200,7 +200,7 @@ class LimitCones:
     def _least_violations(
         self, bounds: list[tuple[Array, float]], owners: list[int], *, pressing: bool
     ) -> Array:
-        """Return the violations of bounds row x <= bound, of least sum, for which forces balance.
+        """Return the violations of the bounds row x <= bound with the smallest sum for which forces balance.
 
         Args:
             bounds: rows and bounds.
@@ -214,8 +214,8 @@ class LimitCones:
         limits += [(0.0, None)] * several
         for first in self.contacts:
             limits[first] = (0.0 if pressing else None, None)
-        for idle in self.open:
-            limits[idle] = (0.0, 0.0)
+        for open_element in self.open:
+            limits[open_element] = (0.0, 0.0)
         rows = [np.append(row, -np.eye(several)[k]) for (row, _), k in zip(bounds, owners, strict=True)]
         optimum = linprog(
             np.append(np.zeros(self.count), np.ones(several)),
@@ -281,8 +281,8 @@ class LimitCones:
         limits.append((0.0, most if sign else None))
         for first in self.contacts:
             limits[first] = (0.0, None)
-        for idle in self.open:
-            limits[idle] = (0.0, 0.0)
+        for open_element in self.open:
+            limits[open_element] = (0.0, 0.0)
         if not self.holds:
             return np.inf, np.zeros(self.count)
         goal = np.zeros(self.count + 1)
@@ -323,7 +323,7 @@ def _directions(size: int) -> Iterator[Array]:
     if size == 1:
         yield from (np.array([1.0]), np.array([-1.0]))
     elif size == 2:
-        for k in range(FIRST):
-            yield np.array([np.cos(2.0 * np.pi * k / FIRST), np.sin(2.0 * np.pi * k / FIRST)])
+        for k in range(INITIAL_CUTS):
+            yield np.array([np.cos(2.0 * np.pi * k / INITIAL_CUTS), np.sin(2.0 * np.pi * k / INITIAL_CUTS)])
     else:
         yield from np.vstack([np.eye(size), -np.eye(size)])

@@ -10,7 +10,14 @@ from numpy.typing import NDArray
 
 from pin_nonideal.core_loader import core
 from pin_nonideal.scene.scene import Scene, compiled_scene
-from pin_nonideal.states.rows import DEPENDENT, gap_rows, holonomic_rows, row_lengths, rows_at, shortest
+from pin_nonideal.states.rows import (
+    MIN_SINGULAR_VALUE,
+    gap_rows,
+    holonomic_rows,
+    minimum_norm,
+    row_lengths,
+    rows_at,
+)
 from pin_nonideal.states.scales import slides
 from pin_nonideal.types import Array
 
@@ -35,7 +42,7 @@ class Balance(NamedTuple):
 
 # A contact touches if its gap is below this part of the scene's length, or of 1 m if the scene is shorter, as
 # at starts of runs.
-TOUCHING = 1e-10
+TOUCHING_GAP = 1e-10
 
 
 class AtRest:
@@ -63,7 +70,7 @@ class AtRest:
         self._slides = slides(scene.model)
         self._smooth = [core.Mode.unloaded] * len(scene.element_names)
         self.gaps = gap_rows(self.program)
-        self.touching = TOUCHING * max(1.0, compiled_scene(scene).projection.length)
+        self.touching = TOUCHING_GAP * max(1.0, compiled_scene(scene).projection.length)
         self.begin(q)
 
     def begin(self, q: Array) -> None:
@@ -142,7 +149,7 @@ class AtRest:
         D = self.runner.slip_rows(q, self.still, self.t).reshape(-1, len(self.still))
         lengths = row_lengths(self.runner, q, self.still, self.t)[self.program.rows :]
         scaled = np.linalg.solve(self.root(q), D.T).T
-        short = (np.linalg.norm(scaled, axis=1) <= DEPENDENT * lengths)[:, None]
+        short = (np.linalg.norm(scaled, axis=1) <= MIN_SINGULAR_VALUE * lengths)[:, None]
         return np.where(short, 0.0, D), lengths, np.where(short, 0.0, scaled)
 
     def root(self, q: Array) -> Array:
@@ -166,7 +173,7 @@ class AtRest:
         A = rows_at(self.runner, q, self.still, self.t)[0]
         lengths = row_lengths(self.runner, q, self.still, self.t)[: len(A)]
         scaled = np.linalg.solve(root, A.T).T / np.where(lengths > 0.0, lengths, 1.0)[:, None]
-        short = self.open | (np.linalg.norm(scaled, axis=1) <= DEPENDENT)
+        short = self.open | (np.linalg.norm(scaled, axis=1) <= MIN_SINGULAR_VALUE)
         return np.where(short[:, None], 0.0, A), lengths, np.where(short[:, None], 0.0, scaled)
 
     def balance(self, q: Array) -> Balance:
@@ -177,8 +184,8 @@ class AtRest:
         """
         F, root = self.forces(q), self.root(q)
         A, lengths, scaled = self.scaled_rows(q, root)
-        lam = shortest(scaled.T, np.asarray(np.linalg.solve(root, -F)), lengths)
-        free = _free(scaled, root)
+        lam = minimum_norm(scaled.T, np.asarray(np.linalg.solve(root, -F)), lengths)
+        free = _free_basis(scaled, root)
         return Balance(F, A, lam, free, free.T @ F)
 
     def free(self, q: Array) -> Array:
@@ -188,7 +195,7 @@ class AtRest:
             q: configuration, (nq,).
         """
         root = self.root(q)
-        return _free(self.scaled_rows(q, root)[2], root)
+        return _free_basis(self.scaled_rows(q, root)[2], root)
 
     def mass(self, q: Array) -> Array:
         """Return the mass matrix M(q), (nv, nv).
@@ -220,12 +227,12 @@ class AtRest:
         return np.where(along, np.sqrt(slide / turn) if min(slide, turn) > 0.0 else 1.0, 1.0)
 
 
-def _free(scaled: Array, root: Array) -> Array:
+def _free_basis(scaled: Array, root: Array) -> Array:
     """Return an orthonormal basis of the velocities that scaled rows admit, M = root root^T."""
     if not len(scaled):
         return np.eye(len(root))
     _, values, turned = np.linalg.svd(scaled)
-    rank = int((values > DEPENDENT).sum())
+    rank = int((values > MIN_SINGULAR_VALUE).sum())
     return np.asarray(np.linalg.qr(np.linalg.solve(root.T, turned[rank:].T))[0])
 
 

@@ -48,9 +48,9 @@ class Rest:
     def holding(self) -> dict[str, HoldingTorque]:
         """Torques that friction holds and torques of slow motion, by joint name, computed on first access.
 
-        The joints are those of one degree of freedom that a law of dry friction acts on. The other joints
-        keep their torques. The torque of a joint is the whole torque of its drive, with that of the scene's
-        actuation.
+        The table has the joints of one degree of freedom on which a law of dry friction acts. The other
+        joints keep their torques. The torque of a joint is the whole torque of its drive, with that of the
+        scene's actuation.
         """
         return self._holding()
 
@@ -105,14 +105,14 @@ def rest(scene: Scene, q: State | None = None, tau: State | None = None, *, t: f
     friction = {name: forces[s] for name, s in zip(scene.element_names, cones.parts, strict=True)}
     margin = 1.0 - factor
     rests = margin >= -10.0 * FOUND
-    reason = "" if rests else _overloaded(scene, cones, factor)
+    reason = "" if rests else _elements_at_limit(scene, cones, factor)
     return Rest(rests, margin, friction, forces[: len(cones.A)], reason, holding)
 
 
-def _overloaded(scene: Scene, cones: LimitCones, factor: float) -> str:
+def _elements_at_limit(scene: Scene, cones: LimitCones, factor: float) -> str:
     """Return the elements at their limits where friction needs larger limits."""
     names = [scene.element_names[e] for e in cones.at_limits(factor)]
-    where = f"; at their limits: {_quoted(names)}" if names else ""
+    where = f"; at their limits: {_quote(names)}" if names else ""
     return f"dry friction needs {factor:.4g} times its limits{where}"
 
 
@@ -133,10 +133,10 @@ def _unheld(scene: Scene, at_rest: AtRest, q: Array, cones: LimitCones) -> str:
     if pulls:
         most = max(pulls.values())
         parts.append(
-            f"contacts would have to pull, with up to {most:.4g} N: {_quoted([rows[k] for k in pulls])}"
+            f"contacts would have to pull, with up to {most:.4g} N: {_quote([rows[k] for k in pulls])}"
         )
     if rubs:
-        names = _quoted([scene.element_names[e] for e in rubs])
+        names = _quote([scene.element_names[e] for e in rubs])
         most = max(rubs.values())
         parts.append(f"friction without a load would have to hold up to {most:.4g} (N or N m): {names}")
     return "; ".join(parts) or "no forces balance the scene"
@@ -148,6 +148,6 @@ def _joint_of(model: Model, dof: int) -> str:
     return next(str(model.names[j]) for j in joints if 0 <= dof - int(model.idx_vs[j]) < int(model.nvs[j]))
 
 
-def _quoted(names: list[str]) -> str:
+def _quote(names: list[str]) -> str:
     shown = ", ".join(f'"{name}"' for name in names[:MAX_NAMED])
     return shown + (", ..." if len(names) > MAX_NAMED else "")

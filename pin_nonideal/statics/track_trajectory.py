@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from pin_nonideal.compilation.actuation import commanded, gains_of
+from pin_nonideal.compilation.actuation import command_mask, gains_of
 from pin_nonideal.description.actuation import (
     Gain,
     checked_gain,
@@ -21,7 +21,7 @@ from pin_nonideal.description.scene_drive import BoundDrive, SceneDrive
 from pin_nonideal.description.scene_spec import SceneSpec
 from pin_nonideal.errors import InputError
 from pin_nonideal.states.joint_layout import joint_places
-from pin_nonideal.states.parsing import joint_named, named_configuration_samples, named_joint_samples
+from pin_nonideal.states.parsing import find_joint, named_configuration_samples, named_joint_samples
 from pin_nonideal.states.reference_motion import TIME_ROUNDING, ReferenceMotion, break_times
 from pin_nonideal.types import Array, Model, Table
 from pin_nonideal.validation import by_name, choice, label, optional_text, positive, sequence, text
@@ -55,12 +55,12 @@ class TrackTrajectory(SceneDrive):
       name enter "gravity" and "rnea" with their present position and velocity, and without acceleration.
     - "constrained": torques by which the driven joints move the mechanism along the reference, by
       `inverse_dynamics` with the constraints, laws and forces of the scene, without its contacts. The
-      reference is put onto the constraints: it keeps as many coordinates as these leave free, driven ones
-      first, and the others follow, also the joints that q does not name. Given coordinates beyond this
-      number must agree with the constraints: q up to 1e-3 rad, or 1e-3 of the scene's length, and v up to a
-      tenth of the largest given velocity. Otherwise `simulate` raises an InputError before its first step.
-      The constraints must hold positions. Forces that the driven joints cannot supply are left out in the
-      sense of least squares.
+      reference is put onto the constraints: it keeps as many coordinates as the constraints leave free,
+      driven ones first. The other coordinates follow, also those of joints that q does not name. Given
+      coordinates beyond this number must agree with the constraints: q up to 1e-3 rad, or 1e-3 of the
+      scene's length, and v up to a tenth of the largest given velocity. Otherwise `simulate` raises an
+      InputError before its first step. The constraints must hold positions. Forces that the driven joints
+      cannot supply are left out in the sense of least squares.
 
     Args:
         times: increasing times [s], shape (nt,) with nt >= 1.
@@ -156,7 +156,7 @@ class TrackTrajectory(SceneDrive):
             driven = np.zeros(model.nv, dtype=bool)
             for gain, values in zip((self.kp, self.kd), gains, strict=True):
                 is_array = isinstance(gain, np.ndarray)
-                driven |= _with_gain(model, values) if is_array else commanded(model, gain)
+                driven |= _with_gain(model, values) if is_array else command_mask(model, gain)
         if not driven.any():
             raise InputError(
                 f"{who}: at least one joint must be driven; got none with a gain; name the driven joints in "
@@ -204,7 +204,7 @@ def _named(model: Model, samples: object, who: str) -> Mask:
     table = by_name(samples)
     mask = np.full(model.nv, table is None)
     for name in table or ():
-        j = joint_named(model, name, who)
+        j = find_joint(model, name, who)
         mask[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]] = True
     return mask
 

@@ -32,7 +32,7 @@ def sweep_grid(**axes: Iterable[object]) -> list[Table]:
             or getattr(values, "ndim", 1) == 0
         ):
             raise InputError(f"sweep_grid: {name} must be a list of values; got {short_repr(values)}")
-    listed = [[_plain(value) for value in values] for values in axes.values()]
+    listed = [[_plain_value(value) for value in values] for values in axes.values()]
     return [dict(zip(axes, point, strict=True)) for point in itertools.product(*listed)]
 
 
@@ -53,17 +53,17 @@ def sweep_samples(
     Raises:
         InputError: an argument is invalid.
     """
-    number = count("sweep_samples: n", n, least=1)
+    number = count("sweep_samples: n", n, min_value=1)
     choice("sweep_samples: kind", kind, ("sobol", "latin", "halton", "random"))
     count("sweep_samples: seed", seed)
     if not ranges:
         raise InputError("sweep_samples needs the range of a parameter, such as mu=(0.1, 0.5)")
     bounds = np.array([array(f"sweep_samples: {name}", pair, (2,)) for name, pair in ranges.items()])
-    for name, (least, largest) in zip(ranges, bounds.tolist(), strict=True):
-        if least > largest:
+    for name, (min_value, max_value) in zip(ranges, bounds.tolist(), strict=True):
+        if min_value > max_value:
             raise InputError(
-                f"sweep_samples: {name} must be (minimum, maximum); got ({least:g}, {largest:g}); exchange "
-                "the two"
+                f"sweep_samples: {name} must be (minimum, maximum); got ({min_value:g}, {max_value:g}); "
+                "exchange the two"
             )
     from scipy.stats import qmc
 
@@ -79,5 +79,5 @@ def sweep_samples(
     return [dict(zip(ranges, point.tolist(), strict=True)) for point in points]
 
 
-def _plain(value: object) -> object:
+def _plain_value(value: object) -> object:
     return value.item() if isinstance(value, np.generic) else value

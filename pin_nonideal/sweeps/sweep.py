@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from pin_nonideal.atomic_files import file_path
-from pin_nonideal.compilation.callbacks import named
+from pin_nonideal.compilation.callbacks import named_function
 from pin_nonideal.errors import (
     InputError,
     OutputError,
@@ -39,7 +39,7 @@ MAX_JOBS = 100_000  # also of negative numbers: -n leaves n - 1 processors free
 # overhead; many tasks balance the load.
 MAX_TASK_RUNS, TASKS_PER_WORKER = 200, 16
 # Arguments of `simulate` that are no options of a sweep.
-UNLIKE = ("scene", "duration", "progress", "checkpoint_interval")
+EXCLUDED_OPTIONS = ("scene", "duration", "progress", "checkpoint_interval")
 
 
 def sweep(
@@ -96,7 +96,7 @@ def sweep(
                 f"sweep: parameters must hold mappings of keyword arguments; got {short_repr(entry)}"
             )
     length = positive("sweep: duration", duration)
-    if jobs is not None and count("sweep: jobs", jobs, least=-MAX_JOBS, most=MAX_JOBS) == 0:
+    if jobs is not None and count("sweep: jobs", jobs, min_value=-MAX_JOBS, max_value=MAX_JOBS) == 0:
         raise InputError("sweep: jobs must not be zero; leave it out for joblib's choice")
     if options.get("checkpoint") is not None:
         raise InputError("sweep: checkpoint is the file of one run; its runs would overwrite one another's")
@@ -126,12 +126,12 @@ def sweep(
 
 
 def _check_options(duration: float, options: Table) -> None:
-    """Check the options of `simulate`, as far as they do not depend on the scene.
+    """Check the options of `simulate` that do not depend on the scene.
 
     Raises:
         InputError: `simulate` has no such option, or refuses its value.
     """
-    known = [name for name in inspect.signature(simulate).parameters if name not in UNLIKE]
+    known = [name for name in inspect.signature(simulate).parameters if name not in EXCLUDED_OPTIONS]
     for name in options:
         if name not in known:
             raise InputError(f'sweep: `simulate` has no option "{name}"{nearest(name, known)}')
@@ -206,7 +206,7 @@ class _Work:
         run, stopped = self._simulate(k, entry)
         if stopped is not None and not self.keep:
             return stopped
-        more = self._measured(run) if self.measure is not None and stopped is None else {}
+        more = self._measure_run(run) if self.measure is not None and stopped is None else {}
         error = None if stopped is None else f"{type(stopped).__name__}: {stopped}"
         return pack.add(record_of(k, entry, run, error, more), b"" if run is None else to_bytes(run))
 
@@ -239,8 +239,8 @@ class _Work:
             )
         return scene
 
-    def _measured(self, run: Trajectory) -> Table:
-        results = named(self.measure, "sweep: measure")(run)
+    def _measure_run(self, run: Trajectory) -> Table:
+        results = named_function(self.measure, "sweep: measure")(run)
         if not isinstance(results, Mapping):
             raise UserFunctionError(f"sweep: measure must return numbers by name; got {short_repr(results)}")
         return {str(name): number(f'sweep: measure: "{name}"', x) for name, x in results.items()}

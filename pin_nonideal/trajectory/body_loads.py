@@ -55,12 +55,12 @@ def loads_on_bodies(run: RunFields) -> Iterator[Load]:
             yield from _pair(run, name, c, *frames)
     for f in scene.forces:
         if isinstance(f, Wrench):
-            yield _pushed(run, f, resolver.frame(f.frame, "reaction"))
+            yield _wrench_loads(run, f, resolver.frame(f.frame, "reaction"))
         elif isinstance(f, SpringDamper):
             yield from _sprung(f, *resolver.pair(f, "reaction"))
     for law in scene.laws:
         if isinstance(law, Drag):
-            yield _dragged(law, resolver.frame(law.frame, "reaction"))
+            yield _drag_loads(law, resolver.frame(law.frame, "reaction"))
 
 
 class _Frames:
@@ -106,7 +106,7 @@ def _pair(run: RunFields, name: str, c: Any, first: Frame, second: Frame) -> Ite
         yield Load(f'"{name}"', frame[0], place, at, name if run.rows[name][2] else None)
 
 
-def _pushed(run: RunFields, f: Wrench, frame: Frame) -> Load:
+def _wrench_loads(run: RunFields, f: Wrench, frame: Frame) -> Load:
     def at(k: int, motions: BodyMotions) -> pin.Force:
         value = f.value(float(run.t[k])) if callable(f.value) else f.value
         return about_world(np.asarray(value, dtype=float).reshape(6), motions.point(frame))
@@ -132,7 +132,7 @@ def _sprung(f: SpringDamper, first: Frame, second: Frame) -> Iterator[Load]:
     yield Load(f'the SpringDamper at "{f.frame2}"', second[0], f.frame2 or "universe", push)
 
 
-def _dragged(law: Drag, frame: Frame) -> Load:
+def _drag_loads(law: Drag, frame: Frame) -> Load:
     def at(k: int, motions: BodyMotions) -> pin.Force:
         u = motions.point_velocity(frame)
         speed = float(np.linalg.norm(u))

@@ -9,7 +9,7 @@ import pinocchio as pin
 
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
 from pin_nonideal.scene.scene import compiled_scene
-from pin_nonideal.states.joint_layout import CIRCLES
+from pin_nonideal.states.joint_layout import COS_SIN_JOINTS
 from pin_nonideal.states.kinematics import frame_motion
 from pin_nonideal.types import Array
 from pin_nonideal.validation import choice, text
@@ -32,10 +32,10 @@ def joint_record(run: RunFields, name: str) -> JointRecord:
     v, a, tau = (None if x is None else x[:, rates] for x in (run.v, run.a, run.tau))
     assert v is not None
     q = run.q[:, place.q_first : place.q_first + place.nq]
-    if place.kind.startswith(CIRCLES):
+    if place.kind.startswith(COS_SIN_JOINTS):
         q = np.column_stack([q[:, :-2], angles(q[:, -2:], v[:, -1], run.t)])
-    alone = place.nv == 1 and q.shape[1] == 1
-    parts = [x if x is None or not alone else x[:, 0] for x in (q, v, a, tau)]
+    is_scalar = place.nv == 1 and q.shape[1] == 1
+    parts = [x if x is None or not is_scalar else x[:, 0] for x in (q, v, a, tau)]
     return JointRecord(place.name, *parts)  # type: ignore[arg-type]
 
 
@@ -118,10 +118,12 @@ def _wrenches(run: RunFields, name: str) -> Array:
     if model is None or name == "universe" or not model.existFrame(name):
         frames = [] if model is None else [str(f.name) for f in model.frames][1:]
         known = [*reactions_of(run), *frames]
-        lost = (
+        explanation = (
             "" if model is not None else "; fixed joints need the scene of the run, which this one has lost"
         )
-        raise UnknownNameError(f'no joint, frame, anchor or contact "{name}"{nearest(name, known)}{lost}')
+        raise UnknownNameError(
+            f'no joint, frame, anchor or contact "{name}"{nearest(name, known)}{explanation}'
+        )
     index = carrier_of(model, name)
     if model.frames[index].type == pin.FrameType.JOINT:
         of_joint: Array = reactions_of(run)[str(model.frames[index].name)]

@@ -14,7 +14,7 @@ from pin_nonideal.types import Array
 from .by_name import joint_record
 from .fields import RunFields
 
-# Kinds of joints by prefix, with the units of their positions as `JointRecord` has them and of their rates.
+# Kinds of joints by prefix, with the units of their positions in a `JointRecord` and of their rates.
 # Kinds that are not listed, such as composites, have unknown units.
 KINDS = (
     ("JointModelFreeFlyer", ("m",) * 3 + ("1",) * 4, ("m",) * 3 + ("rad",) * 3),
@@ -141,8 +141,8 @@ def _all(
     for field, values, dofs in _by_dof(run, left_out):
         for joint, first, nv, forces in _among(places, dofs) if acting else places:
             part = _of_dofs(values, dofs, first, nv)
-            yield from _numbered(f"{joint}.{field}", part[:, 0] if nv == 1 else part, forces)
-    yield from _others(run, left_out)
+            yield from _number_columns(f"{joint}.{field}", part[:, 0] if nv == 1 else part, forces)
+    yield from _remaining_columns(run, left_out)
 
 
 def _of_dofs(values: Array, dofs: Sequence[int], first: int, nv: int) -> Array:
@@ -178,10 +178,10 @@ def _joints(run: RunFields) -> Iterator[tuple[str, Array, str]]:
         per = {"q": position, "tau": forces}
         per |= {key: [unit and unit + end for unit in rate] for key, end in RATES.items()}
         for field in ("q", "v", "a", "tau"):
-            yield from _numbered(f"{place.name}.{field}", getattr(record, field), per[field])
+            yield from _number_columns(f"{place.name}.{field}", getattr(record, field), per[field])
 
 
-def _others(run: RunFields, left_out: Collection[str]) -> Iterator[tuple[str, Array, str]]:
+def _remaining_columns(run: RunFields, left_out: Collection[str]) -> Iterator[tuple[str, Array, str]]:
     """Yield values of rows, elements, reactions and laws, energies, powers and violations."""
     for name, (first, end, _) in run.rows.items():
         if name in left_out:
@@ -189,7 +189,7 @@ def _others(run: RunFields, left_out: Collection[str]) -> Iterator[tuple[str, Ar
         for field in ("lam", "lam_ideal"):
             multipliers = getattr(run, field)
             own = None if multipliers is None else multipliers[:, first:end]
-            yield from _numbered(f"{name}.{field}", own, [EITHER_FORCE] * (end - first))
+            yield from _number_columns(f"{name}.{field}", own, [EITHER_FORCE] * (end - first))
     for k, name in enumerate(run.element_names):
         if left_out and run.law_names[run.element_laws[k]] in left_out:
             continue
@@ -197,11 +197,11 @@ def _others(run: RunFields, left_out: Collection[str]) -> Iterator[tuple[str, Ar
             if of_all is not None:
                 yield f"{name}.{field}", cast("Array", of_all[:, k]), unit
     for name, values in (run.reactions or {}).items():
-        yield from _numbered(f"{name}.reaction", values[:, :6], ["N"] * 3 + ["N m"] * 3)
+        yield from _number_columns(f"{name}.reaction", values[:, :6], ["N"] * 3 + ["N m"] * 3)
     for field, unit in (("energy", "J"), ("power", "W")):
         for name, values in (getattr(run, field) or {}).items():
             yield f"{field}.{name}", values, unit
-    yield from _numbered("z", run.z, [])
+    yield from _number_columns("z", run.z, [])
     yield "violation", run.violation, "m or rad"
     yield "violation_rate", run.violation_rate, "m/s or rad/s"
 
@@ -227,7 +227,9 @@ def _by_dof(run: RunFields, left_out: Collection[str]) -> Iterator[tuple[str, Ar
         yield f"C.{name}", part[:, order], np.asarray(dofs[name])[order].tolist()
 
 
-def _numbered(name: str, values: Array | None, units: Sequence[str]) -> Iterator[tuple[str, Array, str]]:
+def _number_columns(
+    name: str, values: Array | None, units: Sequence[str]
+) -> Iterator[tuple[str, Array, str]]:
     """Return one column under the given name, several columns under numbered names, or none for None."""
     if values is None:
         return

@@ -32,7 +32,7 @@ class DenseOutput:
         modes: modes of the friction elements during each step, (n, ne).
         directions: slip directions of the elements at the points of each step, (n, points, 3 ne), or without
             columns if each element slips along one direction. Steps that did not solve for directions store
-            those at their end.
+            the directions at their end.
         sought: whether each step solved for the slip direction of each element, as in slow slip, (n, ne).
         torque: torque that each step holds constant, (n, nv), NaN for steps without one; (0, nv) if no step
             has one.
@@ -81,8 +81,8 @@ class DenseOutput:
         """
         if len(t) and not (len(self) and self.times[0, 0] <= t.min() and t.max() <= self.times[-1, 1]):
             span = f"{self.times[0, 0]:g} to {self.times[-1, 1]:g} s" if len(self) else "no time"
-            late = t.max() if len(self) and self.times[0, 0] <= t.min() else t.min()
-            raise InputError(f"at: t must lie in the run, which took {span}; got {late:g} s")
+            outside_time = t.max() if len(self) and self.times[0, 0] <= t.min() else t.min()
+            raise InputError(f"at: t must lie in the run, which took {span}; got {outside_time:g} s")
         sizes = (self.states.shape[2], self.modes.shape[1], len(self.torque) and self.torque.shape[1])
         program, nv = compiled_scene(scene).program, scene.model.nv
         work = len(program.power_names) if self.options.energy else 0

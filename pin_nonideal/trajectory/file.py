@@ -31,13 +31,13 @@ FORMAT = 1
 # full-precision motions would save a tenth of the size and take ten to thirty times as long as writing.
 MAX_COMPRESSED_BYTES = 1_000_000
 # Errors of NumPy, zip archives and JSON for damaged files or files of another format.
-UNREADABLE: tuple[type[Exception], ...] = (OSError, ValueError, LookupError, TypeError, AttributeError)
-UNREADABLE += (EOFError, RuntimeError, tokenize.TokenError, zipfile.BadZipFile, zlib.error)
-REQUIRED = ("t", "q", "v", "violation", "violation_rate")
-OPTIONAL = ("a", "tau", "F_ideal", "F_nonideal", "lam", "lam_ideal", "z", "modes", "closed", "limits")
+READ_ERRORS: tuple[type[Exception], ...] = (OSError, ValueError, LookupError, TypeError, AttributeError)
+READ_ERRORS += (EOFError, RuntimeError, tokenize.TokenError, zipfile.BadZipFile, zlib.error)
+REQUIRED_FIELDS = ("t", "q", "v", "violation", "violation_rate")
+OPTIONAL_FIELDS = ("a", "tau", "F_ideal", "F_nonideal", "lam", "lam_ideal", "z", "modes", "closed", "limits")
 # Fields by name, with one row or number for each sample; a file has a table for each, or None.
 GROUPS = ("energy", "power", "law_forces", "reactions", "contact_forces")
-DENSE = ("times", "states", "modes", "directions", "sought", "torque", "moved")
+DENSE_FIELDS = ("times", "states", "modes", "directions", "sought", "torque", "moved")
 LISTS = ("element_names", "element_laws", "law_names", "law_dofs")
 
 
@@ -79,8 +79,8 @@ def to_bytes(run: RunFields) -> bytes:
 
 def _arrays(run: RunFields) -> Table:
     """Return all arrays of a trajectory and its header, by their names in a file."""
-    arrays: Table = {key: getattr(run, key) for key in REQUIRED}
-    arrays |= {key: getattr(run, key) for key in OPTIONAL if getattr(run, key) is not None}
+    arrays: Table = {key: getattr(run, key) for key in REQUIRED_FIELDS}
+    arrays |= {key: getattr(run, key) for key in OPTIONAL_FIELDS if getattr(run, key) is not None}
     if run.closed is not None:
         arrays["closed"] = run.closed.astype(np.int8)
     tables = {group: vars(run)[group] for group in GROUPS}
@@ -91,7 +91,7 @@ def _arrays(run: RunFields) -> Table:
         "name": run.name,
         "notes": run.notes,
         "failure": run.failure,
-        "events": [_listed(e) for e in run.events],
+        "events": [_event_list(e) for e in run.events],
         "stats": vars(run.stats),
         "origin": None if run.scene is None else scene_origin(run.scene).table,
     }
@@ -136,12 +136,12 @@ def read_from(stream: Any, source: Path) -> tuple[Table, Table | None]:
         header = json.loads(arrays.pop("header").item())
         if header.get("format") != FORMAT:
             raise LoadingError(f'"{source}" must have format {FORMAT}; it has {header.get("format")}')
-        missing = [key for key in REQUIRED if key not in arrays]
+        missing = [key for key in REQUIRED_FIELDS if key not in arrays]
         if missing:
             raise LoadingError(f'"{source}" is no complete trajectory: {", ".join(missing)} missing')
         loose = {key: arrays.pop(key) for key in list(arrays) if key.startswith("loose/")}
         _check_arrays(arrays, source)
-        fields: Table = {key: arrays.get(key) for key in (*REQUIRED, *OPTIONAL)}
+        fields: Table = {key: arrays.get(key) for key in (*REQUIRED_FIELDS, *OPTIONAL_FIELDS)}
         for group in GROUPS:
             if header.get(group) is not None:  # files of earlier versions have fewer groups
                 if group == "energy":
@@ -169,7 +169,7 @@ def read_from(stream: Any, source: Path) -> tuple[Table, Table | None]:
         return result, header.get("origin")
     except LoadingError:
         raise
-    except UNREADABLE as error:
+    except READ_ERRORS as error:
         raise LoadingError(
             f'cannot read a trajectory from "{source}": {reason_of(error)}; '
             "it must be an .npz file written by Trajectory.save"
@@ -180,7 +180,7 @@ def reason_of(error: Exception) -> str:
     """Return the reason for an unreadable file, without the terms of NumPy, zip archives and JSON.
 
     Args:
-        error: one of `UNREADABLE`.
+        error: one of `READ_ERRORS`.
     """
     if isinstance(error, FileNotFoundError):
         return "there is no such file"
@@ -202,7 +202,7 @@ def matches_scene(scene: Scene, joints: Sequence[JointPlace], rows: Table) -> bo
     return compiled_scene(scene).joints == list(joints) and compiled_scene(scene).rows == rows
 
 
-def described(joints: Sequence[JointPlace], rows: Table) -> str:
+def describe_content(joints: Sequence[JointPlace], rows: Table) -> str:
     """Return the joints, constraints and contacts of a run as text.
 
     Args:
@@ -210,10 +210,12 @@ def described(joints: Sequence[JointPlace], rows: Table) -> str:
         rows: rows of the run.
     """
     named = [place.name for place in joints]
-    return f"the joints {_few(named)} and " + (f"the rows of {_few(list(rows))}" if rows else "no rows")
+    return f"the joints {_first_names(named)} and " + (
+        f"the rows of {_first_names(list(rows))}" if rows else "no rows"
+    )
 
 
-def _few(names: Sequence[str]) -> str:
+def _first_names(names: Sequence[str]) -> str:
     return ", ".join(f'"{name}"' for name in names[:4]) + (", ..." if len(names) > 4 else "")
 
 
@@ -239,7 +241,7 @@ def reload_scene(origin: Any, joints: Sequence[JointPlace], rows: Table, notes: 
     return None
 
 
-def _listed(e: Event) -> list[Any]:
+def _event_list(e: Event) -> list[Any]:
     """Return an event as a list for the header of a file."""
     if e.kind == "relaxed":
         return [e.time, e.kind, e.element, e.miss]
@@ -263,12 +265,12 @@ def _extra_arrays(run: RunFields) -> Table:
     for k, record in enumerate(run.user_events):
         arrays |= {f"event/{k}/{key}": getattr(record, key) for key in ("t", "q", "v")}
     if run.dense is not None:
-        arrays |= {f"dense/{key}": getattr(run.dense, key) for key in DENSE}
+        arrays |= {f"dense/{key}": getattr(run.dense, key) for key in DENSE_FIELDS}
     return arrays
 
 
 def _extra_fields(loose: Table, header: Table, samples: int) -> Table:
-    """Return the fields that consist of such arrays; invalid arrays raise an error listed in `UNREADABLE`."""
+    """Return the fields that consist of such arrays; invalid arrays raise one of `READ_ERRORS`."""
     fields: Table = {}
     if "loose/grid" in loose:
         fields["grid"] = loose["loose/grid"].astype(bool).reshape(samples)
@@ -279,7 +281,7 @@ def _extra_fields(loose: Table, header: Table, samples: int) -> Table:
     if "dense" in header:
         options = SimpleNamespace(**header["dense"])
         options.atol = np.array(options.atol, dtype=float)
-        dense = {key: loose[f"loose/dense/{key}"] for key in DENSE if key != "sought"}
+        dense = {key: loose[f"loose/dense/{key}"] for key in DENSE_FIELDS if key != "sought"}
         if "loose/dense/sought" in loose:
             dense["sought"] = loose["loose/dense/sought"]
         else:  # files of earlier versions have directions at the end of each step only
@@ -330,7 +332,7 @@ def _check_arrays(arrays: Table, source: Path) -> None:
             )
         columns = (
             2
-            if key in ("q", "v", *OPTIONAL)
+            if key in ("q", "v", *OPTIONAL_FIELDS)
             or key.startswith(("law_forces/", "reactions/", "contact_forces/"))
             else 1
         )

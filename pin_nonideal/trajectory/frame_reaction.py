@@ -20,13 +20,14 @@ from pin_nonideal.types import Array, Model
 from .body_loads import Load, about_world, loads_on_bodies
 from .fields import RunFields, reactions_of
 
-# Largest part of the forces on a body by which they may miss its recorded reaction.
-AGREES = 1e-6
-# Part of the weight of the mechanism by which they may miss it where forces cancel, as in free fall.
-CANCELS = 1e-9
-# Smallest eigenvalue of the inertia that frames leave to their body, relative to the inertia of the body.
-LEFT_OVER = -1e-9
-CARRIERS = (pin.FrameType.JOINT, pin.FrameType.FIXED_JOINT)
+# Tolerance of the sum of the forces on a body against its recorded reaction, relative to these forces.
+FORCE_BALANCE_TOL = 1e-6
+# The same tolerance if forces cancel, as in free fall, relative to the weight of the mechanism.
+WEIGHT_BALANCE_TOL = 1e-9
+# Minimum eigenvalue of the remaining inertia of a body without its frames, relative to the inertia of the
+# body.
+MIN_INERTIA_EIGENVALUE = -1e-9
+JOINT_FRAME_TYPES = (pin.FrameType.JOINT, pin.FrameType.FIXED_JOINT)
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +57,7 @@ def carrier_of(model: Model, name: str) -> int:
     index = frame_index(model, name)
     frame = model.frames[index]
     carrier = int(frame.parentFrame)
-    if frame.type == pin.FrameType.BODY and carrier and model.frames[carrier].type in CARRIERS:
+    if frame.type == pin.FrameType.BODY and carrier and model.frames[carrier].type in JOINT_FRAME_TYPES:
         return carrier
     return index
 
@@ -90,7 +91,7 @@ def frame_reaction(run: RunFields, name: str, index: int) -> Array:
     for k in range(len(run.t)):
         motions = BodyMotions(model, run.q[k], run.v[k], accelerations[k])
         for body in bodies:
-            _require_recorded(run, k, motions, body, who)
+            _require_balance(run, k, motions, body, who)
         own = place.actInv(_balance(run, k, motions, part)[0])
         R = motions.placement(joint).rotation @ place.rotation
         wrenches[k] = np.concatenate([own.linear, own.angular, R @ own.linear, R @ own.angular])
@@ -109,7 +110,7 @@ def _balance(run: RunFields, k: int, motions: BodyMotions, part: Part) -> tuple[
     return sum(terms, pin.Force.Zero()), sum(float(np.abs(term.vector).max()) for term in terms)
 
 
-def _require_recorded(run: RunFields, k: int, motions: BodyMotions, body: Part, who: str) -> None:
+def _require_balance(run: RunFields, k: int, motions: BodyMotions, body: Part, who: str) -> None:
     """Check that the loads on a whole body add up to the recorded reaction of its joint.
 
     Raises:
@@ -122,7 +123,7 @@ def _require_recorded(run: RunFields, k: int, motions: BodyMotions, body: Part, 
     model = run.scene.model
     whole = sum(Y.mass for Y in model.inertias) * float(np.linalg.norm(model.gravity.linear))
     whole += max(float(np.abs(wrench[k]).max()) for wrench in reactions_of(run).values())
-    if missed > AGREES * (size + float(np.abs(recorded).max())) + CANCELS * whole:
+    if missed > FORCE_BALANCE_TOL * (size + float(np.abs(recorded).max())) + WEIGHT_BALANCE_TOL * whole:
         raise InputError(
             f"{who}: masses and gravity of the run must be those of its scene; the loads on the body of "
             f'joint "{name}" miss its recorded reaction by {missed:.2g} (N or N m) at t = {run.t[k]:.4g} s; '
@@ -154,7 +155,7 @@ def _part_beyond(scene: Scene, index: int, loads: list[Load], who: str) -> Part:
     return Part(joint, _inertia_beyond(model, index, who), held, own)
 
 
-def _beyond(model: Model, frame: int, index: int) -> bool | None:
+def _is_beyond(model: Model, frame: int, index: int) -> bool | None:
     """Check if a frame lies beyond another frame of its body; None if the order of frames is unclear."""
     joint, passed = model.frames[index].parentJoint, set()
     before = _ancestors(model, index)
@@ -194,7 +195,7 @@ def _inertia_beyond(model: Model, index: int, who: str) -> pin.Inertia:
     for i, each in enumerate(model.frames):
         if each.parentJoint != frame.parentJoint:
             continue
-        is_beyond = _beyond(model, i, index)
+        is_beyond = _is_beyond(model, i, index)
         if is_beyond is None and each.inertia.mass > 0.0:
             raise InputError(
                 f'{who}: the model must tell on which side of the frame link "{each.name}" lies; its parent '
@@ -214,7 +215,7 @@ def _inertia_beyond(model: Model, index: int, who: str) -> pin.Inertia:
         return total
     body = model.inertias[frame.parentJoint].toPseudoInertia().toMatrix()
     left = np.linalg.eigvalsh(body - total.toPseudoInertia().toMatrix())
-    if left[0] < LEFT_OVER * float(np.abs(body).max()):
+    if left[0] < MIN_INERTIA_EIGENVALUE * float(np.abs(body).max()):
         raise InputError(
             f"{who}: the inertia beyond the frame ({total.mass:.6g} kg) must be part of the inertia of its "
             f"body ({model.inertias[frame.parentJoint].mass:.6g} kg), and is not; the inertia of joint "
@@ -232,7 +233,7 @@ def _child_beyond(model: Model, child: int, index: int, who: str) -> bool:
     name = str(model.names[child])
     is_beyond = None
     if model.existFrame(name, pin.FrameType.JOINT):
-        is_beyond = _beyond(model, int(model.getFrameId(name, pin.FrameType.JOINT)), index)
+        is_beyond = _is_beyond(model, int(model.getFrameId(name, pin.FrameType.JOINT)), index)
     if is_beyond is None:
         raise InputError(
             f'{who}: the model must tell on which side of the frame joint "{name}" lies; its joint frame has '
@@ -249,7 +250,7 @@ def _load_beyond(scene: Scene, load: Load, index: int, who: str) -> bool:
     """
     model, is_beyond = scene.model, None
     if load.frame is not None and model.existFrame(load.frame):
-        is_beyond = _beyond(model, frame_index(model, load.frame), index)
+        is_beyond = _is_beyond(model, frame_index(model, load.frame), index)
         if load.contact is not None and load.frame == str(model.names[load.joint]):
             is_beyond = _shape_beyond(scene, load.joint, load.contact, index)
     elif load.frame is not None:  # a joint without a frame
@@ -273,7 +274,7 @@ def _shape_beyond(scene: Scene, joint: int, contact: str, index: int) -> bool | 
     shapes = scene.collision_model
     own = [] if shapes is None else [g for g in shapes.geometryObjects if g.parentJoint == joint]
     named = [g for g in own if g.name in contact]
-    sides = {_beyond(scene.model, int(g.parentFrame), index) for g in named or own}
+    sides = {_is_beyond(scene.model, int(g.parentFrame), index) for g in named or own}
     if named:
         return sides.pop() if len(sides) == 1 else None
     return None if sides - {False} else False

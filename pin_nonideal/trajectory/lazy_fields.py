@@ -13,14 +13,14 @@ FACTORY = "_make"
 _one_at_a_time = RLock()  # reentrant, since the fields of one object may need those of another
 
 
-class _Plain:
+class _DictBase:
     """Base class that provides the instance dictionary."""
 
 
-_own: Callable[[Any], Table] = vars(_Plain)["__dict__"].__get__
+_own: Callable[[Any], Table] = vars(_DictBase)["__dict__"].__get__
 
 
-class LazyFields(_Plain):
+class LazyFields(_DictBase):
     """Base class of objects whose fields are computed by a function on first access.
 
     A field must not be a class attribute as well, since Python finds class attributes first.

@@ -228,12 +228,12 @@ class Trajectory(RunFields):
         """Return the first samples of a run, with the events up to the last sample.
 
         Args:
-            count: number of samples, at most all.
+            count: number of samples, at most the number of samples of the run.
 
         Raises:
             InputError: `count` is not a number of samples.
         """
-        count = whole_number("first: count", count, most=len(self.t))
+        count = whole_number("first: count", count, max_value=len(self.t))
         last = float(self.t[count - 1]) if count else -np.inf
         events = [e for e in self.events if e.time <= last]
         return dataclasses.replace(self.samples(slice(count)), events=events)
@@ -341,7 +341,7 @@ def restore_trajectory(fields: Table, origin: Any, path: Any, scene: Scene | str
         InputError: the scene is not the scene of the run.
         LoadingError: the scene cannot be reloaded.
     """
-    from .file import described, matches_scene, reload_scene
+    from .file import describe_content, matches_scene, reload_scene
 
     run = Trajectory(**fields)
     if scene == "source":
@@ -351,6 +351,6 @@ def restore_trajectory(fields: Table, origin: Any, path: Any, scene: Scene | str
     if scene is not None and not matches_scene(scene, run.joints, run.rows):
         raise InputError(
             f'Trajectory.load: the scene "{scene.name}" is not the one of the run in "{path}", which has '
-            f"{described(run.joints, run.rows)}; pass the scene that was simulated, or scene=None"
+            f"{describe_content(run.joints, run.rows)}; pass the scene that was simulated, or scene=None"
         )
     return dataclasses.replace(run, scene=scene)

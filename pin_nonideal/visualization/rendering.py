@@ -81,7 +81,7 @@ def render(
         raise OutputError(f'render: "{target}" must end in one of {", ".join(ENDINGS)}')
     check_writable(target, "the picture")
     size = [
-        count(f"render: {what}", x, least=1, most=MAX_SIDE)
+        count(f"render: {what}", x, min_value=1, max_value=MAX_SIDE)
         for what, x in (("width", width), ("height", height))
     ]
     seconds, fps = positive("render: seconds", seconds), positive("render: fps", fps)

@@ -200,7 +200,7 @@ def _page(content: bytes, title: str, compress: bool) -> str:
         "style": asset("style.css"),
         "notices": html.escape(notices),
         "library": _packed(library, compress),
-        "payload": _stored(content, compress),
+        "payload": _encode(content, compress),
         "zipped": "true" if compress else "false",
         "boot": "\n".join(asset(name) for name in BOOT),
         "scripts": _packed(
@@ -210,13 +210,13 @@ def _page(content: bytes, title: str, compress: bool) -> str:
     return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match.group(1)], asset("page.html"))
 
 
-def _stored(plain: bytes, compress: bool) -> str:
+def _encode(plain: bytes, compress: bool) -> str:
     """Return bytes in the encoding of the page."""
     return base64.b64encode(gzip.compress(plain, COMPRESSION, mtime=0) if compress else plain).decode()
 
 
 # The parts that all pages share are compressed once.
-_packed = lru_cache(maxsize=4)(_stored)
+_packed = lru_cache(maxsize=4)(_encode)
 
 
 def viewer_library() -> tuple[bytes, str]:

@@ -36,10 +36,10 @@ MEMBERS = (
     "static constexpr bool constant_A",
     "static constexpr bool affine_rate",
     "static constexpr bool comparable_rows",
-    "static constexpr Shown shown",
+    "static constexpr DisplayKind shown",
     "residual",
     "rows",
-    "rate_and_drift",
+    "rate_and_bias",
 )
 
 

@@ -195,7 +195,7 @@ def test_arrays_keep_failures_apart() -> None:
 
 def test_arrays_name_runs_off_their_constraints(monkeypatch: pytest.MonkeyPatch) -> None:
     """With no room for rounding, every closed loop counts as open."""
-    monkeypatch.setattr("pin_nonideal.simulation.rollout_arrays.LEFT", 0.0)
+    monkeypatch.setattr("pin_nonideal.simulation.rollout_arrays.MAX_RESIDUAL", 0.0)
     scene = pn.load("four_bar")
     q, v = scene.initial_state()
     runs = pn.rollout(scene, np.tile(q, (2, 1)), np.tile(v, (2, 1)), 0.1, as_arrays=True, failures="keep")

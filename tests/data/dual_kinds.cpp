@@ -143,7 +143,7 @@ Rows<S> rows_of(const K& kind, const Motion& m1, const Motion& m2, bool with_res
         if (with_residual) kind.residual(s, out);
         kind.rows(s, out);
     }
-    kind.rate_and_drift(s, out);
+    kind.rate_and_bias(s, out);
     return out;
 }
 
@@ -168,15 +168,16 @@ void check(const char* name, const K& kind, int first_position, int end_position
 
 // Where they do not touch: a line that passes through a solid is nearest at a kink.
 bool apart(const pn::Hull& hull, double rim, const Motion& m1, const Motion& m2) {
-    return rows_of<double>(pn::RimRow{pn::Frame(), pn::Frame(), hull, rim, 0.0}, m1, m2, true).residual[0] > 1e-9;
+    return rows_of<double>(pn::DiskHullRow{pn::Frame(), pn::Frame(), hull, rim, 0.0}, m1, m2, true).residual[0] > 1e-9;
 }
 bool apart(const pn::Revolved& solid, double half, const Motion& m1, const Motion& m2) {
-    return rows_of<double>(pn::LineRow{pn::Frame(), pn::Frame(), solid, half, 0.0}, m1, m2, true).residual[0] > 1e-9;
+    const pn::CapsuleCylinderRow row{pn::Frame(), pn::Frame(), solid, half, 0.0};
+    return rows_of<double>(row, m1, m2, true).residual[0] > 1e-9;
 }
 
 bool apart(const pn::Revolved& first, const pn::Revolved& second, const Motion& m1, const Motion& m2) {
-    const Vec<double> n = rows_of<double>(pn::RimsRow{pn::Frame(), pn::Frame(), first, second, 0.0}, m1, m2, true)
-                              .wrench[0].force, e1 = m1.R.c[2], e2 = m2.R.c[2];
+    const pn::CylinderCylinderRow row{pn::Frame(), pn::Frame(), first, second, 0.0};
+    const Vec<double> n = rows_of<double>(row, m1, m2, true).wrench[0].force, e1 = m1.R.c[2], e2 = m2.R.c[2];
     return n.dot(m1.x - m2.x) - first.support(-n.dot(e1), n.cross(e1).norm()) -
            second.support(n.dot(e2), n.cross(e2).norm()) > 1e-9;
 }
@@ -185,23 +186,23 @@ int main() {
     const pn::Frame f;
     const pn::Vec3 x = pn::Vec3::UnitX(), y = pn::Vec3::UnitY(), z = pn::Vec3::UnitZ();
     check("point", pn::PointRows{f, f, {0, 1, 2}}, 0, 3);
-    check("contact", pn::ContactRow{f, f, z, 0.1}, 0, 1);
+    check("contact", pn::PlanePointRow{f, f, z, 0.1}, 0, 1);
     check("frame", pn::FrameRows{f, f}, 0, 0);
     check("hinge", pn::HingeRows{f, f, z, x, y}, 0, 3);
     check("distance", pn::DistanceRows{f, f, pn::Polynomial{{1.0}}}, 0, 1);
-    check("knife", pn::KnifeRows{f, f, y}, 0, 0);
+    check("knife", pn::KnifeEdgeRows{f, f, y}, 0, 0);
     check("rolling disk", pn::RollingRows{f, f, 0.2, false, y, x, y, z}, 2, 3);
     check("rolling sphere", pn::RollingRows{f, f, 0.2, true, y, x, y, z}, 2, 3);
     check("hinge slip", pn::HingeSlipRows{{}, f, f, z}, 0, 0);
-    check("turn slip", pn::TurnSlipRows{{}, f, f, {0, 1, 2}}, 0, 0);
-    check("contact slip", pn::ContactSlipRows{{}, f, f, 0.2, x, y, z}, 0, 0);
+    check("turn slip", pn::SpinSlipRows{{}, f, f, {0, 1, 2}}, 0, 0);
+    check("contact slip", pn::PlanePointSlipRows{{}, f, f, 0.2, x, y, z}, 0, 0);
     for (const double half : {0.05, 0.6, 2.0}) {
-        check("box", pn::BoxRow{f, f, {half, 0.4, 0.1}, 0.1}, 0, 1);
-        check("box slip", pn::BoxSlipRows{{}, f, f, {half, 0.4, 0.1}, 0.1}, 0, 0);
+        check("box", pn::PointBoxRow{f, f, {half, 0.4, 0.1}, 0.1}, 0, 1);
+        check("box slip", pn::PointBoxSlipRows{{}, f, f, {half, 0.4, 0.1}, 0.1}, 0, 0);
     }
     for (const double least : {0.0, 0.05, 0.3}) {
-        check("ellipsoid", pn::EllipsoidRow{f, f, z, {0.3, 0.4, least}}, 0, 1);
-        check("ellipsoid slip", pn::EllipsoidSlipRows{{}, f, f, {0.3, 0.4, least}, x, y, z}, 0, 0);
+        check("ellipsoid", pn::PlaneEllipsoidRow{f, f, z, {0.3, 0.4, least}}, 0, 1);
+        check("ellipsoid slip", pn::PlaneEllipsoidSlipRows{{}, f, f, {0.3, 0.4, least}, x, y, z}, 0, 0);
     }
     // A corner with its three faces, and the face across it.
     const double third = 1.0 / std::sqrt(3.0);
@@ -231,26 +232,26 @@ int main() {
     const pn::Hull cube(corners, {-1, 0, 0, 0.5, 1, 0, 0, 0.5, 0, -1, 0, 0.5, 0, 1, 0, 0.5, 0, 0, -1, 0.5, 0, 0, 1, 0.5}, edges);
     for (const double size : {0.1, 0.6, 2.0}) {
         const auto apart_from_cube = [&](const auto&... m) { return apart(cube, size, m...); };
-        check("rim", pn::RimRow{f, f, cube, size, 0.1}, 0, 1, apart_from_cube);
-        check("rim slip", pn::RimSlipRows{{}, f, f, cube, size}, 0, 0, apart_from_cube);
+        check("rim", pn::DiskHullRow{f, f, cube, size, 0.1}, 0, 1, apart_from_cube);
+        check("rim slip", pn::DiskHullSlipRows{{}, f, f, cube, size}, 0, 0, apart_from_cube);
         for (const double half : {0.0, 0.3, 2.0})
             for (const pn::Revolved& solid : {pn::Revolved(size, 0.4, 0.4), pn::Revolved(size, 0.4, 0.0)}) {
                 const auto apart_from_solid = [&](const auto&... m) { return apart(solid, half, m...); };
-                check("line", pn::LineRow{f, f, solid, half, 0.1}, 0, 1, apart_from_solid);
-                check("line slip", pn::LineSlipRows{{}, f, f, solid, half, 0.1}, 0, 0, apart_from_solid);
+                check("line", pn::CapsuleCylinderRow{f, f, solid, half, 0.1}, 0, 1, apart_from_solid);
+                check("line slip", pn::CapsuleCylinderSlipRows{{}, f, f, solid, half, 0.1}, 0, 0, apart_from_solid);
             }
     }
     const pn::Revolved turned[] = {{0.0, 0.7, 0.7}, {0.6, 0.4, 0.4}, {2.0, 0.3, 0.3}, {0.6, 0.4, 0.0}, {1.0, 0.3, 0.6}};
     for (const pn::Revolved& first : turned)
         for (const pn::Revolved& second : turned) {
             const auto apart_from_other = [&](const auto&... m) { return apart(first, second, m...); };
-            check("rims", pn::RimsRow{f, f, first, second, 0.1}, 0, 1, apart_from_other);
-            check("rims slip", pn::RimsSlipRows{{}, f, f, first, second, 0.04, 0.06}, 0, 0, apart_from_other);
+            check("rims", pn::CylinderCylinderRow{f, f, first, second, 0.1}, 0, 1, apart_from_other);
+            check("rims slip", pn::CylinderCylinderSlipRows{{}, f, f, first, second, 0.04, 0.06}, 0, 0, apart_from_other);
         }
     for (const double half1 : {0.0, 0.3, 1.5})
         for (const double half2 : {0.0, 0.4, 2.0}) {
-            check("capsules", pn::CapsulesRow{f, f, half1, half2, 0.1}, 0, 1);
-            check("capsules slip", pn::CapsulesSlipRows{{}, f, f, half1, half2, 0.1}, 0, 0);
+            check("capsules", pn::CapsuleCapsuleRow{f, f, half1, half2, 0.1}, 0, 1);
+            check("capsules slip", pn::CapsuleCapsuleSlipRows{{}, f, f, half1, half2, 0.1}, 0, 0);
         }
     return wrong != 0;
 }

@@ -11,7 +11,7 @@ from oracles import mujoco_motion
 from pin_nonideal.errors import LoadingError
 from pin_nonideal.loading.mjcf import fields
 from pin_nonideal.loading.mjcf.reader import translate
-from pin_nonideal.loading.mjcf.unsupported import ALLOWED, UnsupportedFeatures
+from pin_nonideal.loading.mjcf.unsupported import IGNORABLE_FEATURES, UnsupportedFeatures
 from pin_nonideal.loading.yaml.assembly import scene_arguments
 
 from ..support.refusals import refuses
@@ -58,7 +58,7 @@ def fields_of(thing):
 def test_every_field_of_the_model_is_on_a_list():
     model = mujoco.MjModel.from_xml_string(RICH)
     assert [name for name in fields_of(model) if not fields.is_listed(name)] == []
-    listed = " ".join((fields.CONVERTED, fields.REPORTED, fields.DERIVED)).split()
+    listed = " ".join((fields.CONVERTED_FIELDS, fields.REPORTED_FIELDS, fields.DERIVED_FIELDS)).split()
     assert [name for name in set(listed) if listed.count(name) > 1] == []
     assert [name for name in listed if not hasattr(model, name)] == []
 
@@ -75,13 +75,13 @@ def test_every_option_and_flag_is_on_a_list():
 def numbers_of(text):
     """Names of the carried fields of floats that a file of this text fills."""
     model = mujoco.MjModel.from_xml_string(text)
-    names = fields.CONVERTED.split()
+    names = fields.CONVERTED_FIELDS.split()
     arrays = {name: np.asarray(getattr(model, name)) for name in names if name != "opt"}
     return [name for name, a in arrays.items() if a.dtype.kind == "f" and a.size and a.ndim]
 
 
 def accelerations(model):
-    unsupported = UnsupportedFeatures("", ALLOWED, [])
+    unsupported = UnsupportedFeatures("", IGNORABLE_FEATURES, [])
     robot, _ = translate(mujoco, model, "rich", unsupported)
     robot.q0 = None
     scene = pn.Scene(**scene_arguments(robot, {}, "rich", merge=False))

@@ -99,7 +99,7 @@ def test_a_run_off_its_constraints_is_refused(method, monkeypatch):
     scene = pn.load("four_bar")
     residual = pn.simulate(scene, 0.2, method=method).violation
     first = int((residual > 0.0).argmax())
-    monkeypatch.setattr("pin_nonideal.simulation.results.LEFT", 0.0)
+    monkeypatch.setattr("pin_nonideal.simulation.results.MAX_RESIDUAL", 0.0)
     with refuses('loop "loop" has opened by t = ', LoopClosureError) as caught:
         pn.simulate(scene, 0.2, method=method)
     assert caught.value.gaps == {"loop": pytest.approx(residual[first], abs=1e-15)}

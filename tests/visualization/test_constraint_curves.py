@@ -17,8 +17,8 @@ from ..support.replay_runs import jointed
 @pytest.fixture(autouse=True)
 def _short_curves(monkeypatch: pytest.MonkeyPatch) -> None:
     """Follow open curves for one extent of the path, which takes less time."""
-    monkeypatch.setattr(constraint_curves, "EXTENTS", 1)
-    monkeypatch.setattr(constraint_curves, "ALONG", 20)
+    monkeypatch.setattr(constraint_curves, "MAX_EXTENTS", 1)
+    monkeypatch.setattr(constraint_curves, "CURVE_STEPS", 20)
 
 
 def particle() -> pin.Model:

@@ -11,7 +11,7 @@ import pytest
 
 import pin_nonideal as pn
 from pin_nonideal.visualization.page.applied_forces import applied_force_arrows
-from pin_nonideal.visualization.page.camera import upward, view
+from pin_nonideal.visualization.page.camera import up_direction, view
 from pin_nonideal.visualization.page.contact_points import contact_points
 from pin_nonideal.visualization.page.contact_surfaces import contact_surfaces, planes_of
 from pin_nonideal.visualization.page.force_arrows import arrows_of
@@ -102,21 +102,24 @@ def test_an_incline_is_a_patch_below_the_path_of_what_touches_it() -> None:
     run = pn.simulate(scene, 0.5)
     motion = sample(run)
     (plane,) = planes_of(scene)
-    (patch,) = contact_surfaces(run, motion, [], upward(model))
+    (patch,) = contact_surfaces(run, motion, [], up_direction(model))
     np.testing.assert_allclose(patch.placement.rotation[:, 2], plane.normal, atol=ROUNDING)
     top = patch.placement.act(np.array([0.0, 0.0, patch.shape.size[2] / 2.0]))
     assert abs(top[2]) < ROUNDING
     local = (motion.point(2, np.array([0.0, 0.0, -0.1])) - top) @ patch.placement.rotation[:, :2]
     assert (np.abs(local) <= np.array(patch.shape.size[:2]) / 2.0).all()
     level = pn.Scene(jointed(pin.JointModelPZ(), lever=0.0), q0=[0.1])
-    assert contact_surfaces(pn.simulate(level, 0.1), sample(pn.simulate(level, 0.1)), [], upward(model)) == []
+    assert (
+        contact_surfaces(pn.simulate(level, 0.1), sample(pn.simulate(level, 0.1)), [], up_direction(model))
+        == []
+    )
 
 
 def test_a_stop_that_was_struck_stands_where_the_body_points_at_it() -> None:
     model = jointed(pin.JointModelRY())
     limit = pn.JointLimit("j0", lower=-2.0, upper=0.7, restitution=0.5)
     run = pn.simulate(pn.Scene(model, contacts=[limit], q0=[0.0]), 1.0, record="forces")
-    (stop,) = contact_surfaces(run, sample(run), [], upward(model))
+    (stop,) = contact_surfaces(run, sample(run), [], up_direction(model))
     assert stop.name == "JointLimit(j0) upper"
     way = stop.placement.translation / np.linalg.norm(stop.placement.translation)
     np.testing.assert_allclose(way, [np.cos(0.7), 0.0, -np.sin(0.7)], atol=ROUNDING)
@@ -208,7 +211,7 @@ def test_forces_between_round_bodies_act_where_they_touch() -> None:
     np.testing.assert_allclose(arrow.values[:, 2], G, atol=ROUNDING)
     touching = np.array([0.0, 0.2 * 0.3 / 0.5, height - 0.3 * height / 0.5])
     np.testing.assert_allclose(arrow.origin, np.tile(touching, (len(motion.times), 1)), atol=ROUNDING)
-    names = {visual.name for visual in contact_surfaces(run, motion, [], upward(model))}
+    names = {visual.name for visual in contact_surfaces(run, motion, [], up_direction(model))}
     assert names == {"ball round", "beam round"}
 
 

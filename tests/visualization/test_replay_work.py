@@ -89,14 +89,14 @@ def test_displacements_between_samples_are_computed_once(monkeypatch):
 
 def test_forces_of_contacts_that_stay_open_are_not_resampled(monkeypatch):
     """Two boxes have 160 gaps, which the page shows if they close."""
-    run, asked, read = boxes(beside=True), set(), resampling._Resampled.__getitem__
+    run, asked, read = boxes(beside=True), set(), resampling._ResampledFields.__getitem__
 
     def recorded(self, name):
         if self.field == "contact_forces":
             asked.add(name)
         return read(self, name)
 
-    monkeypatch.setattr(resampling._Resampled, "__getitem__", recorded)
+    monkeypatch.setattr(resampling._ResampledFields, "__getitem__", recorded)
     packed(run)
     between = {name for name in run.scene.contact_names if "ground" not in name}
     assert len(between) == 160
@@ -105,7 +105,7 @@ def test_forces_of_contacts_that_stay_open_are_not_resampled(monkeypatch):
 
 def test_resampled_values_are_a_mapping_with_values_at_the_frames():
     samples, exact = {"a": np.arange(3.0), "b": np.ones(3)}, {"a": np.zeros(1)}
-    resampled = resampling._Resampled("energy", samples, exact, lambda part, known: (part, known))
+    resampled = resampling._ResampledFields("energy", samples, exact, lambda part, known: (part, known))
     assert list(resampled) == ["a", "b"]
     assert len(resampled) == 2
     assert resampled["a"][1] is exact["a"]

@@ -171,8 +171,8 @@ struct ConeProgram {
     }
 
     // Find the modes from the end of the path. An element slips if its acceleration exceeds the distance of its force
-    // to the limit. If both are small, the solution decides: modes that it contradicts are changed until none is left.
-    // Returns false if the modes do not settle.
+    // to the limit. If both are small, the solution decides: modes that contradict the solution are changed until all
+    // modes agree. Returns false if the modes do not settle.
     bool find_modes() {
         std::vector<char> slides(elements);
         for (int e = 0; e < elements; ++e) slides[e] = y[e].head > 1.0 - tail(x, e).norm();

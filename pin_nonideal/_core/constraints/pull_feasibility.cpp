@@ -69,14 +69,14 @@ std::vector<int> sharing_with(int index, const MatX& Z) {
 
 }  // namespace
 
-Press press(const std::vector<Block>& blocks, const std::vector<double>& B,
+PullMargin press(const std::vector<Block>& blocks, const std::vector<double>& B,
             const DescribedRows& all, const std::vector<int>& pressing, RowSystem& s, const VecX& shared, int index) {
     const double own = all.share(pressing[index], shared);
-    const Press alone{own, {index}, {index}, own < 0.0};
+    const PullMargin alone{own, {index}, {index}, own < 0.0};
     if (!s.redundant && !all.copied) return alone;
     const MatX of_all = of_pressing(pressing, free_described(blocks, B, all, s));
     if (of_all.row(index).isZero(0.0)) return alone;
-    Press found{own, sharing_with(index, of_all), {}, false};
+    PullMargin found{own, sharing_with(index, of_all), {}, false};
     const int n = static_cast<int>(found.sharing.size());
     MatX Z(n, of_all.cols());
     VecX N(n);
@@ -84,7 +84,7 @@ Press press(const std::vector<Block>& blocks, const std::vector<double>& B,
         Z.row(k) = of_all.row(found.sharing[k]);
         N[k] = all.share(pressing[found.sharing[k]], shared);
     }
-    const LargestLeast least = largest_least(Z, N);
+    const MaxMin least = max_min(Z, N);
     found.margin = least.value;
     found.must_pull = least.value < -pull_feasibility_parameters.margin_rounding * N.cwiseAbs().maxCoeff();
     for (int k = 0; k < least.weight.size(); ++k)

@@ -13,7 +13,7 @@ struct PullFeasibilityParameters {
 
 inline constexpr PullFeasibilityParameters pull_feasibility_parameters{};
 
-struct Press {
+struct PullMargin {
     double margin;             // largest s with all multipliers >= s in some distribution (negative: some row must pull)
     std::vector<int> sharing;  // rows that share a load with the given row, as indices of `pressing`
     std::vector<int> pulling;  // rows among them that determine the margin together
@@ -22,7 +22,7 @@ struct Press {
 
 // Compute the margin of the described row pressing[index]. The multipliers of the rows `pressing` should not be
 // negative. `shared` holds the result of `share_multipliers`.
-Press press(const std::vector<Block>& blocks, const std::vector<double>& B,
+PullMargin press(const std::vector<Block>& blocks, const std::vector<double>& B,
             const DescribedRows& all, const std::vector<int>& pressing, RowSystem& s, const VecX& shared, int index);
 
 }  // namespace pn

@@ -66,10 +66,10 @@ int householder(RowSystem& s, int n, bool pivot, double tolerance) {
 
 }  // namespace
 
-void find_independent(const std::vector<Block>& blocks, const std::vector<double>& B, double tolerance, int most,
+void find_independent(const std::vector<Block>& blocks, const std::vector<double>& B, double tolerance, int max_rank,
                       RowSystem& s) {
     dense_columns(blocks, B, s.required, s);
-    s.rank = std::min(most, householder(s, static_cast<int>(s.columns.size()), true, tolerance));
+    s.rank = std::min(max_rank, householder(s, static_cast<int>(s.columns.size()), true, tolerance));
     std::fill(s.active.begin(), s.active.end(), char(0));
     for (int k = 0; k < s.rank; ++k) s.active[s.columns[k]] = 1;
     s.redundant = s.rank < static_cast<int>(s.columns.size());

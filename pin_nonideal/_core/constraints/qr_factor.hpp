@@ -6,8 +6,9 @@
 
 namespace pn {
 
-// Find the rank of the required rows and at most `most` independent ones by column pivoting. These become the rows in use.
-void find_independent(const std::vector<Block>& blocks, const std::vector<double>& B, double tolerance, int most,
+// Find the rank of the required rows and at most `max_rank` independent rows by column pivoting. These become the rows
+// in use.
+void find_independent(const std::vector<Block>& blocks, const std::vector<double>& B, double tolerance, int max_rank,
                       RowSystem& s);
 // Factorize B^T = Q T for the active rows, without pivoting.
 void factor_orthogonally(const std::vector<Block>& blocks, const std::vector<double>& B, RowSystem& s);

@@ -9,8 +9,8 @@
 
 namespace pn {
 
-// Check if a block is a permanent constraint. Contacts and friction count by their own length, as in the programs that
-// decide which elements stick.
+// Check if a block is a permanent constraint. Rows of contacts and friction are divided by their own length, as in the
+// problems that determine the sticking elements.
 static bool is_lasting(const Block& block) {
     return role(block.kind) == Role::constraint && pressing_row(block.kind) < 0;
 }
@@ -30,7 +30,7 @@ static void present_lengths(const Block& block, const std::vector<double>& B, do
 
 void decide_rows(const Mechanism& m, Terms& terms, const std::vector<Block>& blocks,
                  const std::vector<RowValues>& values, const std::vector<double>& B, RowSystem& s, double tolerance,
-                 int most) {
+                 int max_rank) {
     for (int i : s.blocks) {
         const Block& block = blocks[i];
         double* length = s.scale.data() + block.row;
@@ -42,7 +42,7 @@ void decide_rows(const Mechanism& m, Terms& terms, const std::vector<Block>& blo
             length[k] = length[k] > 0.0 ? 1.0 / length[k] : 1.0;
         }
     }
-    find_independent(blocks, B, tolerance, most, s);
+    find_independent(blocks, B, tolerance, max_rank, s);
     s.longest_chosen.setZero();
     s.chosen_pivot = 0.0;
 }

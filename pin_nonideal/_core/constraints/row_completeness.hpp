@@ -24,7 +24,7 @@ constexpr bool answers(Question) { return std::is_invocable_v<Question, const K&
 template <class K> using ConstantA = std::bool_constant<std::decay_t<K>::constant_A>;
 template <class K> using AffineRate = std::bool_constant<std::decay_t<K>::affine_rate>;
 template <class K> using ComparableRows = std::bool_constant<std::decay_t<K>::comparable_rows>;
-template <class K> using ShownAs = std::integral_constant<Shown, std::decay_t<K>::shown>;
+template <class K> using ShownAs = std::integral_constant<DisplayKind, std::decay_t<K>::shown>;
 template <class K> using Called = decltype(std::string(std::decay_t<K>::name));
 template <class K> using RoleOf = std::integral_constant<Role, std::decay_t<K>::role>;
 // A value of type T for unevaluated expressions. It has no definition.
@@ -60,13 +60,13 @@ constexpr bool is_complete() {
     static_assert(answers<K>([](const auto& k) -> ComparableRows<decltype(k)> { return {}; }),
                   "a kind needs `static constexpr bool comparable_rows`: components of one vector");
     static_assert(answers<K>([](const auto& k) -> ShownAs<decltype(k)> { return {}; }),
-                  "a kind needs `static constexpr Shown shown`: what a replay shows of it");
+                  "a kind needs `static constexpr DisplayKind shown`: what a replay shows of it");
     static_assert(answers<K>([](const auto& k) -> decltype(k.residual(given<At>(), given<RowValues&>())) {}),
                   "a kind needs `residual`: phi(q, t) of each row, with phi_t and phi_tt where it moves");
     static_assert(places<K, At> || answers<K>([](const auto& k) -> decltype(k.rows(given<At>(), given<RowValues&>())) {}),
                   "a kind needs `rows`: unit wrenches, or A itself; or `place`: residual and rows at once");
-    static_assert(answers<K>([](const auto& k) -> decltype(k.rate_and_drift(given<At>(), given<RowValues&>())) {}),
-                  "a kind needs `rate_and_drift`: A v + phi_t, and its rate at zero acceleration");
+    static_assert(answers<K>([](const auto& k) -> decltype(k.rate_and_bias(given<At>(), given<RowValues&>())) {}),
+                  "a kind needs `rate_and_bias`: A v + phi_t, and its rate at zero acceleration");
     return true;
 }
 

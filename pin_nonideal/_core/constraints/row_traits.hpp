@@ -12,15 +12,15 @@ enum class Role {
 
 // A number, frame or vector of a kind, with its name in Python.
 template <class Kind, class Value>
-struct Datum {
+struct Field {
     const char* name;
     Value Kind::*member;
 };
 template <class Kind, class Value>
-Datum(const char*, Value Kind::*) -> Datum<Kind, Value>;
+Field(const char*, Value Kind::*) -> Field<Kind, Value>;
 
 // Display of a kind in a replay.
-enum class Shown {
+enum class DisplayKind {
     nothing,
     anchor,   // two tied frames, and the force on frame 1 by components in the axes of frame 2
     rod,      // two tied frames, and the force along their line
@@ -35,7 +35,7 @@ enum class Shown {
 struct SlipDirections {
     static constexpr Role role = Role::direction;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
-    static constexpr Shown shown = Shown::nothing;
+    static constexpr DisplayKind shown = DisplayKind::nothing;
 
     bool is_holonomic(int) const { return false; }
     bool moves_in_time() const { return false; }

@@ -51,7 +51,7 @@ Role role(const Kind& kind) {
     return std::visit([](const auto& k) { return k.role; }, kind);
 }
 
-Shown shown(const Kind& kind) {
+DisplayKind shown(const Kind& kind) {
     return std::visit([](const auto& k) { return k.shown; }, kind);
 }
 
@@ -102,7 +102,7 @@ void RowValues::resize(const Kind& kind, int nv) {
 template <Part part, class K, class At>
 static PN_INLINE void evaluate_at(const K& kind, const At& at, RowValues& out) {
     if constexpr (part == Part::motion) {
-        kind.rate_and_drift(at, out);
+        kind.rate_and_bias(at, out);
     } else if constexpr (part == Part::place && places<K, At>) {
         kind.place(at, out);
     } else {
@@ -144,7 +144,7 @@ static constexpr size_t index_of(const std::variant<K...>*) {
 // Three wide functions evaluate the first kinds. The last kinds are gaps between shapes, which search for nearest points.
 // Each has functions of its own, compiled once: wide functions for all of them take 20 s more to compile
 // (GCC 12) and no less to run.
-constexpr size_t shapes = index_of<EllipsoidRow>(static_cast<const Kind*>(nullptr));
+constexpr size_t shapes = index_of<PlaneEllipsoidRow>(static_cast<const Kind*>(nullptr));
 static PN_WIDE void residual(const Kind& kind, const State& s, RowValues& out) {
     evaluate_until<Part::residual, shapes>(kind, s, out);
 }

@@ -43,12 +43,13 @@
 
 namespace pn {
 
-using Kind = std::variant<PointRows, ContactRow, CapsulesRow, BoxRow, FrameRows, HingeRows, DistanceRows, KnifeRows,
-                          RollingRows, CouplingRows, MotionRows, LimitRow, UserRows, UserGapRow, DofRows,
-                          HingeSlipRows, TurnSlipRows, ContactSlipRows, CapsulesSlipRows, BoxSlipRows, CouplingSlipRow,
-                          UserSlipRows, EllipsoidRow, EllipsoidSlipRows, HullRow, HullSlipRows, RevolvedRow,
-                          RevolvedSlipRows, LineRow, LineSlipRows, RimRow, RimSlipRows, RimsRow,
-                          RimsSlipRows>;
+using Kind = std::variant<PointRows, PlanePointRow, CapsuleCapsuleRow, PointBoxRow, FrameRows, HingeRows, DistanceRows,
+                          KnifeEdgeRows, RollingRows, CouplingRows, MotionRows, LimitRow, UserRows, UserGapRow,
+                          DofSlipRows, HingeSlipRows, SpinSlipRows, PlanePointSlipRows, CapsuleCapsuleSlipRows,
+                          PointBoxSlipRows, CouplingSlipRow, UserSlipRows, PlaneEllipsoidRow, PlaneEllipsoidSlipRows,
+                          HullRow, HullSlipRows, RevolvedRow, RevolvedSlipRows, CapsuleCylinderRow,
+                          CapsuleCylinderSlipRows, DiskHullRow, DiskHullSlipRows, CylinderCylinderRow,
+                          CylinderCylinderSlipRows>;
 
 // Values of the rows of one constraint, before any row is removed.
 struct RowValues {
@@ -82,7 +83,7 @@ bool has_comparable_rows(const Kind& kind);
 // Return the row with a multiplier that should not be negative, or -1.
 int pressing_row(const Kind& kind);
 Role role(const Kind& kind);
-Shown shown(const Kind& kind);
+DisplayKind shown(const Kind& kind);
 // Return both frames of a kind between bodies, else null pointers.
 std::pair<const Frame*, const Frame*> frames(const Kind& kind);
 // Return the functions of time among the data of a kind.

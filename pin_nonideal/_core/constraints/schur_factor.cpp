@@ -67,16 +67,16 @@ static PN_INLINE double shortest_row(const std::vector<Block>& blocks, const Row
     double shortest = 1.0;
     for (int index : s.blocks) {
         const Block& block = blocks[index];
-        double least = HUGE_VAL, most = 0.0;
+        double min_square = HUGE_VAL, max_square = 0.0;
         for (size_t k = 0; k < block.kept.size(); ++k) {
             if (!s.active[block.row + k]) continue;
             const int i = s.envelope.position[block.row + k];
             const double square = s.G[s.envelope.start[i] + i];
-            least = std::min(least, square);
-            most = std::max(most, square);
+            min_square = std::min(min_square, square);
+            max_square = std::max(max_square, square);
         }
-        vanishes |= least < rank_parameters.vanishing_square * most;
-        if (block.comparable_rows && least < shortest * most) shortest = least / most;
+        vanishes |= min_square < rank_parameters.vanishing_square * max_square;
+        if (block.comparable_rows && min_square < shortest * max_square) shortest = min_square / max_square;
     }
     return shortest;
 }

@@ -29,8 +29,8 @@ bool goes_its_way(const Program& p, Workspace& w, const VecX& v) {
         if (f.dim == 1 || f.gap < 0 || is_open(p, w, e) || !at_rest(p, w, e, v)) continue;
         const Vec3 begins = slip_acceleration(p, w, f);
         const double size = begins.norm();
-        if (size > least && begins.dot(w.state.slip_direction[e]) < (1.0 - active_set_parameters.astray) * size)
-            return false;
+        const double max_deviation = active_set_parameters.max_direction_deviation;
+        if (size > least && begins.dot(w.state.slip_direction[e]) < (1.0 - max_deviation) * size) return false;
     }
     return true;
 }
@@ -52,13 +52,13 @@ struct Search {
     const Choice& rest;
     const std::function<void(const RestingMotion*)>& find_modes;
     const RestingMotion* together = nullptr;
-    bool aligned = false;  // slip onset must oppose friction
+    bool needs_opposed_friction = false;  // slip onset must oppose friction
     std::vector<Choice> tried;
     std::optional<Failure> failure;  // failure of the first active set without a motion
 
     // Return the next active set: the same one if its motion satisfies all conditions, else with one contact more or
     // less. Return nothing if the set has no motion.
-    std::optional<Choice> better(const Choice& choice) {
+    std::optional<Choice> improved_choice(const Choice& choice) {
         tried.push_back(choice);
         set_closed(p, w, choice);
         try {
@@ -68,17 +68,17 @@ struct Search {
             if (!failure) failure = thrown;
             return std::nullopt;
         }
-        if (aligned && !goes_its_way(p, w, v)) return std::nullopt;
+        if (needs_opposed_friction && !goes_its_way(p, w, v)) return std::nullopt;
         if (together && together->slides() && all_stay()) return std::nullopt;
         Choice next = choice;
         int change = pulling_contact(p, w);
-        if (change < 0) change = approaching(choice);
+        if (change < 0) change = fastest_approaching(choice);
         if (change >= 0) next[change] = !next[change];
         return next;
     }
 
-    // Check if no contact begins to move. A joint answer that slides shows that no forces within the cones hold all
-    // contacts, although the loads of a redundant set do not show it.
+    // Check if no contact begins to move. If the joint solution slides, no forces within the cones hold all contacts.
+    // The loads of a redundant set alone do not show this.
     bool all_stay() {
         for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
             if (!rest[i]) continue;
@@ -95,15 +95,15 @@ struct Search {
     }
 
     // Return the open contact with the fastest relative approach acceleration, or -1.
-    int approaching(const Choice& choice) {
+    int fastest_approaching(const Choice& choice) {
         int found = -1;
-        double most = 1.0;
+        double max_ratio = 1.0;
         for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
             if (!rest[i] || choice[i]) continue;
             evaluate_gap(p, w, t, v, i);
             const double beyond = -gap_acceleration(p, w, i) / acceleration_rounding(p, w, i);
-            if (beyond <= most) continue;
-            most = beyond;
+            if (beyond <= max_ratio) continue;
+            max_ratio = beyond;
             found = i;
         }
         return found;
@@ -112,9 +112,9 @@ struct Search {
     bool is_new(const Choice& choice) const { return std::find(tried.begin(), tried.end(), choice) == tried.end(); }
 
     // Pivot from one active set to the next until one satisfies all conditions.
-    bool walk(Choice choice) {
+    bool pivot(Choice choice) {
         while (is_new(choice)) {
-            const std::optional<Choice> next = better(choice);
+            const std::optional<Choice> next = improved_choice(choice);
             if (!next) return false;
             if (*next == choice) return true;
             choice = *next;
@@ -127,9 +127,9 @@ struct Search {
         std::vector<int> list;
         for (int i = 0; i < static_cast<int>(rest.size()); ++i)
             if (rest[i]) list.push_back(i);
-        if (static_cast<int>(list.size()) >
-            (aligned ? active_set_parameters.most_aligned : active_set_parameters.most_enumerated))
-            return false;
+        const int max_contacts = needs_opposed_friction ? active_set_parameters.max_aligned_contacts
+                                                        : active_set_parameters.max_enumerated_contacts;
+        if (static_cast<int>(list.size()) > max_contacts) return false;
         std::vector<unsigned> order(1u << list.size());
         for (unsigned k = 0; k < order.size(); ++k) order[k] = k;
         const auto count = [](unsigned bits) { return __builtin_popcount(bits); };
@@ -137,7 +137,7 @@ struct Search {
         for (unsigned bits : order) {
             Choice choice(rest.size(), 0);
             for (size_t k = 0; k < list.size(); ++k) choice[list[k]] = bits >> k & 1u;
-            if (is_new(choice) && better(choice) == choice) return true;
+            if (is_new(choice) && improved_choice(choice) == choice) return true;
         }
         return false;
     }
@@ -145,8 +145,8 @@ struct Search {
 
 }  // namespace
 
-Touching touching_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, bool starts) {
-    Touching out{Choice(p.gaps.size(), 0), Choice(p.gaps.size(), 0)};
+TouchingContacts touching_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, bool starts) {
+    TouchingContacts out{Choice(p.gaps.size(), 0), Choice(p.gaps.size(), 0)};
     update_kinematics(p, w, t, q, v);
     const double width = starts ? active_set_parameters.starting_width * scene_size(p, w) : touching_width;
     std::vector<int> list;
@@ -180,7 +180,8 @@ Touching touching_contacts(const Program& p, Workspace& w, double t, const VecX&
     return out;
 }
 
-const Touching& TouchingKnown::at(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, bool starts) {
+const TouchingContacts& TouchingCache::at(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
+                                          bool starts) {
     const bool same = known_ && t == t_ && starts == starts_ && q == q_ && v == v_ && same_bytes(closed_, w.state.closed);
     if (same) return found_;
     known_ = true;
@@ -205,11 +206,11 @@ void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, con
         return resting_motion(p, w, t, q, v, question);
     };
     std::optional<Failure> failure;  // of the first active set without a motion
-    const auto seek = [&](const Choice& start, const RestingMotion* answer, bool aligned) {
+    const auto seek = [&](const Choice& start, const RestingMotion* answer, bool needs_opposed_friction) {
         Choice first = start;
         if (question.opening_gap >= 0) first[question.opening_gap] = 0;
-        Search search{p, w, t, v, question.rest, find_modes, answer, aligned, {}, {}};
-        if (search.walk(first) || search.enumerate()) return true;
+        Search search{p, w, t, v, question.rest, find_modes, answer, needs_opposed_friction, {}, {}};
+        if (search.pivot(first) || search.enumerate()) return true;
         if (!failure) failure = search.failure;
         return false;
     };
@@ -247,8 +248,8 @@ void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, con
     }
     try {
         close(question.rest, nullptr);
-        // Multipliers of redundant rows do not show if friction at rest is within its cones. Sliding friction follows the
-        // loads of minimum norm, and the solution of the cones need not.
+        // Multipliers of redundant rows do not show if friction at rest is within its cones. Sliding friction follows
+        // the minimum-norm loads, unlike the solution of the cone problem.
         if (question.prescribed || !w.now.rows.redundant || !w.state.sticks_anywhere() || slides_anywhere(p, w, v))
             return;
         if (!answer) answer = together();

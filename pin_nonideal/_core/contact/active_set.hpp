@@ -14,42 +14,42 @@ struct ActiveSetParameters {
     // At the start of a run, gaps up to this fraction of the scene's size touch.
     double starting_width = 1e-10;
     // Enumerate all active sets up to this many contacts if pivoting fails.
-    int most_enumerated = 12;
-    // Limit of the enumeration if slip directions must be consistent too. Without consistency a motion to integrate
-    // exists.
-    int most_aligned = 8;
+    int max_enumerated_contacts = 12;
+    // Limit of the enumeration if slip directions must be consistent too. Without this condition a motion to integrate
+    // is known already.
+    int max_aligned_contacts = 8;
     // No body closes a wider gap [m or rad] within `touching_time`: its speed would exceed the speed of light.
     double sure_gap = 1e-3;
     // Minimum number of contacts that can share a load in several ways.
     int may_share = 2;
     // Minimum slip acceleration that defines a direction, relative to the scale of accelerations, and allowed deviation
     // of the direction (1 - cosine).
-    double min_direction_acceleration = 1e-4, astray = 1e-6;
+    double min_direction_acceleration = 1e-4, max_direction_deviation = 1e-6;
 };
 
 inline constexpr ActiveSetParameters active_set_parameters{};
 
 // Contact state: touching contacts, resting contacts, and impacts.
-struct Touching {
+struct TouchingContacts {
     std::vector<char> touch, rest;
     bool strikes = false;
     bool lands = false;  // some impact is at an open contact
 };
-// Find touching contacts from the widths and rates of the gaps at (t, q, v): closed gaps and narrow gaps. One of several
-// coincident gaps counts: the one that opens last, else a closed one.
-Touching touching_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, bool starts);
+// Find touching contacts from the widths and rates of the gaps at (t, q, v): closed gaps and narrow gaps. Of several
+// coincident gaps, only the gap that opens last counts, else a closed gap.
+TouchingContacts touching_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, bool starts);
 
 // Caches the touching contacts of the last state.
-class TouchingKnown {
+class TouchingCache {
 public:
-    const Touching& at(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, bool starts);
+    const TouchingContacts& at(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, bool starts);
 
 private:
     bool known_ = false, starts_ = false;
     double t_ = 0.0;
     VecX q_, v_;
     std::vector<char> closed_;
-    Touching found_;
+    TouchingContacts found_;
 };
 
 // Check if all slip that begins from rest opposes its friction. If one contact would need tension, other contacts may
@@ -57,8 +57,8 @@ private:
 bool goes_its_way(const Program& p, Workspace& w, const VecX& v);
 
 // Select the closed contacts among those at rest at (t, q, v). `find_modes` computes the stick-slip modes for closed
-// contacts, or takes them from the joint motion of all contacts if given. The workspace ends with the motion at v. If
-// no consistent solution exists, some slip directions are not consistent yet, and integration corrects them.
+// contacts, or takes them from the joint motion of all contacts if given. On return the workspace holds the motion at
+// v. If no consistent solution exists, some slip directions are not consistent yet, and integration corrects them.
 void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
                     const ClosingQuestion& question, const std::function<void(const RestingMotion*)>& find_modes);
 

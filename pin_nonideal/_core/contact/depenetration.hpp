@@ -20,10 +20,10 @@ double longest_single_move(const Program& p, const Workspace& w);
 // are nearly parallel.
 bool strays_from_planes(const Program& p, Workspace& w, double longest_single);
 
-// Move q by the least move in the metric of M to a position that satisfies the constraints. Gaps there are nonnegative
-// and complementary to compressive multipliers. Contacts that do not touch there open. If no such position is found, q
-// is only projected onto the constraints, and contacts off their planes open. The workspace ends configured at q with
-// the rows that are independent there. Return true if rows were chosen.
+// Move q by the least move in the metric of M to a position that satisfies the constraints. At this position gaps are
+// nonnegative and complementary to compressive multipliers. Contacts that do not touch at this position open. If no
+// such position is found, q is only projected onto the constraints, and contacts off their planes open. On return the
+// workspace is configured at q, with independent rows. Return true if rows were chosen.
 bool move_out(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
 
 }  // namespace pn

@@ -111,7 +111,7 @@ double load_rounding(const Program& p, const Workspace& w, int gap) {
 
 int pulling_contact(const Program& p, Workspace& w) {
     const Reactions& r = reactions(p, w);
-    if (r.presses && w.now.rows.redundant) return -1;
+    if (r.loads_are_feasible && w.now.rows.redundant) return -1;
     VecX lam = r.lam;
     if (w.now.rows.redundant) share_multipliers(p.blocks, w.now.B, p.described, w.now.rows, w.now.lam, lam);
     int found = -1;

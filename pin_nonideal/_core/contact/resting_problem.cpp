@@ -17,7 +17,7 @@ double strength(const Friction& f) { return f.gap >= 0 ? f.mu : f.constant; }
 
 bool is_at_rest(const Program& p, const Workspace& w, const VecX& v, const ClosingQuestion& question,
                 const RunState& before, int e) {
-    const bool known = before.mode[e] == sticking || before.lingers[e];
+    const bool known = before.mode[e] == sticking || before.is_sticking_deferred[e];
     return e == question.arrived_element || (known && !question.after_impact) ||
            slip_velocity(w.now, p.frictions[e]).norm() <= rest_speed * (1.0 + v.cwiseAbs().maxCoeff());
 }
@@ -36,7 +36,7 @@ void RestingMotion::answer(const Program& p, Workspace& w, ModeQuestion& questio
         if (p.frictions[e].dim > 1 && slips(modes[e]))
             w.state.slip_direction[e] = w.state.last_direction[e] = direction[e];
     }
-    question.answered = true;
+    question.is_solved_jointly = true;
     question.several = several;
 }
 
@@ -105,16 +105,18 @@ VecX RestingProblem::accelerations() {
     return out;
 }
 
-double RestingProblem::in_play() const { return w0.cwiseAbs().maxCoeff() + (W.cwiseAbs() * f.cwiseAbs()).maxCoeff(); }
+double RestingProblem::acceleration_scale() const {
+    return w0.cwiseAbs().maxCoeff() + (W.cwiseAbs() * f.cwiseAbs()).maxCoeff();
+}
 
-double RestingProblem::in_play(int row, int count) const {
+double RestingProblem::acceleration_scale(int row, int count) const {
     if (count == 0) return 0.0;
     return w0.segment(row, count).cwiseAbs().maxCoeff() +
            (W.middleRows(row, count).cwiseAbs() * f.cwiseAbs()).maxCoeff();
 }
 
 double RestingProblem::rounding(int row, int count) const {
-    return parameters.none * in_play(row, count) + parameters.common_slip_rounding * in_play();
+    return parameters.none * acceleration_scale(row, count) + parameters.common_slip_rounding * acceleration_scale();
 }
 
 // Check if friction is at its limit. A contact that shares a load may have a load of rounding only.
@@ -177,7 +179,8 @@ bool RestingProblem::solve_cones(bool warm, bool& shared) {
     for (int round = 0; round < parameters.most_releases; ++round) {
         const bool solved = solver.solve(W, w0, cones, warm || round > 0, f) == ConeStatus::solved;
         if (round == 0 && !warm && (!solved || moves())) {
-            const bool another = solved && (w0 + W * f).cwiseAbs().maxCoeff() > parameters.min_other_motion * in_play();
+            const bool another =
+                solved && (w0 + W * f).cwiseAbs().maxCoeff() > parameters.min_other_motion * acceleration_scale();
             if (hold(solver)) {
                 several = another;
                 break;
@@ -198,7 +201,8 @@ bool RestingProblem::take_turns(const VecX& free) {
         const VecX before = f;
         w0 = free + dragging * before;
         if (!solve_cones(true, shared)) return false;
-        if ((dragging * (f - before)).cwiseAbs().maxCoeff() <= parameters.settled * in_play()) return true;
+        if ((dragging * (f - before)).cwiseAbs().maxCoeff() <= parameters.load_change_tol * acceleration_scale())
+            return true;
     }
     return false;
 }
@@ -209,7 +213,7 @@ void RestingProblem::read(RestingMotion& out) const {
         const int e = rows.element(i);
         if (i < rows.gaps.size()) {
             const int gap = rows.gaps[i];
-            out.closed[gap] = a[first[i]] <= parameters.none * in_play();
+            out.closed[gap] = a[first[i]] <= parameters.none * acceleration_scale();
             out.loaded[gap] = out.closed[gap] && f[first[i]] > parameters.none * f.cwiseAbs().maxCoeff();
             if (e < 0 || !out.closed[gap]) continue;
             if (slides[i]) {

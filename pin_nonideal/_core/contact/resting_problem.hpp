@@ -46,7 +46,7 @@ struct RestingProblemParameters {
     double breaking_by = 1e-6;            // relative reduction of the limit of elements that just reached it
     int most_releases = 4;                // rounds that set kinetic limits of slipping contacts
     int max_load_iterations = 100;        // maximum iterations of loads and their friction
-    double settled = 1e-13;               // rounding of the loads' change, relative to the largest acceleration
+    double load_change_tol = 1e-13;       // rounding of the loads' change, relative to the largest acceleration
 };
 
 class RestingProblem {
@@ -76,10 +76,10 @@ private:
     int tail(size_t i) const { return cones[i].dim - head(i); }
     auto tail_of(const VecX& x, size_t i) const { return x.segment(first[i] + head(i), tail(i)); }
     VecX accelerations();
-    // Scale of the accelerations of all rows, or of some rows. That of all rows would hide the slip of a body beside much
-    // lighter ones.
-    double in_play() const;
-    double in_play(int row, int count) const;
+    // Scale of the accelerations of all rows, or of some rows. The scale of all rows would hide the slip of a body
+    // beside much lighter bodies.
+    double acceleration_scale() const;
+    double acceleration_scale(int row, int count) const;
     // Accelerations of these rows, and of the slip of a cone, that are rounding.
     double rounding(int row, int count) const;
     double slip_rounding(size_t i) const { return rounding(first[i] + head(i), tail(i)); }

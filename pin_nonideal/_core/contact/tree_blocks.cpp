@@ -23,7 +23,7 @@ TreeBlocks::TreeBlocks(const Program& p) : size_(p.mechanism.nv, 0), node_(p.mec
     }
 }
 
-// Check the ratio of the pivots of a tree. Those of different trees may differ by any factor.
+// Check the ratio of the pivots of a tree. Pivots of different trees may differ by any factor.
 bool TreeBlocks::is_well_conditioned(const Workspace& w, int root) const {
     const auto pivots = w.now.terms.D.segment(root, size_[root]);
     return pivots.maxCoeff() <= most_pivot_ratio * pivots.minCoeff();

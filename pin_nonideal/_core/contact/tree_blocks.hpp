@@ -17,9 +17,8 @@ public:
 
     // Check if the inertia of every tree is a matrix, in which its dofs follow one another.
     bool applies(const Program& p) const { return contiguous_ && p.mechanism.deep_dofs.empty(); }
-    // Set the nodes, elements and blocks of a problem in a workspace with M and the rows A. `rows` are those of the
-    // elements, one after the other. Return false if an element moves more than two trees, or if a tree is
-    // ill-conditioned.
+    // Set the nodes, elements and blocks of a problem in a workspace with M and the rows A. `rows`: rows of the
+    // elements, in sequence. Return false if an element moves more than two trees, or if a tree is ill-conditioned.
     bool fill(const Program& p, const Workspace& w, const std::vector<StepRow>& rows,
               const std::vector<ConeElement>& cones, BlockProblem& problem);
 

@@ -16,8 +16,8 @@ void scale_rows(const Program& p, Workspace& w) {
     }
 }
 
-void choose_rows(const Program& p, Workspace& w, double tolerance, int most) {
-    decide_rows(p.mechanism, w.now.terms, p.blocks, w.now.values, w.now.B, w.now.rows, tolerance, most);
+void choose_rows(const Program& p, Workspace& w, double tolerance, int max_rank) {
+    decide_rows(p.mechanism, w.now.terms, p.blocks, w.now.values, w.now.B, w.now.rows, tolerance, max_rank);
     factor_rows(p.layout, p.blocks, w.now.B, w.now.rows);
 }
 

@@ -11,8 +11,8 @@ namespace pn {
 
 // B = A R^-T of the rows in use.
 void scale_rows(const Program& p, Workspace& w);
-// Choose at most `most` independent rows among the required ones and factor them.
-void choose_rows(const Program& p, Workspace& w, double tolerance = rank_tolerance, int most = INT_MAX);
+// Choose at most `max_rank` independent rows among the required ones and factor them.
+void choose_rows(const Program& p, Workspace& w, double tolerance = rank_tolerance, int max_rank = INT_MAX);
 
 // Turn the force x into a_s, the acceleration scaled by R, and compute the multipliers lam. Return |a_s'|^2, the
 // squared length of the result without rows.

@@ -208,9 +208,9 @@ void move_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap) 
 
 // Penetrations of all gaps and rates of closed ones. Open gaps are measured here.
 static void gap_violations(const Program& p, Workspace& w, double t, const VecX& v, double& position, double& velocity,
-                           const std::vector<char>* sure) {
+                           const std::vector<char>* open_gaps) {
     for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
-        if (sure && (*sure)[i]) continue;
+        if (open_gaps && (*open_gaps)[i]) continue;
         const RowValues& values = w.now.values[p.gaps[i].block];
         if (!w.state.closed[i]) measure_gap(p, w, t, v, i);
         else velocity = std::max(velocity, std::abs(values.rate[0]));
@@ -219,7 +219,7 @@ static void gap_violations(const Program& p, Workspace& w, double t, const VecX&
 }
 
 void violations(const Program& p, Workspace& w, double t, const VecX& v, double& position, double& velocity,
-                const std::vector<char>* sure) {
+                const std::vector<char>* open_gaps) {
     position = velocity = 0.0;
     for (int i = 0; i < p.first_gap; ++i) {
         const RowValues& values = w.now.values[i];
@@ -228,7 +228,7 @@ void violations(const Program& p, Workspace& w, double t, const VecX& v, double&
             velocity = std::max(velocity, std::abs(values.rate[k]));
         }
     }
-    gap_violations(p, w, t, v, position, velocity, sure);
+    gap_violations(p, w, t, v, position, velocity, open_gaps);
 }
 
 }  // namespace pn

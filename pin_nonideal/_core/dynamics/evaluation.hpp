@@ -15,7 +15,7 @@ struct EvaluationParameters {
     double balance_rounding = 1e-14;
     // Rounding of a sum, relative to the sum of the magnitudes of its terms.
     double residual_sum_rounding = 1e-13;
-    // Evaluations between two looks at signals and wall time. Those of large scenes take milliseconds.
+    // Evaluations between two checks of signals and wall time. One evaluation of a large scene takes milliseconds.
     long evaluations_a_watch = 16;
 };
 
@@ -54,8 +54,8 @@ void evaluate_block(const Program& p, Workspace& w, double t, const VecX& v, int
 void move_block(const Program& p, Workspace& w, double t, const VecX& v, int block);
 
 // Compute the largest residual and rate over all described rows at the state last evaluated. A contact that may open
-// contributes its penetration, and its rate only if it is closed. `sure` marks the open gaps (by index) to skip.
+// contributes its penetration, and its rate only if it is closed. `open_gaps` marks the open gaps (by index) to skip.
 void violations(const Program& p, Workspace& w, double t, const VecX& v, double& position, double& velocity,
-                const std::vector<char>* sure = nullptr);
+                const std::vector<char>* open_gaps = nullptr);
 
 }  // namespace pn

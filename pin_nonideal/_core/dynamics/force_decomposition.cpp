@@ -15,16 +15,16 @@ IdealMotion::IdealMotion(const Program& program, Workspace& workspace) : p(progr
         std::swap(w.now.rows, w.now.ideal_rows);
         const RowSystem& own = w.now.ideal_rows;
         w.now.rows.refine = own.refine;
-        if (!w.state.ideal_decided) {
+        if (!w.state.has_ideal_row_choice) {
             for (int r = 0; r < p.layout.rows; ++r) w.now.rows.required[r] = own.required[r] && r < p.constraint_rows();
             w.now.rows.use_required(p.layout, p.blocks, w.now.awake);
         }
         if (!w.now.rows.blocks.empty()) {
             scale_rows(p, w);
-            if (w.state.ideal_decided) factor_rows(p.layout, p.blocks, w.now.B, w.now.rows);
+            if (w.state.has_ideal_row_choice) factor_rows(p.layout, p.blocks, w.now.B, w.now.rows);
             else choose_rows(p, w);
         }
-        w.state.ideal_decided = true;
+        w.state.has_ideal_row_choice = true;
     }
     solve_motion(p, w, false);
     w.now.ideal = true;

@@ -11,9 +11,9 @@ double implicit_part(double h, double inertia, double stiffness, double damping)
     const double decay = h * (half + (square > 0.0 ? std::sqrt(square) : 0.0));
     const double turns = square < 0.0 ? h * std::sqrt(-square) : 0.0;
     // Exponential fit: one step multiplies the fastest motion by exp(-decay).
-    const double fitted = decay < slow ? 0.5 + decay / 12.0 : 1.0 / -std::expm1(-decay) - 1.0 / decay;
-    const double unresolved = turns > 1.0 ? 1.0 - 0.5 / turns : 0.5;
-    return std::max(fitted, unresolved);
+    const double decay_part = decay < slow ? 0.5 + decay / 12.0 : 1.0 / -std::expm1(-decay) - 1.0 / decay;
+    const double vibration_part = turns > 1.0 ? 1.0 - 0.5 / turns : 0.5;
+    return std::max(decay_part, vibration_part);
 }
 
 void ImplicitDrives::add_inertia(const Mechanism& m, Terms& terms) {

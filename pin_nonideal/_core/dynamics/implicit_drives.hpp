@@ -1,9 +1,9 @@
 // Springs and dampers of single dofs that a time step takes implicitly, with the stiffness K and the damping D:
 //     M + theta h D + theta^2 h^2 K   in place of M,
 //     F + D (v - v0) - (2 theta - 1) h K v0   in place of F at the velocity v.
-// Their force then follows the velocity and the position of the step's end by the part theta. With theta = 1/2 the step
-// is second order and keeps the energy of springs. Fast decay and vibrations that the step does not resolve take a
-// larger theta, so that they fade.
+// The force is thus taken at the part theta of the step. With theta = 1/2 the step
+// is second order and keeps the energy of springs. A larger theta damps vibrations and fast decay that the step does
+// not resolve.
 #pragma once
 
 #include "tree/terms.hpp"
@@ -23,7 +23,7 @@ struct ImplicitDrives {
     void set_velocity(const VecX& v0, const VecX& v);
 };
 
-// Part of the end of a step of length h at which a spring and damper of one dof act, for its inertia.
+// Return theta for the spring and damper of one dof, in a step of length h.
 double implicit_part(double h, double inertia, double stiffness, double damping);
 
 }  // namespace pn

@@ -19,7 +19,7 @@ struct Implicit : Unknowns {
     bool is_due() const {
         const RunState& state = w.state;
         // the proof has already failed
-        if (state.unique == Uniqueness::not_shown) return state.steps_since == never_decided;
+        if (state.unique == Uniqueness::not_shown) return state.steps_since == undecided_steps;
         return state.steps_since >= (state.growth < implicit_friction_parameters.safe_growth
                                          ? std::max(n, implicit_friction_parameters.kept_steps)
                                          : 1);
@@ -28,7 +28,7 @@ struct Implicit : Unknowns {
     // Check if the equation contracts near its solution y. If so, restore the motion of y.
     bool contracts(const VecX& y) {
         ReactionEquation& arrays = w.scratch.equation;
-        const HeldPiece piece(p, w);
+        const FrozenZeroLoads piece(p, w);
         equation(y, arrays);
         if (!arrays.finite()) throw Failure(Failure::Kind::not_finite, t);
         arrays.steepest(w.scratch.jacobian);
@@ -36,7 +36,7 @@ struct Implicit : Unknowns {
         if (!(bound < 1.0 - uniqueness_parameters.least_determinant)) return false;
         w.state.growth = bound;
         w.state.steps_since = 0;
-        w.state.unique = shares_pressing(p, w) ? Uniqueness::not_shown : Uniqueness::shown;
+        w.state.unique = shares_contact_loads(p, w) ? Uniqueness::not_shown : Uniqueness::shown;
         set(y);
         motion();
         return true;
@@ -53,7 +53,7 @@ struct Implicit : Unknowns {
             for (int turn = 0; turn < implicit_friction_parameters.max_zero_load_sets; ++turn) {
                 const VecX from = y;
                 {
-                    const HeldPiece piece(p, w);
+                    const FrozenZeroLoads piece(p, w);
                     solve_bearings(y);
                 }
                 if (is_motion(y)) return;
@@ -184,7 +184,7 @@ struct Implicit : Unknowns {
         if (!iterate() || (bearings && is_due() && !contracts(y))) {
             VecX& solution = w.scratch.solution;
             solution = y.head(n);
-            if (bearings && shares_pressing(p, w)) solve_pieces(solution);
+            if (bearings && shares_contact_loads(p, w)) solve_pieces(solution);
             else if (bearings) solve_bearings(solution);
             else solve_laws(solution);
             y.head(n) = solution;

@@ -44,7 +44,7 @@ struct BodyForces {
 };
 
 // Collects the dofs on which a law may act.
-struct ActedOn {
+struct ActedDofs {
     const Program& p;
     std::vector<char>& dofs;
 
@@ -89,10 +89,10 @@ std::vector<std::vector<int>> law_supports(const Program& p) {
     std::vector<std::vector<char>> on(p.law_names.size(), std::vector<char>(p.mechanism.nv, 0));
     for (const Law& each : p.laws)
         std::visit([&](const auto& law) {
-            ActedOn sink{p, on[law.law]};
+            ActedDofs sink{p, on[law.law]};
             law.act(law_state(anywhere, anywhere.now.v), sink);
         }, each);
-    for (const Friction& f : p.frictions) ActedOn{p, on[f.law]}.along(f.block, Vec3::Zero());
+    for (const Friction& f : p.frictions) ActedDofs{p, on[f.law]}.along(f.block, Vec3::Zero());
     std::vector<std::vector<int>> supports(on.size());
     for (size_t l = 0; l < on.size(); ++l)
         for (int dof = 0; dof < p.mechanism.nv; ++dof)

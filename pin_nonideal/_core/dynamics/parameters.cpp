@@ -16,7 +16,7 @@ template <class T>
 using Members = std::initializer_list<std::pair<const char*, double T::*>>;
 
 template <class T>
-NumberPlace member(T& of, const NumberName& name, Members<T> members) {
+NumberLocation member(T& of, const NumberName& name, Members<T> members) {
     for (const auto& [argument, at] : members)
         if (name.argument == argument) return {&(of.*at), 1};
     refuse(name);
@@ -31,10 +31,10 @@ Kind& nth(Several& several, const NumberName& name) {
     refuse(name);
 }
 
-NumberPlace vector(Vec3& x) { return {reinterpret_cast<double*>(&x.x), 3}; }
-NumberPlace vector(VecX& x) { return {x.data(), static_cast<int>(x.size())}; }
+NumberLocation vector(Vec3& x) { return {reinterpret_cast<double*>(&x.x), 3}; }
+NumberLocation vector(VecX& x) { return {x.data(), static_cast<int>(x.size())}; }
 
-NumberPlace of_law(Program& p, const NumberName& name) {
+NumberLocation of_law(Program& p, const NumberName& name) {
     using F = Friction;
     if (name.call == "add_friction")
         return member(p.frictions.at(name.index), name,
@@ -54,7 +54,7 @@ NumberPlace of_law(Program& p, const NumberName& name) {
                    {"stiction", &L::stiction}, {"stribeck_velocity", &L::stribeck_velocity}});
 }
 
-NumberPlace of_force(Program& p, const NumberName& name) {
+NumberLocation of_force(Program& p, const NumberName& name) {
     using S = SpringDamper;
     using J = JointSpring;
     if (name.call == "add_spring_damper")
@@ -73,7 +73,7 @@ NumberPlace of_force(Program& p, const NumberName& name) {
 
 }  // namespace
 
-NumberPlace find_number(Program& p, const NumberName& name) {
+NumberLocation find_number(Program& p, const NumberName& name) {
     if (name.call == "gravity") return vector(p.mechanism.gravity);
     if (name.call == "body") {
         Joint& joint = p.mechanism.joints.at(name.index);

@@ -18,10 +18,10 @@ struct NumberName {
 
 // Location of the numbers with a name: `size` numbers from `at`. find_number throws std::invalid_argument if a run
 // cannot set them.
-struct NumberPlace {
+struct NumberLocation {
     double* at;
     int size;
 };
-NumberPlace find_number(Program& p, const NumberName& name);
+NumberLocation find_number(Program& p, const NumberName& name);
 
 }  // namespace pn

@@ -47,7 +47,7 @@ void powers(const Program& p, Workspace& w, const VecX& v, double* out) {
         out[2] = v.dot(w.scratch.work);
     }
     if (!p.has_laws()) return;
-    if (p.rubs_while_closed && w.now.slipping.empty()) {
+    if (p.has_contact_friction_only && w.now.slipping.empty()) {
         std::fill_n(out + first_law_power, p.law_names.size(), 0.0);
         return;
     }

@@ -45,7 +45,7 @@ static void number_descriptions(Program& p) {
     p.described.finish(p.layout.rows);
 }
 
-// Geometry of a gap as a list of numbers. `told` is false for kinds with other data, such as solids or functions.
+// Geometry of a gap as a list of numbers. `is_known` is false for kinds with other data, such as solids or functions.
 class GapNumbers {
 public:
     GapNumbers(const Program& p, const Gap& gap) {
@@ -55,7 +55,7 @@ public:
             std::apply([&](const auto&... data) { (add(k.*data.member), ...); }, k.data());
         }, kind);
     }
-    bool told() const { return told_; }
+    bool is_known() const { return is_known_; }
     const std::vector<double>& numbers() const { return numbers_; }
 
 private:
@@ -70,17 +70,17 @@ private:
         add(x.p);
     }
     template <class Other>
-    void add(const Other&) { told_ = false; }
+    void add(const Other&) { is_known_ = false; }
 
     std::vector<double> numbers_;
-    bool told_ = true;
+    bool is_known_ = true;
 };
 
 static void find_alike(Program& p) {
     std::map<std::vector<double>, int> first;
     for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
         const GapNumbers of(p, p.gaps[i]);
-        p.gaps[i].alike = of.told() ? first.emplace(of.numbers(), i).first->second : i;
+        p.gaps[i].alike = of.is_known() ? first.emplace(of.numbers(), i).first->second : i;
     }
 }
 
@@ -124,7 +124,7 @@ void Program::finish() {
         if (f.gap < 0) continue;
         gaps[f.gap].elements.push_back(static_cast<int>(e));
         // Spinning and rolling resistance have their own row kind.
-        if (!std::holds_alternative<TurnSlipRows>(blocks[f.block].kind)) gaps[f.gap].sliding = static_cast<int>(e);
+        if (!std::holds_alternative<SpinSlipRows>(blocks[f.block].kind)) gaps[f.gap].sliding = static_cast<int>(e);
     }
     find_alike(*this);
     for (Friction& f : frictions) {
@@ -133,7 +133,7 @@ void Program::finish() {
         if (described.rows[f.row].kept < 0) f.load = Friction::Load::none;
     }
     for (const Friction& f : frictions) needs_reactions |= f.reaction != Reaction::none;
-    rubs_while_closed = laws.empty() && std::all_of(frictions.begin(), frictions.end(),
+    has_contact_friction_only = laws.empty() && std::all_of(frictions.begin(), frictions.end(),
                                                     [](const Friction& f) { return f.gap >= 0; });
     // Group laws by kind, so that the order of their descriptions does not affect rounding.
     std::stable_sort(laws.begin(), laws.end(), [](const Law& a, const Law& b) { return a.index() < b.index(); });

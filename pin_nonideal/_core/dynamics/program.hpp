@@ -58,7 +58,7 @@ struct Program {
 
     std::vector<GivenForce> forces;
     Actuation actuation;
-    TorqueTable added_torque;            // torques beside those of a sampled control, without times if there are none
+    TorqueTable added_torque;            // torques in addition to a sampled control; no times if there are none
     VecX least_effort, most_effort;      // limits of the actuators, by dof (empty if unlimited)
 
     // Flags that skip computations that the scene does not need.
@@ -69,7 +69,7 @@ struct Program {
         return added_torque.times.empty() ? std::get_if<TorqueTable>(&actuation) : &added_torque;
     }
     bool needs_reactions = false;        // some law reads them
-    bool rubs_while_closed = false;      // the only laws are frictions of unilateral contacts
+    bool has_contact_friction_only = false;      // the only laws are frictions of unilateral contacts
     bool driven = false;                 // forces or actuation
     bool has_body_forces = false;        // given forces that act on bodies
     bool moves_in_time = false;          // some constraint depends on time

@@ -78,8 +78,8 @@ static void press_all(const Program& p, Workspace& w, Reactions& r) {
         gaps.push_back(static_cast<int>(i));
         pulls |= r.lam[block.row] < 0.0;
     }
-    r.presses = true;
-    if (!r.holds_unloaded) {
+    r.loads_are_feasible = true;
+    if (!r.is_zero_load_set_frozen) {
         r.unloaded.assign(p.gaps.size(), 0);
         if (!pulls) return;
     }
@@ -94,17 +94,17 @@ static void press_all(const Program& p, Workspace& w, Reactions& r) {
         N[k] = r.lam[row];
         held[k] = r.unloaded[gaps[k]];
     }
-    if (r.holds_unloaded) {
+    if (r.is_zero_load_set_frozen) {
         r.lam += free * shortest_with_zeros(Z, N, held);
         return;
     }
-    const Nonnegative found = shortest_nonnegative(Z, N);
+    const NonnegativeSum found = shortest_nonnegative(Z, N);
     r.lam += free * found.z;
-    r.presses = found.met;
+    r.loads_are_feasible = found.is_feasible;
     for (size_t k = 0; k < gaps.size(); ++k) {
         r.unloaded[gaps[k]] = found.held[k];
         double& load = r.lam[p.blocks[p.gaps[gaps[k]].block].row];
-        if (found.met) load = found.held[k] ? 0.0 : std::max(load, 0.0);
+        if (found.is_feasible) load = found.held[k] ? 0.0 : std::max(load, 0.0);
     }
 }
 
@@ -130,8 +130,8 @@ const Reactions& reactions(const Program& p, Workspace& w) {
     r.current = true;
     r.swept = false;
     share_multipliers(p.blocks, w.now.B, p.described, w.now.rows, w.now.lam, r.lam);
-    r.presses = true;
-    if (shares_pressing(p, w)) press_all(p, w, r);
+    r.loads_are_feasible = true;
+    if (shares_contact_loads(p, w)) press_all(p, w, r);
     return r;
 }
 
@@ -139,7 +139,7 @@ double normal_force(const Program& p, Workspace& w, int contact) {
     return p.described.share(p.pressing[contact], reactions(p, w).lam);
 }
 
-Press contact_press(const Program& p, Workspace& w, int contact) {
+PullMargin contact_pull_margin(const Program& p, Workspace& w, int contact) {
     const VecX& shared = reactions(p, w).lam;
     return press(p.blocks, w.now.B, p.described, p.pressing, w.now.rows, shared, contact);
 }

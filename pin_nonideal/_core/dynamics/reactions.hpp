@@ -10,65 +10,66 @@ namespace pn {
 const Reactions& reactions(const Program& p, Workspace& w);
 
 // Check if unilateral contacts may share a load. Then the motion determines the set of contacts with zero load.
-inline bool shares_pressing(const Program& p, const Workspace& w) { return !p.gaps.empty() && w.now.rows.redundant; }
+inline bool shares_contact_loads(const Program& p, const Workspace& w) { return !p.gaps.empty() && w.now.rows.redundant; }
 
 // List all possible zero-load sets of contacts that share loads: by gap, true if its load is zero. Empty if there are
 // too many sets.
 std::vector<std::vector<char>> load_pieces(const Program& p, const Workspace& w);
 
 // Freezes the zero-load set of the current motion during its lifetime. Loads are linear in the motion for a fixed set.
-class HeldPiece {
+class FrozenZeroLoads {
 public:
-    HeldPiece(const Program& p, Workspace& w) : r_(w.now.reactions) {
-        held_ = r_.holds_unloaded || !shares_pressing(p, w);
-        if (held_) return;
+    FrozenZeroLoads(const Program& p, Workspace& w) : r_(w.now.reactions) {
+        was_frozen_ = r_.is_zero_load_set_frozen || !shares_contact_loads(p, w);
+        if (was_frozen_) return;
         reactions(p, w);
         hold(true);
     }
     // Freeze the given set of contacts.
-    HeldPiece(Workspace& w, const std::vector<char>& unloaded) : r_(w.now.reactions), held_(false) {
+    FrozenZeroLoads(Workspace& w, const std::vector<char>& unloaded) : r_(w.now.reactions), was_frozen_(false) {
         r_.unloaded = unloaded;
         hold(true);
     }
-    ~HeldPiece() {
-        if (!held_) hold(false);
+    ~FrozenZeroLoads() {
+        if (!was_frozen_) hold(false);
     }
-    HeldPiece(const HeldPiece&) = delete;
-    HeldPiece& operator=(const HeldPiece&) = delete;
+    FrozenZeroLoads(const FrozenZeroLoads&) = delete;
+    FrozenZeroLoads& operator=(const FrozenZeroLoads&) = delete;
 
 private:
     void hold(bool on) {
-        r_.holds_unloaded = on;
+        r_.is_zero_load_set_frozen = on;
         r_.current = false;
     }
     Reactions& r_;
-    bool held_ = false;  // frozen by another object, or no contacts share a load
+    bool was_frozen_ = false;  // frozen by another object, or no contacts share a load
 };
 
 // Releases a frozen zero-load set during its lifetime: each motion determines its own set.
-class FreeLoads {
+class ReleasedZeroLoads {
 public:
-    explicit FreeLoads(Workspace& w) : r_(w.now.reactions), held_(r_.holds_unloaded), kept_(r_.unloaded) {
-        r_.holds_unloaded = r_.current = false;
+    explicit ReleasedZeroLoads(Workspace& w)
+        : r_(w.now.reactions), was_frozen_(r_.is_zero_load_set_frozen), kept_(r_.unloaded) {
+        r_.is_zero_load_set_frozen = r_.current = false;
     }
-    ~FreeLoads() {
-        r_.holds_unloaded = held_;
-        if (held_) r_.unloaded = kept_;
+    ~ReleasedZeroLoads() {
+        r_.is_zero_load_set_frozen = was_frozen_;
+        if (was_frozen_) r_.unloaded = kept_;
         r_.current = false;
     }
-    FreeLoads(const FreeLoads&) = delete;
-    FreeLoads& operator=(const FreeLoads&) = delete;
+    ReleasedZeroLoads(const ReleasedZeroLoads&) = delete;
+    ReleasedZeroLoads& operator=(const ReleasedZeroLoads&) = delete;
 
 private:
     Reactions& r_;
-    const bool held_;
+    const bool was_frozen_;
     const std::vector<char> kept_;
 };
 
-// Normal force of a contact or wheel with minimum-norm shares. contact_press also checks if this contact and the
+// Normal force of a contact or wheel with minimum-norm shares. contact_pull_margin also checks if this contact and the
 // contacts that share its load can all be in compression. `contact` indexes Program::contacts.
 double normal_force(const Program& p, Workspace& w, int contact);
-Press contact_press(const Program& p, Workspace& w, int contact);
+PullMargin contact_pull_margin(const Program& p, Workspace& w, int contact);
 
 // Wrench of a joint on its child body, [force; moment about the joint's origin], world axes. anchor_wrench: wrench of
 // an anchor on the body of frame 1, about the anchor's point.

@@ -10,14 +10,15 @@ namespace pn {
 
 namespace {
 
-// Rows of the contacts that stick, as a cone problem whose w is zero for all multipliers with the force of those at hand.
-struct Shares {
+// Rows of the sticking contacts as a cone problem. Its w is zero for all multipliers that exert the same force as the
+// current multipliers.
+struct StickingShares {
     std::vector<int> rows;
     std::vector<ConeElement> cones;
     bool outside = false;  // a contact pulls, or its friction is beyond its limit
     bool known = true;     // a friction element other than a contact shares the load
 
-    Shares(const Program& p, const Workspace& w, const VecX& lam, const MatX& free) {
+    StickingShares(const Program& p, const Workspace& w, const VecX& lam, const MatX& free) {
         std::vector<char> taken(p.layout.rows, 0);
         for (size_t i = 0; i < p.gaps.size(); ++i) {
             const Block& normal = p.blocks[p.gaps[i].block];
@@ -61,7 +62,7 @@ ReportedLoads::ReportedLoads(const Program& p, Workspace& w) : w_(w) {
     if (p.gaps.empty() || !w.now.rows.redundant || !all_stick(p, w)) return;
     const VecX lam = reactions(p, w).lam;
     const MatX& free = free_multipliers(p.blocks, w.now.B, p.described, w.now.rows);
-    const Shares shares(p, w, lam, free);
+    const StickingShares shares(p, w, lam, free);
     if (!shares.outside || !shares.known) return;
 
     const int n = static_cast<int>(shares.rows.size());

@@ -13,13 +13,14 @@ struct StateProjectionParameters {
     // Gaps above this fraction of the scene's size in dependent rows are closed by projection, which may move sticking
     // elements.
     double creeping_gap = 1e-11;
-    // Maximum choices of rows to project one position. Each choice reduces the gaps of the other rows quadratically.
+    // Maximum number of choices of rows for the projection of one position. Each choice reduces the gaps of the other
+    // rows quadratically.
     int max_row_choices = 3;
 };
 
 inline constexpr StateProjectionParameters state_projection_parameters{};
 
-// Project q and v. The workspace is configured there on return.
+// Project q and v. On return the workspace is configured at q.
 bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
 // Project q and v and evaluate the result.
 void project_and_evaluate(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
@@ -28,12 +29,12 @@ void project_and_evaluate(const Program& p, Workspace& w, double t, VecX& q, Vec
 // other rows. Project onto the longest rows at this position, as many as before, because off the constraints dependent
 // rows appear independent.
 bool project_onto_dependent(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
-// Close the gaps of rows that count as dependent while elements stick. Sticking elements hold these rows with forces
-// below rank_tolerance_sticking and creep by as little.
+// Close the gaps of rows that count as dependent while elements stick. Sticking elements hold these rows with parts of
+// their forces below rank_tolerance_sticking, and creep by the same ratio.
 bool project_past_sticking(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
 
 // Choose rows at a state near the constraints without rows from an earlier step, and project the position onto them.
-// The workspace must be configured there.
+// The workspace must be configured at this state.
 void choose_rows_near(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
 
 // Project a state without factors from an earlier step. Uses the factors and independent rows at the state itself, with

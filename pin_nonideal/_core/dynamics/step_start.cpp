@@ -78,13 +78,13 @@ static int contradicting_block(const Program& p, Workspace& w, const VecX& v, do
     return found;
 }
 
-static void choose_rows_anew(const Program& p, Workspace& w, int most = INT_MAX) {
-    choose_rows(p, w, w.state.sticks_anywhere() ? w.state.rank_tolerance : rank_tolerance, most);
+static void choose_rows_anew(const Program& p, Workspace& w, int max_rank = INT_MAX) {
+    choose_rows(p, w, w.state.sticks_anywhere() ? w.state.rank_tolerance : rank_tolerance, max_rank);
     ++w.counters.factorizations;
 }
 
 bool configure_step(const Program& p, Workspace& w) {
-    w.state.ideal_decided = false;
+    w.state.has_ideal_row_choice = false;
     if (w.now.rows.blocks.empty()) return false;
     const RowSystem& rows = w.now.rows;
     const bool due = p.gaps.empty() && is_choice_due(w.now.rows);  // contacts are chosen with their modes
@@ -130,7 +130,7 @@ void begin_step(const Program& p, Workspace& w, double t, const VecX& q, const V
 }
 
 // Fraction of the kinetic energy of v that the rows in use would remove.
-static double part_stopped(const Program& p, Workspace& w, double t, const VecX& v) {
+static double removed_energy_part(const Program& p, Workspace& w, double t, const VecX& v) {
     VecX kept = v;
     project_velocity(p, w, t, kept);
     const double before = kinetic_energy(p.mechanism, w.now.terms, v);
@@ -139,7 +139,7 @@ static double part_stopped(const Program& p, Workspace& w, double t, const VecX&
     return before > 0.0 ? std::abs(before - after) / before : 0.0;
 }
 
-void keep_moving(const Program& p, Workspace& w, double t, const VecX& v) {
+void restore_motion(const Program& p, Workspace& w, double t, const VecX& v) {
     if (!w.now.rows.redundant || !w.state.sticks_anywhere() || v.cwiseAbs().maxCoeff() <= immobile_speed) return;
     const auto choose = [&](double tolerance) {
         w.state.rank_tolerance = tolerance;
@@ -147,10 +147,10 @@ void keep_moving(const Program& p, Workspace& w, double t, const VecX& v) {
         continue_step(p, w, t, v, true);
     };
     double tolerance = w.state.rank_tolerance;
-    while (tolerance < step_start_parameters.most_unheld &&
-           part_stopped(p, w, t, v) > step_start_parameters.stopped_part)
+    while (tolerance < step_start_parameters.max_unheld_part &&
+           removed_energy_part(p, w, t, v) > step_start_parameters.max_removed_energy_part)
         choose(tolerance *= step_start_parameters.unheld_growth);
-    if (tolerance >= step_start_parameters.most_unheld) choose(rank_tolerance_sticking);
+    if (tolerance >= step_start_parameters.max_unheld_part) choose(rank_tolerance_sticking);
 }
 
 bool begin_rows(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
@@ -174,7 +174,7 @@ void project_into_modes(const Program& p, Workspace& w, double t, VecX& q, VecX&
 }
 
 bool begin_step_on_rates(const Program& p, Workspace& w, double t, VecX& v, bool chosen, bool evaluates) {
-    if (w.state.steps_since != never_decided) ++w.state.steps_since;
+    if (w.state.steps_since != undecided_steps) ++w.state.steps_since;
     const bool moved = project_velocity(p, w, t, v);
     if (evaluates) continue_step(p, w, t, v, chosen);
     return moved;

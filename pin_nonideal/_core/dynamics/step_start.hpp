@@ -12,9 +12,9 @@ struct StepStartParameters {
     // Factor by which biases of a dependent row's basis rows may enter its own bias.
     double dependence_growth = 10.0;
     // A change of modes may take at most this fraction of the kinetic energy. If rows held by elements would take more,
-    // rows held with at most `most_unheld` of their forces count as dependent. `unheld_growth` is the step of that
+    // rows held with at most `max_unheld_part` of their forces count as dependent. `unheld_growth` is the step of that
     // search.
-    double stopped_part = 1e-9, most_unheld = 1e-3, unheld_growth = 3.0;
+    double max_removed_energy_part = 1e-9, max_unheld_part = 1e-3, unheld_growth = 3.0;
 };
 
 inline constexpr StepStartParameters step_start_parameters{};
@@ -25,8 +25,8 @@ void begin_step(const Program& p, Workspace& w, double t, const VecX& q, const V
 void continue_step(const Program& p, Workspace& w, double t, const VecX& v, bool chosen = false);
 // Configure and choose the independent rows, without forces. Return true if it chose rows.
 bool begin_rows(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
-// Configure inside a step, which leaves the constraints. Rows that depend on others seem independent there: if the
-// Cholesky factor cannot tell, the independent rows are chosen at the step's start (t0, q0).
+// Configure inside a step, which leaves the constraints. Off the constraints dependent rows seem independent. If the
+// Cholesky factor does not decide, the independent rows are chosen at the step's start (t0, q0).
 void begin_rows_inside(const Program& p, Workspace& w, double t0, const VecX& q0, double t, const VecX& q, const VecX& v);
 // Choose the independent rows in a configured workspace. Return true if it chose rows.
 bool configure_step(const Program& p, Workspace& w);
@@ -37,8 +37,8 @@ bool begin_step_on_rates(const Program& p, Workspace& w, double t, VecX& v);
 bool begin_step_on_rates(const Program& p, Workspace& w, double t, VecX& v, bool chosen, bool evaluates);
 // Keep bodies moving after a change of modes. If newly chosen rows would stop the motion, rows that sticking elements
 // hold with negligible forces count as dependent from now on. The workspace is evaluated at (q, v) before and after.
-void keep_moving(const Program& p, Workspace& w, double t, const VecX& v);
-// Project a state onto the rows of newly set modes, with the rows that are independent there.
+void restore_motion(const Program& p, Workspace& w, double t, const VecX& v);
+// Project a state onto the rows of newly set modes, with independent rows at this state.
 void project_into_modes(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
 
 }  // namespace pn

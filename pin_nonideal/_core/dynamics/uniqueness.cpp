@@ -49,7 +49,7 @@ void sort_by_distance(const ReactionEquation& equation, const VecX& start, std::
 
 // Remove the rounding of the arrays from a solution near a motion. Return false if no motion is near.
 bool refine(Unknowns& u, const ReactionEquation& equation, VecX& y) {
-    const FreeLoads free(u.w);
+    const ReleasedZeroLoads free(u.w);
     ReactionNewton newton;
     VecX g(u.n);
     for (int pass = 0; pass < uniqueness_parameters.refinements; ++pass) {
@@ -74,9 +74,9 @@ std::vector<VecX> motions_of(Unknowns& u, const ReactionEquation& equation, cons
     return list;
 }
 
-// Check if all sticking elements hold in the motion of a solution. If one slips, the motion has other modes.
+// Check if all sticking elements hold in the motion of a solution. If one of them slips, the motion has other modes.
 bool holds(Unknowns& u, const VecX& y) {
-    const FreeLoads free(u.w);
+    const ReleasedZeroLoads free(u.w);
     u.set(y);
     u.motion();
     for (int e = 0; e < static_cast<int>(u.p.frictions.size()); ++e)
@@ -109,7 +109,7 @@ void decide_over_pieces(Unknowns& u, const VecX& start, VecX& y, const Failure& 
     ReactionEquation equation;
     bool complete = true;
     for (const std::vector<char>& unloaded : pieces) {
-        const HeldPiece held(u.w, unloaded);
+        const FrozenZeroLoads held(u.w, unloaded);
         u.equation(y, equation);
         if (!equation.finite()) throw Failure(Failure::Kind::not_finite, u.t);
         ReactionRoots roots;
@@ -136,7 +136,7 @@ void decide(Unknowns& u, const ReactionEquation& equation, const VecX& start, Ve
     state.growth = growth(L);
     state.steps_since = 0;
     const bool contracts = state.growth < 1.0 - uniqueness_parameters.least_determinant;
-    const bool in_pieces = shares_pressing(u.p, u.w);  // one zero-load set proves nothing about the others
+    const bool in_pieces = shares_contact_loads(u.p, u.w);  // one zero-load set proves nothing about the others
     state.unique = contracts && !in_pieces ? Uniqueness::shown : Uniqueness::not_shown;
     if (contracts && solved) return;
     if (solved && determinant_at(equation, y) > uniqueness_parameters.least_determinant) {
@@ -177,9 +177,9 @@ void decide(Unknowns& u, const ReactionEquation& equation, const VecX& start, Ve
     const bool shown = found.size() == 1 || hold > 1;
     if (!shown && determinant_at(equation, y) > uniqueness_parameters.least_determinant) return;
     state.unique = Uniqueness::several;
-    VecX::Index most = 0;
-    (found.back() - y).cwiseQuotient((found.back() + y).cwiseMax(min_scale)).cwiseAbs().maxCoeff(&most);
-    u.w.now.several_element = u.elements()[most];
+    VecX::Index widest = 0;
+    (found.back() - y).cwiseQuotient((found.back() + y).cwiseMax(min_scale)).cwiseAbs().maxCoeff(&widest);
+    u.w.now.several_element = u.elements()[widest];
     if (u.w.continues && determinant_at(equation, y) > uniqueness_parameters.least_determinant) return;
     if (found.size() == 1) throw paradox(u, std::min(least, edge));
     throw two_motions(u, least, found[0], found[1]);
@@ -224,7 +224,7 @@ template <class Look>
 void each_mixture(const Unknowns& u, const MatX& J, const Look& look) {
     const auto laws = groups(u);
     const int m = static_cast<int>(laws.size());
-    const bool all = m <= uniqueness_parameters.most_mixed;
+    const bool all = m <= uniqueness_parameters.max_mixed_laws;
     for (int mixture = 1; mixture < (all ? 1 << m : m + 1); ++mixture) {
         MatX other = J;
         VecX mirrored = VecX::Zero(u.n);

@@ -7,7 +7,7 @@ namespace pn {
 
 struct UniquenessParameters {
     double difference_step = 1e-7;  // relative to the unknowns: square root of the rounding, with a margin
-    int most_mixed = 6;             // more laws mirror one branch at a time instead of all combinations
+    int max_mixed_laws = 6;         // more laws mirror one branch at a time instead of all combinations
     double same_solution = 1e-9;    // relative residual at which a point is a solution
     double other_solution = 1e-6;   // relative distance beyond which two solutions differ
     double near_motion = 1e-6;      // tolerance between solutions of the arrays and motions, relative to the unknowns
@@ -25,7 +25,7 @@ inline constexpr UniquenessParameters uniqueness_parameters{};
 void decide(Unknowns& unknowns, const ReactionEquation& equation, const VecX& start, VecX& y, bool solved);
 
 // Solve with all zero-load sets after one of them had no solution. y becomes the solution nearest to `start` in any
-// set. If there is none, throw `failure`.
+// set. If no set has a solution, throw `failure`.
 void decide_over_pieces(Unknowns& unknowns, const VecX& start, VecX& y, const Failure& failure);
 
 // Search for other solutions with user functions among the unknowns. J is dg/dy at y. Throws a failure if the

@@ -52,7 +52,7 @@ void Unknowns::image(const VecX& y, VecX& g) {
 }
 
 double Unknowns::rounding() const {
-    if (!shares_pressing(p, w)) return 0.0;
+    if (!shares_contact_loads(p, w)) return 0.0;
     double factor = 0.0;
     each([&](size_t e) { factor = std::max(factor, limit_under(p, w, static_cast<int>(e), 1.0)); },
          [](const UserLaw&) {});
@@ -61,7 +61,7 @@ double Unknowns::rounding() const {
 
 bool Unknowns::is_motion(const VecX& y) {
     if (p.gaps.empty()) return true;
-    const FreeLoads free(w);
+    const ReleasedZeroLoads free(w);
     VecX g(n);
     image(y, g);
     const double size = g.cwiseAbs().maxCoeff() + y.head(n).cwiseAbs().maxCoeff();

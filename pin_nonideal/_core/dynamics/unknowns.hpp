@@ -12,7 +12,7 @@ struct UnknownsParameters {
     double zero_load_set_rounding = 1e-11;
     // Rounding of shared loads, relative to the largest multiplier.
     double shared_rounding = 1e-13;
-    // Maximum steps of Newton's method for y = g(y).
+    // Maximum number of steps of Newton's method for y = g(y).
     int max_newton = 30;
 };
 

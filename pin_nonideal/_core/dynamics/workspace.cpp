@@ -14,7 +14,7 @@ static void size(const Program& p, RunState& state) {
     state.closed.assign(p.gaps.size(), 0);
     state.slip_direction.assign(elements, Vec3::UnitX());
     state.last_direction = state.slip_direction;
-    state.lingers.assign(p.frictions.size(), 0);
+    state.is_sticking_deferred.assign(p.frictions.size(), 0);
     state.z = VecX::Zero(p.states);
     state.held_torque = VecX::Zero(p.mechanism.nv);
     state.unknown = VecX::Zero(p.unknowns());
@@ -32,7 +32,7 @@ static void size(const Program& p, Evaluation& now) {
         *x = VecX::Zero(nv);
     now.values.resize(p.blocks.size());
     for (size_t i = 0; i < p.blocks.size(); ++i) now.values[i].resize(p.blocks[i].kind, nv);
-    now.idle.assign(p.blocks.size(), 0);
+    now.is_inactive.assign(p.blocks.size(), 0);
     now.selected.assign(p.gaps.size(), 1);
     now.awake.resize(p.blocks.size());
     now.touching.resize(p.gaps.size());
@@ -89,12 +89,12 @@ static void select_contacts(const Program& p, Workspace& w) {
         if (closed) w.now.touching.push_back(static_cast<int>(i));
         if (closed == w.now.selected[i]) continue;
         w.now.selected[i] = closed;
-        w.now.idle[p.gaps[i].block] = !closed;
-        for (int e : p.gaps[i].elements) w.now.idle[p.frictions[e].block] = !closed;
+        w.now.is_inactive[p.gaps[i].block] = !closed;
+        for (int e : p.gaps[i].elements) w.now.is_inactive[p.frictions[e].block] = !closed;
     }
     w.now.awake.clear();
     for (size_t i = 0; i < p.blocks.size(); ++i)
-        if (!w.now.idle[i]) w.now.awake.push_back(static_cast<int>(i));
+        if (!w.now.is_inactive[i]) w.now.awake.push_back(static_cast<int>(i));
 }
 
 void select_rows(const Program& p, Workspace& w) {
@@ -123,7 +123,7 @@ void select_rows(const Program& p, Workspace& w) {
             for (size_t k = 0; k < block.kept.size(); ++k) w.now.rows.required[block.row + k] = 1;
     }
     w.now.rows.use_required(p.layout, p.blocks, w.now.awake);
-    w.state.ideal_decided = false;
+    w.state.has_ideal_row_choice = false;
     w.state.rank_tolerance = rank_tolerance_sticking;
 }
 
@@ -133,7 +133,7 @@ void set_modes(const Program& p, Workspace& w, const std::vector<Mode>& modes) {
         if (modes[e] != unloaded && is_open(p, w, static_cast<int>(e))) w.state.mode.values_[e] = unloaded;
         if (w.state.mode[e] == unloaded) w.now.slip_force[e] = Vec3::Zero();
     }
-    w.state.steps_since = never_decided;
+    w.state.steps_since = undecided_steps;
     w.now.renew();
     select_rows(p, w);
 }

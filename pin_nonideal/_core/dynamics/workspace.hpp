@@ -15,7 +15,8 @@
 
 namespace pn {
 
-// Maximum iterations of a projection, each with stored multipliers. Newton's method takes three if it converges well.
+// Maximum number of iterations of a projection, each with stored multipliers. Newton's method takes three if it
+// converges well.
 constexpr int projection_limit = 12;
 
 // Rank tolerance while elements stick. A direction held by a smaller part of their forces counts as free. It is the
@@ -29,7 +30,7 @@ struct Counters {
 
 // Uniqueness of the motion under the laws. It is never proven if user functions are among the laws.
 enum class Uniqueness : signed char { shown, not_shown, several };
-constexpr int never_decided = 1 << 30;
+constexpr int undecided_steps = 1 << 30;
 
 // Data that the next step needs from earlier steps, besides the state (q, v) and the choice of independent rows.
 struct RunState {
@@ -37,7 +38,7 @@ struct RunState {
     std::vector<char> closed;  // closed contacts, by gap (change them by set_closed only)
     // Slip directions of elements with two or three directions: at the step's start, and the last well-defined one.
     std::vector<Vec3> slip_direction, last_direction;
-    std::vector<char> lingers;  // keeps its slip mode at rest: only rounding decides the direction
+    std::vector<char> is_sticking_deferred;  // keeps its slip mode at rest: only rounding decides the direction
     bool seeks_directions = false;  // steps solve for last_direction: slip is too slow to define it
     bool indeterminate = false;   // sticking elements are hyperstatic: their multipliers are not unique
     double rank_tolerance = rank_tolerance_sticking;  // tolerance of the rows while elements stick, in these modes
@@ -48,10 +49,10 @@ struct RunState {
     bool warm = false;
     VecX percussion;  // impulses of contacts and friction in the last time step, by row and divided by its length
     VecX third_order_lam;         // third-order multipliers of the step, divided by its cubed length
-    bool ideal_decided = false;   // rows that are independent without sticking elements are chosen for this step
+    bool has_ideal_row_choice = false;   // rows that are independent without sticking elements are chosen for this step
     Uniqueness unique = Uniqueness::shown;  // uniqueness of the motion in these modes, as last decided
     double growth = 0.0;                    // bound on the growth of the implicit reaction equation at that decision
-    int steps_since = never_decided;        // steps since that decision
+    int steps_since = undecided_steps;        // steps since that decision
 
     bool sticks_anywhere() const { return std::find(mode.begin(), mode.end(), sticking) != mode.end(); }
 };
@@ -60,11 +61,11 @@ struct RunState {
 struct Reactions {
     bool current = false;  // computed for the current motion
     bool swept = false;    // joint reactions are computed too
-    bool presses = true;   // all unilateral contacts with redundant loads can be in compression
+    bool loads_are_feasible = true;   // all unilateral contacts with redundant loads can be in compression
     // Unilateral contacts with zero load, chosen so that no contact that shares their load has tension. While this set
     // is frozen, loads are linear in the motion, and tension is possible.
     std::vector<char> unloaded;
-    bool holds_unloaded = false;
+    bool is_zero_load_set_frozen = false;
     VecX lam;              // by kept row, minimum norm among redundant rows
     std::vector<Force> body;  // external forces on each body, later the sums of its subtree
     std::vector<Motion> motion;
@@ -84,7 +85,7 @@ struct Evaluation {
     }
     double row_time(double t) const { return t < not_before ? not_before : t > not_after ? not_after : t; }
     std::vector<RowValues> values;  // by block
-    std::vector<char> idle;  // blocks of open contacts, which are neither rows nor evaluated
+    std::vector<char> is_inactive;  // blocks of open contacts, which are neither rows nor evaluated
     std::vector<int> awake;              // the other blocks
     std::vector<int> touching;           // closed gaps
     std::vector<char> selected;          // closed flags by gap, at the last selection of rows
@@ -102,7 +103,7 @@ struct Evaluation {
     Reactions reactions;
     VecX holding;                     // M a - F - C - A^T lam: forces that hold the locked dofs
     bool has_holding = false;
-    bool ideal = false;               // the motion is that of the ideal constraints alone
+    bool ideal = false;               // the motion is due to the ideal constraints alone
     std::vector<SlipLimits> load;     // limits at rest before the static ratio
     std::vector<double> limit;        // kinetic limit of each element
     std::vector<Vec3> slip_force;     // force of each slipping element, along its directions
@@ -126,7 +127,8 @@ struct Evaluation {
 struct Scratch {
     VecX scaled, scaled_free, trial, work, r, residual, lam_step;
     std::vector<char> ideal_locked;
-    // Projection of a position: state of the factorization, multipliers from there, and steps of the multipliers.
+    // Projection of a position: state of the factorization, multipliers of the move from this state, and steps of the
+    // multipliers.
     VecX position_start, position_lam;
     std::vector<VecX> position_lam_steps;
     VecX unknown, image, shifted;  // implicit reaction equation

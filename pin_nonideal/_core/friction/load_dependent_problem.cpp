@@ -51,7 +51,7 @@ void RestProblem::describe(size_t i, bool resting) {
     RestElement e;
     e.dim = f.dim;
     if (i > 0) e.row = equation.elements.back().row + equation.elements.back().dim;
-    e.directed = f.gap >= 0 && f.load == Friction::Load::multiplier && shares_pressing(p, w);
+    e.directed = f.gap >= 0 && f.load == Friction::Load::multiplier && shares_contact_loads(p, w);
     const SlipLimits known = f.reaction == Reaction::total ? SlipLimits(f.constant) : w.now.load[problem_.elements[i]];
     e.constant = known.reach();
     e.middle = known.middle();
@@ -90,7 +90,7 @@ void RestProblem::collect_loads() {
         }
         return out;
     };
-    const HeldPiece piece(p, w);
+    const FrozenZeroLoads piece(p, w);
     move(VecX::Zero(equation.n));
     equation.still = collect();
     equation.loads.resize(rows, equation.n);
@@ -140,7 +140,7 @@ void RestProblem::enter_piece(const VecX& x) {
 }
 
 void RestProblem::enter_piece(const std::vector<char>& unloaded) {
-    const HeldPiece piece(w, unloaded);
+    const FrozenZeroLoads piece(w, unloaded);
     collect_loads();
 }
 

@@ -22,7 +22,7 @@ public:
 
     // Acceleration under forces x, if no law is a user function.
     VecX acceleration(const VecX& x) const { return without_ + problem_.response * x; }
-    bool has_pieces() const { return equation.loads.rows() > 0 && shares_pressing(p, w); }
+    bool has_pieces() const { return equation.loads.rows() > 0 && shares_contact_loads(p, w); }
     // Check if forces x give a consistent motion. Then no unilateral contact has tension, and shared loads are
     // consistent with the zero-load set of the equation. enter_piece sets up the equation for the zero-load set of x,
     // or for a given set.

@@ -43,7 +43,7 @@ struct EachChoice {
     void move(const std::vector<Mode>& modes) {
         set_modes(p, w, modes);
         w.state.warm = false;
-        w.state.steps_since = never_decided;
+        w.state.steps_since = undecided_steps;
         begin_step(p, w, t, q, v);
     }
 

@@ -8,9 +8,9 @@
 namespace pn {
 
 // Select the only modes whose motion satisfies their own conditions. Among several select the modes in which every
-// element sticks that sticks in any other. Return false if there are none but other choices may have a motion. Throw a
-// paradox if no motion exists, or if no motion has all the sticking elements of the others. The workspace ends in the
-// selected motion.
+// element sticks that sticks in any other. Return false if no tried modes satisfy them but other choices may have a
+// motion. Throw a paradox if no motion exists, or if no motion has all the sticking elements of the others. On return
+// the workspace holds the selected motion.
 bool take_only_choice(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, const ModeQuestion& question);
 
 }  // namespace pn

@@ -24,7 +24,7 @@ ModeQuestion question(const Program& p, Workspace& w, const VecX& v, int also) {
     ModeQuestion asked{w.state.mode, {}, {}};
     for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
         if (is_open(p, w, e)) continue;
-        if (e != also && !at_rest(p, w, e, v) && !w.state.lingers[e]) {
+        if (e != also && !at_rest(p, w, e, v) && !w.state.is_sticking_deferred[e]) {
             follow_velocity(p, w, e, asked);
             continue;
         }

@@ -13,7 +13,7 @@ struct ModeQuestion {
     // Elements at rest that just reached their limit: they slip at the limit even with zero acceleration.
     std::vector<int> breaking;
     bool several = false;       // another motion than the answer is known
-    bool answered = false;      // `modes` belong to a motion solved with all contacts
+    bool is_solved_jointly = false;      // `modes` belong to a motion solved with all contacts
     std::vector<Vec3> near;     // friction of all elements in a nearby motion, if known
 };
 

@@ -33,7 +33,8 @@ std::optional<int> change_modes(const Program& p, Workspace& w, double t, const 
 
 }  // namespace
 
-bool go_on(const Program& p, Workspace& w, double t, VecX& q, VecX& v, const ModeQuestion& question, int element) {
+bool try_previous_modes(const Program& p, Workspace& w, double t, VecX& q, VecX& v, const ModeQuestion& question,
+                        int element) {
     const bool breaks = !question.breaking.empty();
     // An element starts to slip alone only if no other rows hold the same freedom.
     const bool alone = p.frictions[element].dim == 1 && question.breaking.size() == 1 && !w.now.rows.redundant;

@@ -21,7 +21,8 @@ inline constexpr ModeUpdateParameters mode_update_parameters{};
 
 // Try these modes at (q, v), projected onto the required rows. The element of the event sticks, or slips if it was
 // sticking and reached its limit. Modes with violated conditions are changed for a few rounds. Return true if all
-// conditions hold: then the workspace is evaluated there. Otherwise q and v are restored.
-bool go_on(const Program& p, Workspace& w, double t, VecX& q, VecX& v, const ModeQuestion& question, int element);
+// conditions hold. The workspace is then evaluated with these modes. Otherwise q and v are restored.
+bool try_previous_modes(const Program& p, Workspace& w, double t, VecX& q, VecX& v, const ModeQuestion& question,
+                        int element);
 
 }  // namespace pn

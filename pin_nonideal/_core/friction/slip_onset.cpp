@@ -48,7 +48,7 @@ std::vector<Mode> modes_of(Workspace& w, const ModeQuestion& question, const Fri
                            const FrictionLimits& limits) {
     const VecX alpha = problem.alpha0 + problem.W * f, from_middle = f - limits.middle;
     const double noise = relative_acceleration_rounding * problem.alpha0.cwiseAbs().maxCoeff();
-    const double slowest = slip_onset_parameters.max_acceleration * problem.alpha0.cwiseAbs().maxCoeff();
+    const double min_onset = slip_onset_parameters.max_acceleration * problem.alpha0.cwiseAbs().maxCoeff();
     std::vector<Beginning> all;
     VecX onset;
     for (size_t i = 0, at = 0; i < question.at_rest.size(); at += problem.dims[i], ++i) {
@@ -57,15 +57,15 @@ std::vector<Mode> modes_of(Workspace& w, const ModeQuestion& question, const Fri
         const bool broken = breaks(question, question.at_rest[i], force, limits[i]);
         const bool slides =
             force.norm() >= limits[i] * (1.0 - slip_onset_parameters.limit_rounding) && slip.norm() > noise;
-        const bool slowly =
-            dim > 1 ? force.norm() >= limits[i] * (1.0 - slip_onset_parameters.limit_slack) && slip.norm() < slowest
+        const bool is_slow =
+            dim > 1 ? force.norm() >= limits[i] * (1.0 - slip_onset_parameters.limit_slack) && slip.norm() < min_onset
                     : broken && !slides;
-        if (slowly && onset.size() == 0)
+        if (is_slow && onset.size() == 0)
             onset = onset_accelerations(problem.W, problem.alpha0, problem.dims, limits);
         const double response = problem.W.diagonal().segment(at, dim).sum() / dim;
         const bool by_force = slides && force.norm() * response > slip.norm();
-        const VecX begins = slowly ? VecX(onset.segment(at, dim)) : by_force ? VecX(-force) : slip;
-        all.push_back({force, begins, slides, (slides || slowly) && begins.norm() > noise, broken});
+        const VecX begins = is_slow ? VecX(onset.segment(at, dim)) : by_force ? VecX(-force) : slip;
+        all.push_back({force, begins, slides, (slides || is_slow) && begins.norm() > noise, broken});
     }
     return modes_of(w, question, all);
 }
@@ -75,7 +75,7 @@ std::vector<Mode> modes_of(Workspace& w, const ModeQuestion& question, const Res
     FrictionLimits limits;
     equation.respond(x, alpha, limits);
     const VecX from_middle = x - limits.middle;
-    const double noise = relative_acceleration_rounding + slip_onset_parameters.unsolved * equation.error(x);
+    const double noise = relative_acceleration_rounding + slip_onset_parameters.residual_to_acceleration * equation.error(x);
     std::vector<Beginning> all;
     for (size_t i = 0; i < question.at_rest.size(); ++i) {
         const RestElement& e = equation.elements[i];
@@ -84,13 +84,13 @@ std::vector<Mode> modes_of(Workspace& w, const ModeQuestion& question, const Res
         const bool at_its_limit =
             force.norm() >= limits[i] * (1.0 - slip_onset_parameters.limit_rounding) ||
             (force - e.rho * slip).norm() > limits[i] * (1.0 + slip_onset_parameters.limit_rounding);
-        const double in_play = equation.force_in_play(i, x, limits);
-        const bool slides = !e.may_stick || (at_its_limit && e.rho * slip.norm() > noise * in_play);
-        const bool slowly = broken && !slides;
-        if (slowly && onset.size() == 0) onset = onset_accelerations(equation, x);
+        const double acceleration_scale = equation.force_in_play(i, x, limits);
+        const bool slides = !e.may_stick || (at_its_limit && e.rho * slip.norm() > noise * acceleration_scale);
+        const bool is_slow = broken && !slides;
+        if (is_slow && onset.size() == 0) onset = onset_accelerations(equation, x);
         const bool by_force = slides && e.may_stick && force.norm() > e.rho * slip.norm();
-        const VecX begins = slowly ? VecX(onset.segment(e.row, e.dim)) : by_force ? VecX(-force) : slip;
-        const bool told = slides || (slowly && e.rho * begins.norm() > relative_acceleration_rounding * in_play);
+        const VecX begins = is_slow ? VecX(onset.segment(e.row, e.dim)) : by_force ? VecX(-force) : slip;
+        const bool told = slides || (is_slow && e.rho * begins.norm() > relative_acceleration_rounding * acceleration_scale);
         all.push_back({force, begins, slides, told, broken});
     }
     return modes_of(w, question, all);

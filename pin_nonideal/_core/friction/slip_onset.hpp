@@ -9,10 +9,10 @@
 namespace pn {
 
 struct SlipOnsetParameters {
-    double unsolved = 10.0;          // factor from the residual of the equation to the error of accelerations
-    double max_acceleration = 1e-6;  // accelerations below this fraction are slip onset exactly at a limit
-    double limit_rounding = 1e-13;   // rounding relative to a limit
-    double limit_slack = 1e-9;       // allowed violation of a mode's condition, relative to a limit
+    double residual_to_acceleration = 10.0;  // factor from the residual of the equation to the error of accelerations
+    double max_acceleration = 1e-6;          // accelerations below this fraction are slip onset exactly at a limit
+    double limit_rounding = 1e-13;           // rounding relative to a limit
+    double limit_slack = 1e-9;               // allowed violation of a mode's condition, relative to a limit
 };
 
 inline constexpr SlipOnsetParameters slip_onset_parameters{};

@@ -34,7 +34,7 @@ struct Search {
     const std::vector<int>& list;  // elements at rest
     std::vector<int> slipping;     // slipping elements with load-dependent limits
     RestMotions motions;           // those of load-dependent limits
-    bool presses = true;           // the motion of the iteration has no contact in tension
+    bool loads_are_feasible = true;           // the motion of the iteration has no contact in tension
 
     Search(const Program& program, Workspace& workspace, double time, const VecX& q_, const VecX& v_,
            const ModeQuestion& asked)
@@ -57,7 +57,7 @@ struct Search {
     }
 
     // Check if the motion of the suggested modes satisfies their conditions. The motion is then unique, because no
-    // limit depends on the load. The workspace ends evaluated there.
+    // limit depends on the load. On return the workspace is evaluated at this motion.
     bool keeps_suggestion() {
         if (p.needs_reactions || !question.breaking.empty()) return false;
         try {
@@ -117,8 +117,9 @@ struct Search {
             const Friction& friction = p.frictions[list[i]];
             SlipLimits now = static_limits(p, w, list[i], t, q, v);
             if (modes[list[i]] != sticking) now = w.now.load[list[i]] * friction.speed_factor(0.0);
-            const double missed = std::max(std::abs(now.reach() - limits[i]), std::abs(now.middle() - limits.middle[at]));
-            change = std::max(change, missed / std::max({now.reach(), least, min_scale}));
+            const double limit_change =
+                std::max(std::abs(now.reach() - limits[i]), std::abs(now.middle() - limits.middle[at]));
+            change = std::max(change, limit_change / std::max({now.reach(), least, min_scale}));
             limits.size[i] = now.reach();
             limits.middle[at] = now.middle();
         }
@@ -171,7 +172,7 @@ struct Search {
     }
 
     void run() {
-        if (question.answered) {
+        if (question.is_solved_jointly) {
             apply(question.modes, false);
             w.now.several = question.several;
             w.now.several_element = list.front();
@@ -184,7 +185,7 @@ struct Search {
         try {
             unload(false);
             found = take_turns(modes);
-            presses = !found || reactions(p, w).presses;
+            loads_are_feasible = !found || reactions(p, w).loads_are_feasible;
         } catch (const Failure& failure) {  // elements at rest do not have their final forces here
             if (failure.kind != Failure::Kind::paradox) throw;
         }
@@ -195,7 +196,7 @@ struct Search {
 
     // Check if the iteration may have lowered a limit too early: an element that slips in one iterate gets its kinetic
     // limit.
-    bool released_early(const std::vector<Mode>& modes) const {
+    bool is_released_early(const std::vector<Mode>& modes) const {
         return std::any_of(list.begin(), list.end(), [&](int e) {
             const Friction& friction = p.frictions[e];
             return slips(modes[e]) && friction.holding_limit(1.0) > friction.kinetic_limit(1.0, 0.0);
@@ -205,18 +206,18 @@ struct Search {
     // Search further if loads may allow several motions or none, or if the iteration gave no reliable motion. Return true
     // if the search found the motion.
     bool look_further(bool found, const std::vector<Mode>& turned) {
-        const bool trusted = found && presses && !released_early(turned);
+        const bool is_reliable = found && loads_are_feasible && !is_released_early(turned);
         const bool slid = !found || std::any_of(list.begin(), list.end(), [&](int e) { return turned[e] != sticking; });
         unload(true);
         RestProblem problem(p, w, t, q, v, list, slipping);
         RestEquation& equation = problem.equation;
-        if (trusted && contraction(equation) < 1.0) return false;
+        if (is_reliable && contraction(equation) < 1.0) return false;
         VecX x;
         // A complete search includes this motion. If all elements hold, no other motion has more sticking elements.
         const bool all_known = is_searched(equation) && !problem.has_pieces();
         if (slid && !all_known && equation.loaded()) {
             if (motions.hold(problem, x)) {
-                w.now.several = trusted;
+                w.now.several = is_reliable;
                 w.now.several_element = list.front();
                 std::vector<Mode> modes = question.modes;
                 for (int e : list) modes[e] = sticking;
@@ -225,7 +226,7 @@ struct Search {
             }
             if (problem.has_pieces()) problem.enter_piece(VecX::Zero(equation.n));
         }
-        if (trusted && !is_searched(equation)) return false;
+        if (is_reliable && !is_searched(equation)) return false;
         x = VecX::Zero(equation.n);
         bool solved = motions.find(problem, x), one_limit = true;
         if (!solved && !question.near.empty()) {
@@ -238,7 +239,7 @@ struct Search {
         }
         while (solved && release(problem, equation, modes_of(w, question, equation, x)))
             solved = motions.find(problem, x);
-        if (trusted && !(motions.are_complete() && solved)) return false;
+        if (is_reliable && !(motions.are_complete() && solved)) return false;
         if (!solved && motions.are_complete() && one_limit && !found)
             motions.paradox(problem, std::min(0.0, equation.determinant_far_away()), {});
         if (solved) settle(equation, x, modes_of(w, question, equation, x));

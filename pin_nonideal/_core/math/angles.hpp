@@ -9,8 +9,8 @@
 
 namespace pn {
 
-// Norm of four angles [rad] from which the system's library computes them. Below it n is exact. The products of n with
-// the first two parts of pi/2 (33 bits each) are exact too.
+// Norm of four angles [rad] above which the system's library computes their cosines and sines. Below it n is exact. The
+// products of n with the first two parts of pi/2 (33 bits each) are exact too.
 constexpr double farthest_reduced = 8e5;
 
 PN_INLINE void cosines_and_sines(const Lanes& x, Lanes& c, Lanes& s) {
@@ -39,9 +39,9 @@ PN_INLINE void cosines_and_sines(const Lanes& x, Lanes& c, Lanes& s) {
     const Lanes q = (0.0416666666666666 + z * -0.0013888888888874138) +
                     zz * ((2.4801587289491888e-05 + z * -2.755731435525016e-07) +
                           zz * (2.087572368463225e-09 + z * -1.1359669841303579e-11));
-    const Lanes half = 0.5 * z, most = 1.0 - half;
-    const Lanes sine = r + (r * z * p + low * most);
-    const Lanes cosine = most + (((1.0 - most) - half) + (zz * q - r * low));
+    const Lanes half = 0.5 * z, one_less_half = 1.0 - half;
+    const Lanes sine = r + (r * z * p + low * one_less_half);
+    const Lanes cosine = one_less_half + (((1.0 - one_less_half) - half) + (zz * q - r * low));
 
     // Quadrants: an odd n swaps cosine and sine. The second bit of n + 1 is the sign of the cosine, and that of n the
     // sign of the sine.

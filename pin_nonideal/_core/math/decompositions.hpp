@@ -14,7 +14,7 @@ class Cholesky {
 public:
     // Return false if A is not positive definite to rounding. L is then undefined.
     bool compute(const MatX& A);
-    // Matrix with L in its lower triangle. The entries above the diagonal are those of A.
+    // Matrix with L in its lower triangle. The entries above the diagonal equal the entries of A.
     const MatX& factor() const { return factor_.matrixLLT(); }
     // Solve A x = b. Allocates nothing if x has the right size.
     void solve(const VecX& b, VecX& x) const;
@@ -25,7 +25,8 @@ private:
     Eigen::LLT<MatX> factor_;
 };
 
-// Factorization P A = L U of a square matrix with partial pivoting. A singular A gives infinite numbers, not an error.
+// Factorization P A = L U of a square matrix with partial pivoting. If A is singular, the results are infinite, and no
+// error is raised.
 class LU {
 public:
     void compute(const MatX& A);

@@ -14,8 +14,8 @@ namespace {
 // Least-squares solutions over a set of columns, which changes by one column at a time. [Lawson, Hanson, ch. 24.]
 class ColumnSet {
 public:
-    ColumnSet(Eigen::Index rows, Eigen::Index most)
-        : Q_(rows, std::min(rows, most)), R_(MatX::Zero(Q_.cols(), Q_.cols())) {}
+    ColumnSet(Eigen::Index rows, Eigen::Index max_columns)
+        : Q_(rows, std::min(rows, max_columns)), R_(MatX::Zero(Q_.cols(), Q_.cols())) {}
 
     // Append a column. Return false if the set spans it.
     bool append(const VecX& column) {
@@ -82,7 +82,7 @@ VecX nonnegative_least_squares(const MatX& A, const VecX& b) {
     const double size = n > 0 ? A.cwiseAbs().maxCoeff() : 0.0, size_of_b = b.norm();
     VecX x = VecX::Zero(n);
     std::vector<int> used;
-    std::vector<char> refused(n, 0), is_used(n, 0);
+    std::vector<char> is_rejected(n, 0), is_used(n, 0);
     ColumnSet columns(A.rows(), n);
     for (int pass = 0; pass < nnls_parameters.exchanges * n; ++pass) {
         const VecX residual = b - A * x, descent = A.transpose() * residual;
@@ -90,11 +90,11 @@ VecX nonnegative_least_squares(const MatX& A, const VecX& b) {
         int best = -1;
         double steepest = 0.0;
         for (int j = 0; j < n; ++j) {
-            if (refused[j] || is_used[j] || !(descent[j] > rounding * lengths[j])) continue;
+            if (is_rejected[j] || is_used[j] || !(descent[j] > rounding * lengths[j])) continue;
             if (descent[j] > steepest * lengths[j]) { steepest = descent[j] / lengths[j]; best = j; }
         }
         if (best < 0) break;
-        refused[best] = 1;  // unless its number is positive, also in rounding
+        is_rejected[best] = 1;  // unless its number is positive, also in rounding
         if (!columns.append(A.col(best))) continue;
         used.push_back(best);
         VecX s = columns.solve(b);
@@ -122,7 +122,7 @@ VecX nonnegative_least_squares(const MatX& A, const VecX& b) {
             x[used[k]] = s[k];
             is_used[used[k]] = 1;
         }
-        std::fill(refused.begin(), refused.end(), char(0));
+        std::fill(is_rejected.begin(), is_rejected.end(), char(0));
     }
     return x;
 }
@@ -156,15 +156,15 @@ static std::vector<char> binding(const MatX& Z, const VecX& N) {
     return found;
 }
 
-Nonnegative shortest_nonnegative(const MatX& Z, const VecX& N) {
-    Nonnegative found{VecX::Zero(Z.cols()), std::vector<char>(N.size(), 0), true};
+NonnegativeSum shortest_nonnegative(const MatX& Z, const VecX& N) {
+    NonnegativeSum found{VecX::Zero(Z.cols()), std::vector<char>(N.size(), 0), true};
     const auto violated = [&](double allowed) { return (N + Z * found.z).minCoeff() < -allowed; };
     const auto noise = [&] { return nnls_parameters.met_rounding * (largest(N) + largest(found.z)); };
     if (N.size() == 0 || !violated(0.0)) return found;
     found.held = binding(Z, N);
     found.z = shortest_with_zeros(Z, N, found.held);
-    found.met = !violated(noise());
-    if (found.met) return found;
+    found.is_feasible = !violated(noise());
+    if (found.is_feasible) return found;
     const VecX violation = least_violation(Z, N);
     found.held = binding(Z, N + violation + VecX::Constant(N.size(), nnls_parameters.binding_slack * largest(N)));
     for (int i = 0; i < N.size(); ++i)
@@ -173,10 +173,10 @@ Nonnegative shortest_nonnegative(const MatX& Z, const VecX& N) {
     return found;
 }
 
-LargestLeast largest_least(const MatX& Z, const VecX& N) {
+MaxMin max_min(const MatX& Z, const VecX& N) {
     const double size = largest(N);
     double value = N.maxCoeff() + std::max(size, min_scale);  // above any weighted mean of N
-    LargestLeast found{size, VecX()};
+    MaxMin found{size, VecX()};
     for (int cut = 0; cut < nnls_parameters.most_cuts; ++cut) {
         const VecX violation = least_violation(Z, (N.array() - value).matrix());
         if (largest(violation) <= nnls_parameters.met_rounding * size) break;  // smaller violations are rounding

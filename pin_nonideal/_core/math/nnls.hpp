@@ -21,7 +21,7 @@ struct NnlsParameters {
     int orthogonal_passes = 2;
     // Maximum number of exchanges per column. The method is finite and takes about one. Further exchanges are rounding.
     int exchanges = 10;
-    int most_cuts = 50;  // updates of the bound in largest_least, each exact for the binding numbers
+    int most_cuts = 50;  // updates of the bound in max_min, each exact for the binding numbers
 };
 
 inline constexpr NnlsParameters nnls_parameters{};
@@ -35,15 +35,15 @@ VecX least_violation(const MatX& Z, const VecX& N);
 // Compute the shortest z that makes the marked numbers zero, or as near to zero as possible.
 VecX shortest_with_zeros(const MatX& Z, const VecX& N, const std::vector<char>& zero);
 
-// Shortest z with N + Z z >= 0, or with the least violation if no z is feasible (`met` is false). `held` marks the
+// Shortest z with N + Z z >= 0, or with the least violation if no z is feasible (`is_feasible` is false). `held` marks the
 // numbers at zero: z is the shortest vector with these numbers at zero.
-struct Nonnegative { VecX z; std::vector<char> held; bool met; };
-Nonnegative shortest_nonnegative(const MatX& Z, const VecX& N);
+struct NonnegativeSum { VecX z; std::vector<char> held; bool is_feasible; };
+NonnegativeSum shortest_nonnegative(const MatX& Z, const VecX& N);
 
 // Largest s for which some z gives N + Z z >= s. `weight` marks the numbers that bind together: weight >= 0, Z^T
 // weight = 0, sum(weight) = 1 and s = weight . N. If s has no bound, `value` is the largest entry of |N| and `weight`
 // is empty.
-struct LargestLeast { double value; VecX weight; };
-LargestLeast largest_least(const MatX& Z, const VecX& N);
+struct MaxMin { double value; VecX weight; };
+MaxMin max_min(const MatX& Z, const VecX& N);
 
 }  // namespace pn

@@ -65,7 +65,7 @@ inline double lower_bound_inside(double u0, double a0, double u1, double a1) {
 }
 
 // Return the least extremum of the same cubic inside (0, 1), or HUGE_VAL if there is none.
-inline double least_inside(double u0, double a0, double u1, double a1) {
+inline double min_inside(double u0, double a0, double u1, double a1) {
     // u' = a0 + 2 b x + 3 c x^2
     const double b = 3.0 * (u1 - u0) - 2.0 * a0 - a1, c = a0 + a1 - 2.0 * (u1 - u0);
     const double root = std::sqrt(b * b - 3.0 * a0 * c);  // NaN: no extremum
@@ -87,7 +87,7 @@ inline double rise_between(double t0, double u0, double t1, double u1, double t2
 }
 
 // Return a point between a and b at which the margin is negative, by golden sections toward its minimum. `value` is the
-// margin there. Returns b if no such point is found.
+// margin at this point. Returns b if no such point is found.
 template <class Margin>
 double dip_between(double a, double b, const Margin& margin, double& value) {
     constexpr double golden = 0.3819660112501051;

@@ -25,7 +25,7 @@ struct Vec3 {
     PN_INLINE Vec3(double a, double b, double c) : x{a, b, c, 0.0} {}
     template <class Derived>
     Vec3(const Eigen::MatrixBase<Derived>& v) : x{v[0], v[1], v[2], 0.0} {}
-    // Copies written by hand: such a class is passed in memory, in both versions of a wide function.
+    // Copies are written by hand, so that both versions of a wide function pass the vector in memory.
     PN_INLINE Vec3(const Vec3& o) : x(o.x) {}
     PN_INLINE Vec3& operator=(const Vec3& o) { x = o.x; return *this; }
 
@@ -55,7 +55,7 @@ PN_INLINE Vec3 operator*(const Vec3& a, double s) { return Vec3(a.x * s); }
 PN_INLINE Vec3 operator/(const Vec3& a, double s) { return Vec3(a.x / s); }
 
 // Return the components in the order y, z, x.
-PN_INLINE Vec3 turned_round(const Vec3& a) {
+PN_INLINE Vec3 cyclic_shift(const Vec3& a) {
 #if defined(__clang__)
     return Vec3(__builtin_shufflevector(a.x, a.x, 1, 2, 0, 3));
 #else
@@ -69,7 +69,7 @@ PN_INLINE Vec3 turned_round(const Vec3& a) {
 
 PN_INLINE double Vec3::dot(const Vec3& o) const { return sum(x * o.x); }
 PN_INLINE Vec3 Vec3::cross(const Vec3& o) const {
-    return turned_round(Vec3(x * turned_round(o).x - turned_round(*this).x * o.x));
+    return cyclic_shift(Vec3(x * cyclic_shift(o).x - cyclic_shift(*this).x * o.x));
 }
 PN_INLINE double Vec3::squaredNorm() const { return dot(*this); }
 PN_INLINE double Vec3::norm() const { return std::sqrt(squaredNorm()); }

@@ -1,6 +1,7 @@
-// Tolerances that several rooms of the core share. Others stand beside their algorithm.
+// Tolerances that several rooms of the core share. Other tolerances are defined beside their algorithm.
 //
-// The unit roundoff is 1e-16. Relative tolerances are multiples of it by the operations or the condition behind a value.
+// The unit roundoff is 1e-16. A relative tolerance is this roundoff times the number of operations, or times the
+// condition number of the value.
 #pragma once
 
 namespace pn {
@@ -33,7 +34,7 @@ constexpr double min_directed_speed = 1e-9;
 // --- Forces and accelerations
 // Rounding of accelerations, relative to their scale.
 constexpr double relative_acceleration_rounding = 1e-12;
-// Acceleration of a tree at rest that counts as rounding, relative to that without forces.
+// Acceleration of a tree at rest that counts as rounding, relative to the acceleration without forces.
 constexpr double tree_acceleration_rounding = 1e-9;
 // Minimum response to a force under constraints, relative to its free response. Smaller responses are rounding.
 constexpr double min_constrained_response = 1e-13;

@@ -48,10 +48,10 @@ public:
 
     const nb::object& operator()(const double* x, size_t n) {
         if (data_ == nullptr || n != size_ || Py_REFCNT(array_.ptr()) > 1) {
-            const Numbers fresh = to_numpy(x, n);
-            data_ = fresh.data();
+            const Numbers new_array = to_numpy(x, n);
+            data_ = new_array.data();
             size_ = n;
-            array_ = nb::cast(fresh);
+            array_ = nb::cast(new_array);
         } else {
             std::copy(x, x + n, data_);
         }

@@ -22,7 +22,7 @@ namespace {
 
 // Results of consecutive runs: times, configurations and velocities of their samples, concatenated. Per run also the
 // number of samples, the largest violation and the number of steps.
-struct Kept {
+struct RunSamples {
     std::vector<double> t, q, v, samples, violation, steps;
     struct Stop {
         size_t run;
@@ -46,38 +46,38 @@ struct Kept {
 
 // Array of all samples, n numbers each, by run and sample. Threads write it, because the page faults of a large array
 // take longer than the copy.
-struct Laid {
-    std::vector<double> Kept::* field;
-    size_t n, most;
+struct PaddedArray {
+    std::vector<double> RunSamples::* field;
+    size_t n, max_samples;
     double* to;
     Numbers numbers;
 
-    Laid(std::vector<double> Kept::* field, size_t n, size_t runs, size_t most)
-        : field(field), n(n), most(most), to(new double[std::max<size_t>(1, runs * most * n)]) {
+    PaddedArray(std::vector<double> RunSamples::* field, size_t n, size_t runs, size_t max_samples)
+        : field(field), n(n), max_samples(max_samples), to(new double[std::max<size_t>(1, runs * max_samples * n)]) {
         const nb::capsule owner(to, [](void* data) noexcept { delete[] static_cast<double*>(data); });
-        numbers = Numbers(to, {runs * most * n}, owner);
+        numbers = Numbers(to, {runs * max_samples * n}, owner);
     }
     // Write runs from number `first` on, with NaN after the last sample of a run.
-    void lay(const Kept& some, size_t first) const {
+    void copy(const RunSamples& some, size_t first) const {
         const double* from = (some.*field).data();
-        double* at = to + first * most * n;
+        double* at = to + first * max_samples * n;
         for (const double samples : some.samples) {
             const size_t own = static_cast<size_t>(samples) * n;
-            std::fill(std::copy_n(from, own, at), at + most * n, NAN);
+            std::fill(std::copy_n(from, own, at), at + max_samples * n, NAN);
             from += own;
-            at += most * n;
+            at += max_samples * n;
         }
     }
 };
 
 // Return one number per run.
-Numbers joined(const std::vector<Kept>& all, std::vector<double> Kept::* field) {
+Numbers joined(const std::vector<RunSamples>& all, std::vector<double> RunSamples::* field) {
     std::vector<double> out;
-    for (const Kept& some : all) out.insert(out.end(), (some.*field).begin(), (some.*field).end());
+    for (const RunSamples& some : all) out.insert(out.end(), (some.*field).begin(), (some.*field).end());
     return to_numpy(std::move(out));
 }
 
-nb::object what_stopped(const Kept::Stop& run) {
+nb::object stop_reason(const RunSamples::Stop& run) {
     if (run.failure) return failure_object(*run.failure);
     try {
         std::rethrow_exception(run.error);
@@ -92,13 +92,13 @@ nb::object what_stopped(const Kept::Stop& run) {
 // at about the same time.
 constexpr size_t draws = 32;
 
-std::vector<Kept> run_all(const Program& p, const Array2& q, const Array2& v, Options options, int threads,
-                          const std::vector<NumberTuple>& names, const Array2& values) {
+std::vector<RunSamples> run_all(const Program& p, const Array2& q, const Array2& v, Options options, int threads,
+                                const std::vector<NumberTuple>& names, const Array2& values) {
     const size_t count = q.shape(0);
     const int useful = useful_threads(count, threads);
     const size_t parts = std::min(count, draws * static_cast<size_t>(useful));
     RunPrograms programs(p, names, values, useful);
-    std::vector<Kept> kept(parts);
+    std::vector<RunSamples> kept(parts);
     std::vector<Room> rooms(useful);
     std::atomic<bool> stopped{false};
     options.tick = [&stopped](double t) {
@@ -106,7 +106,7 @@ std::vector<Kept> run_all(const Program& p, const Array2& q, const Array2& v, Op
     };
     const auto q_all = map(q), v_all = map(v);
     share_out(parts, threads, stopped, [&](size_t part, int k) {
-        Kept mine;
+        RunSamples mine;
         for (size_t i = part * count / parts; i < (part + 1) * count / parts && !stopped; ++i) {
             const Program& program = programs.of(i, k);
             rooms[k].carry(program, options, !names.empty(), q_all.row(i), v_all.row(i));
@@ -121,26 +121,28 @@ std::vector<Kept> run_all(const Program& p, const Array2& q, const Array2& v, Op
 // is a list of the stopped runs with their exceptions.
 nb::tuple rollout_arrays(const Program& p, const Array2& q, const Array2& v, const Options& options, int threads,
                          const std::vector<NumberTuple>& names, const Array2& values) {
-    std::vector<Kept> all = run_all(p, q, v, options, threads, names, values);
-    size_t most = 0;
+    std::vector<RunSamples> all = run_all(p, q, v, options, threads, names, values);
+    size_t max_samples = 0;
     nb::list stopped;
     std::vector<size_t> first{0};
-    for (const Kept& some : all) {
-        for (const double samples : some.samples) most = std::max(most, static_cast<size_t>(samples));
-        for (const Kept::Stop& each : some.stopped) stopped.append(nb::make_tuple(each.run, what_stopped(each)));
+    for (const RunSamples& some : all) {
+        for (const double samples : some.samples) max_samples = std::max(max_samples, static_cast<size_t>(samples));
+        for (const RunSamples::Stop& each : some.stopped) stopped.append(nb::make_tuple(each.run, stop_reason(each)));
         first.push_back(first.back() + some.samples.size());
     }
     const size_t runs = q.shape(0), nq = p.mechanism.nq, nv = p.mechanism.nv;
-    const Laid laid[] = {{&Kept::t, 1, runs, most}, {&Kept::q, nq, runs, most}, {&Kept::v, nv, runs, most}};
+    const PaddedArray padded[] = {{&RunSamples::t, 1, runs, max_samples},
+                                  {&RunSamples::q, nq, runs, max_samples},
+                                  {&RunSamples::v, nv, runs, max_samples}};
     std::atomic<bool> interrupted{false};
     share_out(all.size(), threads, interrupted, [&](size_t part, int) {
-        for (const Laid& each : laid) {
-            each.lay(all[part], first[part]);
+        for (const PaddedArray& each : padded) {
+            each.copy(all[part], first[part]);
             (all[part].*each.field) = {};
         }
     });
-    return nb::make_tuple(laid[0].numbers, laid[1].numbers, laid[2].numbers, joined(all, &Kept::samples),
-                          joined(all, &Kept::violation), joined(all, &Kept::steps), stopped);
+    return nb::make_tuple(padded[0].numbers, padded[1].numbers, padded[2].numbers, joined(all, &RunSamples::samples),
+                          joined(all, &RunSamples::violation), joined(all, &RunSamples::steps), stopped);
 }
 
 }  // namespace

@@ -194,15 +194,15 @@ void bind_enums(nb::module_& m) {
         .value("sticking", sticking)
         .value("slip_plus", slip_plus)
         .value("unloaded", unloaded, "carries no friction: its contact is open, or what asks does so without it");
-    nb::enum_<Shown>(m, "Shown", "What a replay shows of a constraint.")
-        .value("nothing", Shown::nothing)
-        .value("anchor", Shown::anchor)
-        .value("rod", Shown::rod)
-        .value("contact", Shown::contact)
-        .value("rolling", Shown::rolling)
-        .value("edge", Shown::edge)
-        .value("drive", Shown::drive)
-        .value("gear", Shown::gear);
+    nb::enum_<DisplayKind>(m, "DisplayKind", "Display of a constraint in a replay.")
+        .value("nothing", DisplayKind::nothing)
+        .value("anchor", DisplayKind::anchor)
+        .value("rod", DisplayKind::rod)
+        .value("contact", DisplayKind::contact)
+        .value("rolling", DisplayKind::rolling)
+        .value("edge", DisplayKind::edge)
+        .value("drive", DisplayKind::drive)
+        .value("gear", DisplayKind::gear);
     nb::enum_<ImpactLaw>(m, "ImpactLaw", "What restitution means in an impact.")
         .value("newton", ImpactLaw::newton, "rate at which a gap opens over that at which it closed")
         .value("poisson", ImpactLaw::poisson, "impulse of expansion over that of compression");

@@ -72,7 +72,7 @@ struct From<std::function<Signature>> {  // user function, or None if it is opti
 
 // Bind Builder.add_<name>(name, data...) of one kind of rows. The arguments are the declared data of the kind.
 template <class K, class... Value>
-void bind_kind(nb::class_<Builder>& builder, const Datum<K, Value>&... data) {
+void bind_kind(nb::class_<Builder>& builder, const Field<K, Value>&... data) {
     builder.def((std::string("add_") + K::name).c_str(),
         [data...](Builder& b, const std::string& name, const typename From<Value>::Given&... given) {
             K kind{};

@@ -14,7 +14,7 @@ struct ConstraintRows {
     int first, count;             // first row and number of rows, among all descriptions
     std::vector<bool> holonomic;  // per row: true for a position constraint
     bool moves_in_time;           // explicitly, or through a user function
-    Shown shown;                  // display kind in a replay
+    DisplayKind shown;                  // display kind in a replay
 };
 std::vector<ConstraintRows> constraint_rows(const Program& p);
 

@@ -27,14 +27,14 @@ Options with_events(Options options, const std::vector<UserEventTuple>& events) 
 }
 
 // Run with its options, workspace and results.
-struct Followed {
+struct ExternalRunOwner {
     std::shared_ptr<const Program> p;
     Options options;
     Workspace w;
     Recording out;
     FollowedRun run;
 
-    Followed(std::shared_ptr<const Program> program, const Options& asked, const Tick& tick,
+    ExternalRunOwner(std::shared_ptr<const Program> program, const Options& asked, const Tick& tick,
              const std::vector<UserEventTuple>& events)
         : p(std::move(program)), options(with_events(asked, events)), w(*p), run(*p, w, options, out) {
         if (tick) options.tick = [tick](double t) { (*tick)(t); };
@@ -64,23 +64,23 @@ struct Followed {
 
 void bind_followed(nb::module_& m) {
     constexpr auto own = nb::rv_policy::automatic;
-    nb::class_<Followed>(m, "FollowedRun")
+    nb::class_<ExternalRunOwner>(m, "FollowedRun")
         .def(nb::init<std::shared_ptr<const Program>, const Options&, const Tick&, const std::vector<UserEventTuple>&>(),
              "program"_a, "options"_a, "tick"_a = nb::none(), "events"_a = std::vector<UserEventTuple>())
-        .def("start", [](Followed& f, const Array& q, const Array& v) { f.run.start(map(q), map(v)); }, "q"_a, "v"_a)
-        .def("derivative", &Followed::derivative, "t"_a, "y"_a)
-        .def("jacobian", &Followed::jacobian, "t"_a, "y"_a)
-        .def("follow", &Followed::follow, "t"_a, "interpolant"_a)
-        .def("stop_before", [](Followed& f, double end) { return f.run.stop_before(end); }, "end"_a)
-        .def_prop_ro("t", [](const Followed& f) { return f.run.time(); })
-        .def_prop_ro("done", [](const Followed& f) { return f.run.done(); })
-        .def_prop_ro("y", [](const Followed& f) { return to_numpy(f.run.state()); }, own)
-        .def_prop_ro("rate", [](const Followed& f) { return to_numpy(f.run.state_rate()); }, own)
-        .def_prop_ro("singular_onset", [](Followed& f) -> std::optional<std::string> {
+        .def("start", [](ExternalRunOwner& f, const Array& q, const Array& v) { f.run.start(map(q), map(v)); }, "q"_a, "v"_a)
+        .def("derivative", &ExternalRunOwner::derivative, "t"_a, "y"_a)
+        .def("jacobian", &ExternalRunOwner::jacobian, "t"_a, "y"_a)
+        .def("follow", &ExternalRunOwner::follow, "t"_a, "interpolant"_a)
+        .def("stop_before", [](ExternalRunOwner& f, double end) { return f.run.stop_before(end); }, "end"_a)
+        .def_prop_ro("t", [](const ExternalRunOwner& f) { return f.run.time(); })
+        .def_prop_ro("done", [](const ExternalRunOwner& f) { return f.run.done(); })
+        .def_prop_ro("y", [](const ExternalRunOwner& f) { return to_numpy(f.run.state()); }, own)
+        .def_prop_ro("rate", [](const ExternalRunOwner& f) { return to_numpy(f.run.state_rate()); }, own)
+        .def_prop_ro("singular_onset", [](ExternalRunOwner& f) -> std::optional<std::string> {
             const auto e = f.run.singular_onset();
             return e ? std::optional(f.p->frictions[*e].name) : std::nullopt;
         })
-        .def("outcome", [](Followed& f) { return Outcome{f.w.counters, std::move(f.out)}; });
+        .def("outcome", [](ExternalRunOwner& f) { return Outcome{f.w.counters, std::move(f.out)}; });
 }
 
 }  // namespace pn

@@ -35,7 +35,7 @@ struct type_caster<pn::Options> {
     bool from_python(handle from, uint32_t, cleanup_list*) noexcept {
         try {
             const auto number = [&](const char* key) { return nanobind::cast<double>(from.attr(key)); };
-            const auto wanted = [&](const char* key) { return nanobind::cast<bool>(from.attr(key)); };
+            const auto flag = [&](const char* key) { return nanobind::cast<bool>(from.attr(key)); };
             value.method = pn::method_named(nanobind::cast<std::string>(from.attr("method")));
             value.t0 = number("t0");
             value.duration = number("duration");
@@ -45,10 +45,10 @@ struct type_caster<pn::Options> {
             value.max_wall = number("max_wall");
             value.max_steps = nanobind::cast<long>(from.attr("max_steps"));
             pn::read_into(from.attr("atol"), value.atol);
-            value.record = {wanted("a"), wanted("forces"), wanted("energy"), wanted("power"),
-                            wanted("laws"), wanted("reactions"), wanted("tau"), wanted("dense")};
+            value.record = {flag("a"), flag("forces"), flag("energy"), flag("power"),
+                            flag("laws"), flag("reactions"), flag("tau"), flag("dense")};
             value.continues = nanobind::cast<std::string>(from.attr("several")) == "continue";
-            value.strict = wanted("strict");
+            value.strict = flag("strict");
             return true;
         } catch (const std::exception&) {
             return false;

@@ -11,8 +11,9 @@ namespace pn {
 
 class KeptRun {
 public:
-    // Run from a state to the end, in a workspace that is reset first. `first`: run state of a new workspace. Program,
-    // workspace and options are those of the first call until `forget`. The results stay in `out` until the next call.
+    // Run from a state to the end, in a workspace that is reset first. `first`: run state of a new workspace. All calls
+    // until `forget` use the program, workspace and options of the first call. The results stay in `out` until the next
+    // call.
     void carry(const Program& p, Workspace& w, const RunState& first, const Options& options, const VecX& q0,
                const VecX& v0) {
         clear_samples();

@@ -28,7 +28,7 @@ class RunPrograms {
     const Program& of(size_t i, int thread) {
         if (own.empty()) return common;
         int column = 0;
-        for (const NumberPlace& place : places[thread])
+        for (const NumberLocation& place : places[thread])
             for (int j = 0; j < place.size; ++j) place.at[j] = values(i, column++);
         return own[thread];
     }
@@ -37,7 +37,7 @@ class RunPrograms {
     const Program& common;
     Eigen::Map<const RowMajor> values;
     std::vector<Program> own;
-    std::vector<std::vector<NumberPlace>> places;
+    std::vector<std::vector<NumberLocation>> places;
 };
 
 }  // namespace pn

@@ -37,7 +37,7 @@ Options options_of(const std::string& method, double period, double dt, double r
 }
 
 // Run with its options, workspace and results.
-struct Stepped {
+struct SteppedRunOwner {
     std::shared_ptr<const Program> p;
     double period;
     Options options;
@@ -48,8 +48,8 @@ struct Stepped {
     VecX q, v, tau;
     NumpyCopies q_out, v_out;
 
-    Stepped(std::shared_ptr<const Program> program, const std::string& method, double period_, double dt, double rtol,
-            const Array& atol)
+    SteppedRunOwner(std::shared_ptr<const Program> program, const std::string& method, double period_, double dt,
+                    double rtol, const Array& atol)
         : p(std::move(program)), period(period_), options(options_of(method, period, dt, rtol, atol)),
           w(*p), first(w.state), q(p->mechanism.nq), v(p->mechanism.nv), tau(p->mechanism.nv),
           q_out(q.size()), v_out(v.size()) {}
@@ -125,20 +125,20 @@ struct Stepped {
 }  // namespace
 
 void bind_stepped(nb::module_& m) {
-    nb::class_<Stepped>(m, "SteppedRun")
+    nb::class_<SteppedRunOwner>(m, "SteppedRun")
         .def(nb::init<std::shared_ptr<const Program>, const std::string&, double, double, double, const Array&>(),
              "program"_a, "method"_a, "period"_a, "dt"_a, "rtol"_a, "atol"_a)
-        .def("begin", &Stepped::begin, "q"_a, "v"_a, "t"_a, "tau"_a.none())
-        .def("advance", &Stepped::advance, "tau"_a.none())
-        .def("step", &Stepped::step, "q"_a, "v"_a, "t"_a, "tau"_a.none(),
+        .def("begin", &SteppedRunOwner::begin, "q"_a, "v"_a, "t"_a, "tau"_a.none())
+        .def("advance", &SteppedRunOwner::advance, "tau"_a.none())
+        .def("step", &SteppedRunOwner::step, "q"_a, "v"_a, "t"_a, "tau"_a.none(),
              nb::sig("def step(self, q: object, v: object, t: float, tau: object | None) -> "
                      "tuple[NDArray[numpy.float64], NDArray[numpy.float64]]"))
-        .def("state", &Stepped::state,
+        .def("state", &SteppedRunOwner::state,
              nb::sig("def state(self) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64]]"))
-        .def_prop_ro("begun", [](const Stepped& s) { return s.run != nullptr; })
-        .def_prop_ro("t", [](const Stepped& s) { return s.run->time(); })
-        .def_prop_ro("modes", [](const Stepped& s) { return static_cast<const std::vector<Mode>&>(s.w.state.mode); })
-        .def("take_events", [](Stepped& s) { return std::exchange(s.out.events, {}); });
+        .def_prop_ro("begun", [](const SteppedRunOwner& s) { return s.run != nullptr; })
+        .def_prop_ro("t", [](const SteppedRunOwner& s) { return s.run->time(); })
+        .def_prop_ro("modes", [](const SteppedRunOwner& s) { return static_cast<const std::vector<Mode>&>(s.w.state.mode); })
+        .def("take_events", [](SteppedRunOwner& s) { return std::exchange(s.out.events, {}); });
 }
 
 }  // namespace pn

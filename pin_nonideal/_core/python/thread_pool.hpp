@@ -23,7 +23,7 @@ void share_out(size_t count, int threads, std::atomic<bool>& stopped, Work work)
     nb::gil_scoped_release release;
     std::atomic<size_t> next{0};
     std::mutex mutex;
-    std::condition_variable ended;
+    std::condition_variable thread_ended;
     int running = 0;
     std::exception_ptr error;
     const auto keep = [&](const std::exception_ptr& thrown) {
@@ -42,7 +42,7 @@ void share_out(size_t count, int threads, std::atomic<bool>& stopped, Work work)
         draw(k);
         const std::lock_guard<std::mutex> guard(mutex);
         --running;
-        ended.notify_one();
+        thread_ended.notify_one();
     };
     const int useful = useful_threads(count, threads);
     std::vector<std::thread> pool;
@@ -58,7 +58,7 @@ void share_out(size_t count, int threads, std::atomic<bool>& stopped, Work work)
     }
     draw(0);
     std::unique_lock<std::mutex> guard(mutex);
-    while (!ended.wait_for(guard, std::chrono::milliseconds(50), [&] { return running == 0; })) {
+    while (!thread_ended.wait_for(guard, std::chrono::milliseconds(50), [&] { return running == 0; })) {
         guard.unlock();
         {
             nb::gil_scoped_acquire gil;

@@ -33,7 +33,7 @@ struct Options {
     bool continues = false;  // if several motions are possible: take the nearest to the last one, else fail
     double max_wall = 0.0;   // maximum wall time [s], 0: no limit
     std::vector<UserEvent> events;
-    // Called between two steps. Can end the run, or set the actuation torques from then on.
+    // Called between two steps. Can end the run, or replace the actuation torques of later steps.
     enum class Told { go_on, stop, torque };
     std::function<Told(double t, const VecX& q, const VecX& v, VecX& torque)> callback;
     std::function<void(double t)> tick;  // progress and interruption, called every few steps

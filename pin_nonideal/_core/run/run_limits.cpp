@@ -13,7 +13,7 @@ void RunLimits::watch_evaluations() {
 }
 
 bool RunLimits::is_late() const {
-    return options_.max_wall > 0.0 && std::chrono::duration<double>(Clock::now() - begun_).count() > options_.max_wall;
+    return options_.max_wall > 0.0 && std::chrono::duration<double>(Clock::now() - start_time_).count() > options_.max_wall;
 }
 
 // Runs are saved only here, because the state between two steps is all that the next step needs.

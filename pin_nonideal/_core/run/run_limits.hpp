@@ -24,11 +24,11 @@ public:
     RunLimits(const RunLimits&) = delete;
     RunLimits& operator=(const RunLimits&) = delete;
 
-    // Report progress and check the wall time at evaluations too. A step may take many of them.
+    // Report progress and check the wall time at evaluations too. A step may need many evaluations.
     void watch_evaluations();
     // Report progress, save a checkpoint if one is due, and check the limits, between two steps.
     void check();
-    // Save a checkpoint, if the run has a place for it.
+    // Save a checkpoint if the run has a file for it.
     void save();
 
 private:
@@ -40,7 +40,7 @@ private:
     Recording& out_;
     long ticks_ = 0;
     Clock::time_point next_save_;
-    const Clock::time_point begun_ = Clock::now();
+    const Clock::time_point start_time_ = Clock::now();
 };
 
 }  // namespace pn

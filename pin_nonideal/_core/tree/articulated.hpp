@@ -2,8 +2,8 @@
 // grows with the fourth power of the depth. The innovations factor of M^-1 = (1 - H psi K)^T D^-1 (1 - H psi K)
 // [Rodriguez, Jain, Kreutz-Delgado, 1992] is the same R = L^T D^1/2 as that of the rows (tree/mass_factor.hpp). R^-1 is
 // a sweep toward the roots and R^-T a sweep toward the leaves. The time of a sweep is linear in the number of dofs.
-// Forces known as wrenches enter on the bodies. As generalized forces they would be long sums that the sweep takes
-// apart again.
+// Forces known as wrenches enter on the bodies. As generalized forces they would be long sums, which the sweep would
+// decompose again.
 #pragma once
 
 #include <vector>
@@ -15,12 +15,12 @@ namespace pn {
 // Compute gains and pivots of the dofs of deep trees. Returns -1, or the dof with a pivot that is not positive.
 int factorize_articulated(const Mechanism& m, BodyTerms& terms);
 
-// Sweeps of mass_factor.hpp for the dofs of deep trees. Forces `body` on bodies, about their reference points, add to x
-// if given.
+// Sweeps of mass_factor.hpp for the dofs of deep trees. Forces `body` on bodies, about their reference points, are
+// added to x if given.
 void solve_R_articulated(const Mechanism& m, BodyTerms& terms, const Force* body, VecX& x);
 void solve_Rt_articulated(const Mechanism& m, BodyTerms& terms, const std::vector<int>& dofs, VecX& x);
 // x := R^-1 x on the listed dofs, which are descending and closed under ancestors. The entries of x follow the list,
-// `stride` apart. The wrenches +f1 on the body of joint1 and -f2 on the body of joint2 add to x.
+// `stride` apart. The wrenches +f1 on the body of joint1 and -f2 on the body of joint2 are added to x.
 void scale_row_articulated(const Mechanism& m, BodyTerms& terms, const std::vector<int>& dofs, int joint1, const Force& f1,
                            int joint2, const Force& f2, double* x, int stride);
 

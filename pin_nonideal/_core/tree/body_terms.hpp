@@ -3,7 +3,7 @@
 // All quantities are in world axes about one reference point per kinematic tree. It is the origin of the first joint
 // that turns, frozen for the instant of the evaluation. Numbers stay small for a robot far from the world's origin, on
 // a floating base or on sliding joints. In a deep tree each body has its own reference point, the origin of its joint.
-// About a point a hundred links away an inertia would keep few digits of the body.
+// About a point a hundred links away, the inertia of the body would lose most digits.
 #pragma once
 
 #include <vector>

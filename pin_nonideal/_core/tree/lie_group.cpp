@@ -43,8 +43,8 @@ double cubic(double x) {
 }
 
 // Segment of a chart with unit length: a quaternion or (cos, sin), or none.
-struct Stretch { int first, n; };
-Stretch unit_stretch(const Chart& c) {
+struct ChartSegment { int first, n; };
+ChartSegment unit_segment(const Chart& c) {
     switch (c.kind) {
         case Chart::Kind::circle: return {c.iq, 2};
         case Chart::Kind::quaternion: return {c.iq, 4};
@@ -90,7 +90,7 @@ void configuration_rate(const Mechanism& m, const double* q, const double* v, do
 
 void normalize(const Mechanism& m, double* q) {
     for (const Chart& c : m.charts) {
-        const Stretch unit = unit_stretch(c);
+        const ChartSegment unit = unit_segment(c);
         if (unit.n == 0) continue;
         Eigen::Map<VecX> part(q + unit.first, unit.n);
         const double square = part.squaredNorm();
@@ -100,7 +100,7 @@ void normalize(const Mechanism& m, double* q) {
 
 bool has_unit_lengths(const Mechanism& m, const double* q, double tolerance) {
     for (const Chart& c : m.charts) {
-        const Stretch unit = unit_stretch(c);
+        const ChartSegment unit = unit_segment(c);
         if (unit.n == 0) continue;
         if (!(std::abs(Eigen::Map<const VecX>(q + unit.first, unit.n).norm() - 1.0) <= tolerance)) return false;
     }

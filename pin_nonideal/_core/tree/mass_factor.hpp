@@ -11,7 +11,8 @@ namespace pn {
 // Factorize M = L^T D L. Returns -1, or the dof with a pivot that is not positive.
 int factorize(const Mechanism& m, Terms& terms);
 
-// x := R^-1 x = D^-1/2 L^-T x, and x := R^-T x = L^-1 D^-1/2 x. Forces `body` on the bodies of deep trees add to x.
+// x := R^-1 x = D^-1/2 L^-T x, and x := R^-T x = L^-1 D^-1/2 x. Forces `body` on the bodies of deep trees are added to
+// x.
 void solve_R(const Mechanism& m, Terms& terms, VecX& x, const Force* body = nullptr);
 void solve_Rt(const Mechanism& m, Terms& terms, VecX& x);
 // x := R^-T x for the listed dofs, with ancestors first. x must be zero on the other dofs.

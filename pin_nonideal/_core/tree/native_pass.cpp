@@ -152,11 +152,11 @@ PN_INLINE void columns(const Joint& j, const Body& b, const JointMotion& other, 
 
 }  // namespace
 
-OwnPass::OwnPass(const Mechanism& m) : cos_sin(m.joints.size()), others(m), rest(VecX::Zero(m.nv)) {
-    int most = 0;
+NativePass::NativePass(const Mechanism& m) : cos_sin(m.joints.size()), others(m), rest(VecX::Zero(m.nv)) {
+    int max_dofs = 0;
     for (const Joint& j : m.joints)
-        if (j.kind == JointKind::other) most = std::max(most, j.nv);
-    motion.S.resize(most);
+        if (j.kind == JointKind::other) max_dofs = std::max(max_dofs, j.nv);
+    motion.S.resize(max_dofs);
 }
 
 // The functions below are compiled twice, for mechanisms with deep trees and without. The second version has no checks
@@ -165,7 +165,7 @@ OwnPass::OwnPass(const Mechanism& m) : cos_sin(m.joints.size()), others(m), rest
 // Place body i relative to its parent. In a deep tree, `shift` becomes the vector from the parent's reference point to
 // its own.
 template <bool some_deep>
-static PN_INLINE void place_body(const Mechanism& m, OwnPass& pass, BodyTerms& terms, int i, Vec3& shift) {
+static PN_INLINE void place_body(const Mechanism& m, NativePass& pass, BodyTerms& terms, int i, Vec3& shift) {
     const Joint& j = m.joints[i];
     if (j.kind == JointKind::other) pass.others.evaluate(m, i, terms.q, pass.rest, pass.motion);
     Body& b = terms.body[i];
@@ -181,7 +181,7 @@ static PN_INLINE void place_body(const Mechanism& m, OwnPass& pass, BodyTerms& t
 static PN_INLINE void weigh_body(const Joint& j, Body& b) { b.Y = b.own = in_world(b, j.mass, j.com, j.inertia); }
 
 // Compute cosines and sines of angles, four at a time. The last group is padded with the last angle.
-static PN_INLINE void find_cos_sin(OwnPass& pass, const BodyTerms& terms, const std::vector<Angle>& angles) {
+static PN_INLINE void find_cos_sin(NativePass& pass, const BodyTerms& terms, const std::vector<Angle>& angles) {
     const int n = static_cast<int>(angles.size());
     for (int k = 0; k < n; k += 4) {
         Lanes x, c, s;
@@ -191,7 +191,7 @@ static PN_INLINE void find_cos_sin(OwnPass& pass, const BodyTerms& terms, const 
     }
 }
 
-PN_WIDE void place_bodies(const Mechanism& m, OwnPass& pass, BodyTerms& terms, const std::vector<int>& joints,
+PN_WIDE void place_bodies(const Mechanism& m, NativePass& pass, BodyTerms& terms, const std::vector<int>& joints,
                           const std::vector<Angle>& angles) {
     find_cos_sin(pass, terms, angles);
     Vec3 shift;  // local, so that the shifts of the factor remain
@@ -199,7 +199,7 @@ PN_WIDE void place_bodies(const Mechanism& m, OwnPass& pass, BodyTerms& terms, c
 }
 
 template <bool some_deep>
-static PN_INLINE void place_all(const Mechanism& m, OwnPass& pass, BodyTerms& terms) {
+static PN_INLINE void place_all(const Mechanism& m, NativePass& pass, BodyTerms& terms) {
     const int n = static_cast<int>(m.joints.size());
     for (int i = 1; i < n; ++i) {
         place_body<some_deep>(m, pass, terms, i, terms.deep.shift[i]);
@@ -212,14 +212,14 @@ static PN_INLINE void place_all(const Mechanism& m, OwnPass& pass, BodyTerms& te
     }
 }
 
-PN_WIDE void place_bodies(const Mechanism& m, OwnPass& pass, BodyTerms& terms) {
+PN_WIDE void place_bodies(const Mechanism& m, NativePass& pass, BodyTerms& terms) {
     find_cos_sin(pass, terms, m.angles);
     if (m.deep_joints.empty()) place_all<false>(m, pass, terms);
     else place_all<true>(m, pass, terms);
 }
 
 template <bool some_deep>
-static PN_INLINE void move_all(const Mechanism& m, OwnPass& pass, BodyTerms& terms, const VecX& v) {
+static PN_INLINE void move_all(const Mechanism& m, NativePass& pass, BodyTerms& terms, const VecX& v) {
     const int n = static_cast<int>(m.joints.size());
     for (int i = 1; i < n; ++i) {
         const Joint& j = m.joints[i];
@@ -241,7 +241,7 @@ static PN_INLINE void move_all(const Mechanism& m, OwnPass& pass, BodyTerms& ter
     }
 }
 
-PN_WIDE void move_bodies(const Mechanism& m, OwnPass& pass, BodyTerms& terms, const VecX& v) {
+PN_WIDE void move_bodies(const Mechanism& m, NativePass& pass, BodyTerms& terms, const VecX& v) {
     if (m.deep_joints.empty()) move_all<false>(m, pass, terms, v);
     else move_all<true>(m, pass, terms, v);
 }
@@ -264,7 +264,7 @@ static PN_INLINE void fill_M(const Mechanism& m, BodyTerms& terms) {
     }
 }
 
-PN_WIDE void mass_matrix(const Mechanism& m, OwnPass&, BodyTerms& terms) {
+PN_WIDE void mass_matrix(const Mechanism& m, NativePass&, BodyTerms& terms) {
     if (m.deep_joints.empty()) fill_M<false>(m, terms);
     else fill_M<true>(m, terms);
 }
@@ -287,7 +287,7 @@ static PN_INLINE void sum_bias_forces(const Mechanism& m, BodyTerms& terms) {
     }
 }
 
-PN_WIDE void bias_forces(const Mechanism& m, OwnPass&, BodyTerms& terms) {
+PN_WIDE void bias_forces(const Mechanism& m, NativePass&, BodyTerms& terms) {
     if (m.deep_joints.empty()) sum_bias_forces<false>(m, terms);
     else sum_bias_forces<true>(m, terms);
 }

@@ -22,9 +22,9 @@ Motion motion(const pinocchio::Motion& x) { return {x.linear(), x.angular()}; }
 
 // A model of one joint, evaluated by `forwardKinematics`, which Pinocchio's library instantiates. The templates of the
 // joint itself (createData, calc) take fifteen seconds to compile.
-class LoneJoint {
+class SingleJoint {
 public:
-    explicit LoneJoint(const pinocchio::JointModel& joint) : model_(with(joint)), data_(model_) {}
+    explicit SingleJoint(const pinocchio::JointModel& joint) : model_(with(joint)), data_(model_) {}
 
     // Compute placement, motion subspace and bias at a configuration (nq) and velocity (nv) of this joint.
     const pinocchio::JointData& move(const Eigen::Ref<const VecX>& q, const Eigen::Ref<const VecX>& v) {
@@ -74,7 +74,7 @@ void place_deep(const pinocchio::Data& data, BodyTerms& terms, const Joint& j, s
 }  // namespace
 
 struct PinocchioJoints::Data {
-    std::vector<std::unique_ptr<LoneJoint>> joints;  // by joint, null if the core has a formula
+    std::vector<std::unique_ptr<SingleJoint>> joints;  // by joint, null if the core has a formula
 };
 
 PinocchioJoints::PinocchioJoints() = default;
@@ -85,11 +85,11 @@ PinocchioJoints::PinocchioJoints(const Mechanism& m) : data_(new Data) {
     data_->joints.resize(m.joints.size());
     for (size_t i = 1; i < m.joints.size(); ++i)
         if (m.joints[i].kind == JointKind::other)
-            data_->joints[i] = std::make_unique<LoneJoint>(model_of(m).joints[i]);
+            data_->joints[i] = std::make_unique<SingleJoint>(model_of(m).joints[i]);
 }
 
 void PinocchioJoints::evaluate(const Mechanism& m, int i, const VecX& q, const VecX& v, JointMotion& out) {
-    LoneJoint& joint = *data_->joints[i];
+    SingleJoint& joint = *data_->joints[i];
     const pinocchio::JointData& data =
         joint.move(q.segment(m.joints[i].iq, joint.model().nq), v.segment(m.joints[i].iv, joint.model().nv));
     const auto placement = pinocchio::joint_transform(data);
@@ -100,7 +100,7 @@ void PinocchioJoints::evaluate(const Mechanism& m, int i, const VecX& q, const V
 }
 
 Motion first_motion(const void* model, int joint) {
-    LoneJoint lone(static_cast<const Model*>(model)->joints[joint]);
+    SingleJoint lone(static_cast<const Model*>(model)->joints[joint]);
     const VecX rest = VecX::Zero(lone.model().nv);
     Motion first;
     each_column(lone.move(pinocchio::neutral(lone.model()), rest), [&](int k, const Motion& column) {

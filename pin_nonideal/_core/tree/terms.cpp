@@ -26,7 +26,7 @@ void Terms::allocate(const Mechanism& m) {
         deep.inertia.assign(m.joints.size(), ArticulatedInertia{});
     }
     if (m.provider == Provider::pinocchio) pass.emplace<PinocchioPass>(m);
-    else pass.emplace<OwnPass>(m);
+    else pass.emplace<NativePass>(m);
 }
 
 void place_bodies(const Mechanism& m, Terms& terms, const VecX& q, const std::vector<int>& joints,

@@ -9,7 +9,7 @@
 namespace pn {
 
 struct Terms : BodyTerms {
-    std::variant<OwnPass, PinocchioPass> pass;  // fills body, J, Ag, nle and M
+    std::variant<NativePass, PinocchioPass> pass;  // fills body, J, Ag, nle and M
 
     void allocate(const Mechanism& m);
 };

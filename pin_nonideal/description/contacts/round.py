@@ -28,8 +28,8 @@ def _check(c: SphereContact | CapsuleContact | BoxContact) -> str:
 class SphereContact:
     """Contact of two spheres around two frames' origins, or of a sphere and a point, with Coulomb friction.
 
-    Gap: phi = |p1 - p2| - radius1 - radius2 [m], never negative. Opening, closing and impacts are those of a
-    `PointContact`.
+    Gap: phi = |p1 - p2| - radius1 - radius2 [m], never negative. The contact opens, closes and has impacts
+    like a `PointContact`.
     Rows: 1 while closed. lam: normal force on the body of frame1 [N], away from the other body; zero while
     open.
     Sliding friction opposes the slip of the two bodies at the contact point. It is at most mu lam while

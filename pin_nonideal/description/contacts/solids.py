@@ -122,8 +122,8 @@ class CylinderContact:
     """Contact of a sphere or a capsule with a cylinder or a cone of another body, with Coulomb friction.
 
     Gap: distance of the sphere's center, or of the capsule's segment, from the solid, minus both radii [m];
-    otherwise as `SphereContact`. The contact has one point: a capsule along the solid touches in the middle
-    of their common length.
+    otherwise as `SphereContact`. The contact has one point: a capsule parallel to the solid touches it in the
+    middle of the overlap.
     Rows: 1 while closed. lam: normal force on the body of frame1 [N], away from the solid.
 
     Args:

@@ -12,7 +12,7 @@ from pin_nonideal.description.constraints import Constraint, JointCoupling
 from pin_nonideal.errors import LoadingError, short_repr
 from pin_nonideal.loading.urdf.geometry_sources import Shapes
 from pin_nonideal.loading.urdf.reader import RobotFile
-from pin_nonideal.loading.urdf.xml import listed
+from pin_nonideal.loading.urdf.xml import quote_names
 from pin_nonideal.loading.yaml.initial_state import joint_index, vector
 from pin_nonideal.loading.yaml.robot import check_keys, joint_types, names_in, pitches
 from pin_nonideal.types import GeometryModel, Model, Table
@@ -133,7 +133,7 @@ def lock(
     if not locked:
         return q0, v0
     indices = [joint_index(robot.model, n, f"{where}: model: locked") for n in locked]
-    return _reduced(robot, indices, q0, v0)
+    return _fix_joints(robot, indices, q0, v0)
 
 
 def fix_massless(
@@ -152,27 +152,27 @@ def fix_massless(
         Configuration and velocity of the remaining joints.
     """
     model = robot.model
-    idle = [j for j in range(1, model.njoints) if _moves_no_inertia(model, j)]
-    idle = [j for j in idle if not names_on(model, j) & named]
+    massless_joints = [j for j in range(1, model.njoints) if _moves_no_inertia(model, j)]
+    massless_joints = [j for j in massless_joints if not names_on(model, j) & named]
     leaders = {c.joint2 for c in robot.constraints if isinstance(c, JointCoupling)}
-    names = {model.names[j] for j in idle}
+    names = {model.names[j] for j in massless_joints}
     followers = {c.joint1: c.joint2 for c in robot.constraints if isinstance(c, JointCoupling)}
     lead = {n for n in names & leaders if any(f not in names for f, to in followers.items() if to == n)}
-    idle = [j for j in idle if model.names[j] not in lead]
-    if not idle or len(idle) == model.njoints - 1:
+    massless_joints = [j for j in massless_joints if model.names[j] not in lead]
+    if not massless_joints or len(massless_joints) == model.njoints - 1:
         return q0, v0
-    names = {str(model.names[j]) for j in idle}
-    notes.append(f"joints that move no inertia are fixed: {listed(sorted(names))}")
+    names = {str(model.names[j]) for j in massless_joints}
+    notes.append(f"joints that move no inertia are fixed: {quote_names(sorted(names))}")
     robot.constraints = [c for c in robot.constraints if not names & set(map(str, vars(c).values()))]
-    return _reduced(robot, idle, q0, v0)
+    return _fix_joints(robot, massless_joints, q0, v0)
 
 
 def _moves_no_inertia(model: Model, joint: int) -> bool:
     """Check if no link beyond a joint has mass or inertia, and no joint there has armature."""
     beyond = list(model.subtrees[joint])
     dofs = [i for j in beyond for i in range(model.idx_vs[j], model.idx_vs[j] + model.nvs[j])]
-    bare = all(model.inertias[j].mass == 0.0 and not model.inertias[j].inertia.any() for j in beyond)
-    return bare and not model.armature[dofs].any()
+    is_massless = all(model.inertias[j].mass == 0.0 and not model.inertias[j].inertia.any() for j in beyond)
+    return is_massless and not model.armature[dofs].any()
 
 
 def names_on(model: Model, joint: int) -> set[str]:
@@ -186,21 +186,21 @@ def names_on(model: Model, joint: int) -> set[str]:
     return {str(f.name) for f in model.frames if f.parentJoint in beyond} | {str(model.names[joint])}
 
 
-def _reduced(
+def _fix_joints(
     robot: RobotFile, indices: list[int], q0: NDArray[np.float64], v0: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Fix joints at q0, and return the configuration and velocity of the others."""
     model = robot.model
     moving = [j for j in range(1, model.njoints) if j not in indices]
-    none = [np.zeros(0)]
-    q = np.concatenate([q0[model.idx_qs[j] : model.idx_qs[j] + model.nqs[j]] for j in moving] or none)
-    v = np.concatenate([v0[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]] for j in moving] or none)
+    empty = [np.zeros(0)]
+    q = np.concatenate([q0[model.idx_qs[j] : model.idx_qs[j] + model.nqs[j]] for j in moving] or empty)
+    v = np.concatenate([v0[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]] for j in moving] or empty)
     _exchange(robot, lambda geometries: reduced_model(model, geometries, indices, q0))
     return q, v
 
 
 def has_joints(model: Model, constraint: Constraint, where: str) -> bool:
-    """Check if the joints of a constraint in the robot's file still exist; without them it is satisfied.
+    """Check if the joints of a constraint still exist; without these joints it is satisfied.
 
     Args:
         model: pinocchio.Model.

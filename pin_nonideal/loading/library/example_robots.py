@@ -78,7 +78,7 @@ def example_robot(name: str, others: list[str]) -> RobotFile:
             f"URDF instead{MJCF_INSTEAD.get(name, '')}"
         )
     try:
-        robot, path = _load_lazily(robots_loader, name)
+        robot, path = _load_without_meshes(robots_loader, name)
     except Exception as error:  # any error of the loaders' parsers
         raise LoadingError(
             f'example-robot-data cannot load "{name}": {" ".join(str(error).split())}'
@@ -92,7 +92,7 @@ def example_robot(name: str, others: list[str]) -> RobotFile:
     return robot
 
 
-def _load_lazily(robots_loader: Any, name: str) -> tuple[RobotFile, Path]:
+def _load_without_meshes(robots_loader: Any, name: str) -> tuple[RobotFile, Path]:
     """Return a robot of example-robot-data, whose meshes are read on first use, and the path of its file.
 
     If the class of the robot has its own `__init__`, it also loads the meshes.

@@ -42,7 +42,7 @@ def n_four_bar(
     Source:
         IFToMM benchmark A02; Bayo and Avello, Nonlinear Dynamics 5 (1994) 209-231.
     """
-    N = count("n_four_bar: N", N, least=1, most=MAX_WINDOWS)
+    N = count("n_four_bar: N", N, min_value=1, max_value=MAX_WINDOWS)
     m, L = positive("n_four_bar: m", m), positive("n_four_bar: L", L)
     g, speed = nonnegative("n_four_bar: g", g), number("n_four_bar: speed", speed)
     model, visual = pin.Model(), pin.GeometryModel()

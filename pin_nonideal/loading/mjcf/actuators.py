@@ -13,7 +13,7 @@ from pin_nonideal.validation import array, number
 
 from .motion import FixedTendon
 from .mujoco_types import MjModel
-from .transmissions import BODY, TENDON, Geared, OnBall, OnSite, Transmission
+from .transmissions import BODY, TENDON, GearedLength, OnBall, OnSite, Transmission
 from .tree import Tree
 
 NO_DYNAMICS, INTEGRATOR, FILTER, FILTER_EXACT = range(4)  # MuJoCo's mjtDyn
@@ -62,7 +62,7 @@ class Actuators:
         self._lengths = np.zeros((len(supported), tree.model.nq))
         self._curved = []
         for k, transmission in enumerate(self._transmissions):
-            if isinstance(transmission, Geared) and isinstance(transmission.tendon, FixedTendon):
+            if isinstance(transmission, GearedLength) and isinstance(transmission.tendon, FixedTendon):
                 self._arms[k] = transmission.gear * transmission.tendon.row
                 self._lengths[k] = transmission.gear * transmission.tendon.coefficients
             else:

@@ -15,14 +15,14 @@ import numpy as np
 from pin_nonideal.errors import LoadingError
 from pin_nonideal.loading.urdf.xml import read_text
 
-from .fields import CONVERTED, CONVERTED_OPTIONS
+from .fields import CONVERTED_FIELDS, CONVERTED_OPTIONS
 from .mujoco_types import MjModel, MjsElement, MjSpec, Mujoco
 
 MIN_VERSION = 4  # oldest supported major version of MuJoCo, because the fields of compiled models differ
 PLACEHOLDER = 1e-3  # radius of the sphere that replaces a shape that is not read [m]
 
 
-class Compiled(NamedTuple):
+class CompiledFile(NamedTuple):
     """Compiled MJCF file.
 
     Attributes:
@@ -59,7 +59,7 @@ def mujoco_module(path: Path) -> Mujoco:
     return mujoco
 
 
-def compile_mjcf(path: Path, *, meshes: bool = False) -> Compiled:
+def compile_mjcf(path: Path, *, meshes: bool = False) -> CompiledFile:
     """Compile an MJCF file.
 
     Args:
@@ -81,7 +81,7 @@ def compile_mjcf(path: Path, *, meshes: bool = False) -> Compiled:
     return compiled
 
 
-def _compile(mujoco: Mujoco, path: Path, meshes: bool, *, probe: bool) -> Compiled:
+def _compile(mujoco: Mujoco, path: Path, meshes: bool, *, probe: bool) -> CompiledFile:
     """Compile a file; with `probe`, also without the massless meshes that MuJoCo cannot read."""
     notes: list[str] = []
     with warnings.catch_warnings(record=True) as caught, _collected_warnings(mujoco) as messages:
@@ -98,7 +98,7 @@ def _compile(mujoco: Mujoco, path: Path, meshes: bool, *, probe: bool) -> Compil
     words = [" ".join(text.split()) for text in (*(str(one.message) for one in caught), *messages)]
     notes += [f"MuJoCo: {text}" for text in dict.fromkeys(words)]
     identities = [frozenset(int(g.id) for g in geoms) for geoms in (absent, unread)]
-    return Compiled(model, identities[0], identities[1], notes)
+    return CompiledFile(model, identities[0], identities[1], notes)
 
 
 @contextmanager
@@ -116,7 +116,7 @@ def _collected_warnings(mujoco: Mujoco) -> Iterator[list[str]]:
 def _check_finite(model: MjModel, path: Path) -> None:
     """Check that a model contains no NaN, which MuJoCo accepts with a warning and treats as no range."""
     fields = {f"option {name}": getattr(model.opt, name) for name in CONVERTED_OPTIONS.split()}
-    fields |= {name: getattr(model, name) for name in CONVERTED.split() if name != "opt"}
+    fields |= {name: getattr(model, name) for name in CONVERTED_FIELDS.split() if name != "opt"}
     bad = [name for name, values in fields.items() if np.isnan(np.asarray(values, dtype=float)).any()]
     if bad:
         raise LoadingError(f'"{path}" must hold finite numbers; MuJoCo finds NaN in {", ".join(bad)}')
@@ -159,7 +159,7 @@ def _assets(
     assets = [*spec.meshes, *spec.hfields]
     homes = [Path(spec.modelfiledir or "."), *_homes(path)]
     places = {_shape(asset): _place(spec, asset, homes) for asset in assets if asset.file}
-    lost = {shape for shape, place in places.items() if place is None}
+    missing_shapes = {shape for shape, place in places.items() if place is None}
     broken = {_shape(a) for a in assets if probe and not _is_readable(mujoco, a, places.get(_shape(a)))}
     files = {_shape(asset): asset.file for asset in assets}
     absent, unread = [], []
@@ -169,12 +169,12 @@ def _assets(
         if not shape:
             continue
         if _carries_mass(mujoco, spec, geom) or geom.name in wrapping:
-            if shape in lost:  # MuJoCo rejects undeclared assets and broken files itself
+            if shape in missing_shapes:  # MuJoCo rejects undeclared assets and broken files itself
                 raise LoadingError(
                     f'"{path}": body "{geom.parent.name}" has its mass from mesh "{files[shape]}", which was '
                     "not found; put the mesh there or give the body an <inertial>"
                 )
-        elif shape in lost | broken:
+        elif shape in missing_shapes | broken:
             absent.append(geom)
         elif not meshes:
             unread.append(geom)
@@ -183,8 +183,8 @@ def _assets(
         geom.meshname = geom.hfieldname = ""
         geom.plugin.active, geom.mass = False, 0.0
     _drop_unused(spec)
-    for shape in (s for s in files if s in lost | broken):
-        what = "was not found" if shape in lost else "cannot be read"
+    for shape in (s for s in files if s in missing_shapes | broken):
+        what = "was not found" if shape in missing_shapes else "cannot be read"
         notes.append(f'mesh "{files[shape]}" {what}; its shape is left out')
     return absent, unread
 

@@ -6,7 +6,7 @@ them.
 
 from __future__ import annotations
 
-CONVERTED = """
+CONVERTED_FIELDS = """
 opt qpos0 qpos_spring body_parentid body_jntnum body_jntadr body_pos body_quat body_ipos body_iquat
 body_mass body_inertia body_gravcomp jnt_type jnt_qposadr jnt_dofadr jnt_bodyid jnt_actuatorid jnt_limited
 jnt_range jnt_pos jnt_axis jnt_stiffness jnt_stiffnesspoly jnt_actfrclimited jnt_actfrcrange jnt_actgravcomp
@@ -23,7 +23,7 @@ actuator_ctrllimited actuator_ctrlrange actuator_gear key_qpos key_qvel key_act 
 pair_geom2 exclude_signature nq nv nu nactuator na nbody njnt ngeom nsite neq ntendon nkey npair nexclude
 nout nwrap
 """
-REPORTED = """
+REPORTED_FIELDS = """
 body_mocapid body_plugin jnt_plasticadr jnt_springyield tree_sleep_policy geom_plugin geom_surfacevel
 geom_adhesion geom_margin geom_gap geom_condim geom_priority geom_solmix geom_solref geom_solimp jnt_solref
 jnt_solimp jnt_margin dof_solref dof_solimp eq_solref eq_solimp pair_dim pair_solref pair_solreffriction
@@ -36,7 +36,7 @@ flg_adhesion flg_surfacevel nsensor
 """
 # Prefixes of fields: of flexes, which are reported as a whole, and of fields for display or measurement only.
 FLEX = ("flex_", "flexedge_", "nflex", "efm0", "efmC", "nefm")
-IGNORED = """
+IGNORED_FIELDS = """
 cam light mat mesh skin tex text tuple numeric sensor bvh oct vis stat hfield name names paths key_time
 nuser nname npath ncam nlight nmat nmesh nskin ntex ntuple nnumeric nsensor nbvh noct nhfield nplugin
 nhistory geom_rgba geom_group geom_matid geom_user geom_castshadow site_type site_size site_rgba site_group
@@ -44,7 +44,7 @@ site_matid site_user site_dataid tendon_rgba tendon_group tendon_matid tendon_us
 jnt_user jnt_group actuator_user signature
 """
 # Values that MuJoCo computes from other fields: buffer sizes, sparsity, bounds, values at the reference pose.
-DERIVED = """
+DERIVED_FIELDS = """
 B_colind B_rowadr B_rownnz D_colind D_diag D_rowadr D_rownnz M_colind M_rowadr M_rownnz mapD2M mapM2D mapM2M
 nB nC nD nJfe nJmom nJten nM narena nbuffer nconmax nemax njmax nuserdata npolygonmax ntree body_rootid
 body_weldid body_dofnum body_dofadr body_treeid body_geomnum body_geomadr body_simple body_sameframe
@@ -64,5 +64,5 @@ ls_iterations noslip_iterations ccd_iterations sdf_initpoints sdf_iterations
 
 def is_listed(field: str) -> bool:
     """Check if a field of mjModel is in one of the lists."""
-    listed = {*CONVERTED.split(), *REPORTED.split(), *DERIVED.split()}
-    return field in listed or field.startswith((*FLEX, *IGNORED.split()))
+    listed = {*CONVERTED_FIELDS.split(), *REPORTED_FIELDS.split(), *DERIVED_FIELDS.split()}
+    return field in listed or field.startswith((*FLEX, *IGNORED_FIELDS.split()))

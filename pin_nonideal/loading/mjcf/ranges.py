@@ -47,7 +47,7 @@ class TendonBound:
 
 @dataclass(frozen=True, eq=False)
 class BallBound:
-    """Gap of the rotation angle of a ball joint to its largest value.
+    """Gap between the rotation angle of a ball joint and its largest value.
 
     The angle theta of a rotation with the unit quaternion (x, w) is 2 arccos |w|, where w is the scalar. The
     gap is 2 (|w| - cos(bound/2)) / sin(bound/2), which is smooth at theta = 0. Its derivative with respect to

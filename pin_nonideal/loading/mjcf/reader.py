@@ -41,7 +41,7 @@ def read_mjcf(path: Path, *, allow: Collection[str] = (), ctrl: Control = None) 
 
     Args:
         path: path of the file.
-        allow: active features that may be ignored, from `unsupported.ALLOWED`.
+        allow: active features that may be ignored, from `unsupported.IGNORABLE_FEATURES`.
         ctrl: controls of the actuators, as in `Actuators.set_control`.
 
     Raises:

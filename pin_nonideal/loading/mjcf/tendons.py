@@ -175,5 +175,7 @@ def _two_points(tree: Tree, index: int, tendon: Tendon) -> tuple[str, str] | Non
     first = int(m.tendon_adr[index])
     one, two = (tree.site_names[m.wrap_objid[k]] for k in (first, first + 1))
     sites = pin.FrameType.OP_FRAME
-    alone = all(sum(f.name == n for f in tree.model.frames) == 1 for n in (one, two))
-    return (one, two) if alone and all(tree.model.existFrame(n, sites) for n in (one, two)) else None
+    has_unique_frames = all(sum(f.name == n for f in tree.model.frames) == 1 for n in (one, two))
+    return (
+        (one, two) if has_unique_frames and all(tree.model.existFrame(n, sites) for n in (one, two)) else None
+    )

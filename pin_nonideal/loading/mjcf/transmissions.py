@@ -18,7 +18,7 @@ JOINT, JOINT_IN_PARENT, SLIDER_CRANK, TENDON, SITE, BODY = range(6)  # MuJoCo's 
 
 
 @dataclass(frozen=True, eq=False)
-class Geared:
+class GearedLength:
     """Tendon, or joint of one degree of freedom, with a gear."""
 
     tendon: Tendon
@@ -140,7 +140,7 @@ class SliderCrank:
         return self.gear * length, self.motion.generalized(q, forces)
 
 
-Transmission = Geared | OnBall | OnFree | OnSite | SliderCrank
+Transmission = GearedLength | OnBall | OnFree | OnSite | SliderCrank
 
 
 def read_transmission(tree: Tree, actuator: int, tendons: list[Tendon | None]) -> Transmission | None:
@@ -156,13 +156,13 @@ def read_transmission(tree: Tree, actuator: int, tendons: list[Tendon | None]) -
             return OnBall(at, dof, gear[:3], kind == JOINT_IN_PARENT, nv)
         coordinate, row = np.zeros(tree.model.nq), np.zeros(nv)
         coordinate[at] = row[dof] = 1.0
-        return Geared(FixedTendon(coordinate, row), float(gear[0]))
+        return GearedLength(FixedTendon(coordinate, row), float(gear[0]))
     if kind == TENDON:
         tendon = tendons[one]
-        return None if tendon is None else Geared(tendon, float(gear[0]))
+        return None if tendon is None else GearedLength(tendon, float(gear[0]))
     if kind == SITE:
         reference = None if two < 0 else tree.on_site(two)
-        shared = np.zeros(0, dtype=int) if reference is None else _shared(tree, one, two)
+        shared = np.zeros(0, dtype=int) if reference is None else _common_dofs(tree, one, two)
         return OnSite(tree.motion, tree.on_site(one), reference, gear, shared)
     if kind == SLIDER_CRANK:
         rod = float(m.actuator_cranklength[actuator])
@@ -170,7 +170,7 @@ def read_transmission(tree: Tree, actuator: int, tendons: list[Tendon | None]) -
     return None
 
 
-def _shared(tree: Tree, one: int, two: int) -> Any:
+def _common_dofs(tree: Tree, one: int, two: int) -> Any:
     """Return the degrees of freedom of the joints that move both sites."""
     model = tree.model
     chains = [set(model.supports[tree.on_site(site)[0]]) - {0} for site in (one, two)]

@@ -7,7 +7,7 @@ from collections.abc import Collection
 import numpy as np
 
 from pin_nonideal.errors import LoadingError
-from pin_nonideal.loading.urdf.xml import listed
+from pin_nonideal.loading.urdf.xml import quote_names
 
 from .actuators import can_produce_force, is_supported
 from .equality import TENDON, equality_name
@@ -20,7 +20,7 @@ from .transmissions import BODY
 from .transmissions import TENDON as BY_TENDON
 from .tree import GROUND, Tree, actuator_share
 
-ALLOWED = ("actuator", "flex", "fluid", "muscle", "plasticity", "plugin", "tendon")
+IGNORABLE_FEATURES = ("actuator", "flex", "fluid", "muscle", "plasticity", "plugin", "tendon")
 MUSCLE = 2  # MuJoCo's mjtGain and mjtBias
 
 
@@ -29,7 +29,7 @@ class UnsupportedFeatures:
 
     Args:
         where: prefix of error messages.
-        allow: active features that may be ignored, from `ALLOWED`.
+        allow: active features that may be ignored, from `IGNORABLE_FEATURES`.
         notes: receives the notes.
     """
 
@@ -93,11 +93,11 @@ def _check_actuators(tree: Tree, tendons: list[Tendon | None], unsupported: Unsu
     sticking = [names[a] for a in working if m.actuator_trntype[a] == BODY]
     if sticking:
         unsupported.add_note(
-            f"adhesion actuators {listed(sticking)} pull on contacts, which are not carried over"
+            f"adhesion actuators {quote_names(sticking)} pull on contacts, which are not carried over"
         )
     muscles = [names[a] for a in working if MUSCLE in (m.actuator_gaintype[a], m.actuator_biastype[a])]
     if muscles:
-        unsupported.add_active("muscle", f"muscles {listed(muscles)}")
+        unsupported.add_active("muscle", f"muscles {quote_names(muscles)}")
     others = [
         names[a]
         for a in working
@@ -105,7 +105,7 @@ def _check_actuators(tree: Tree, tendons: list[Tendon | None], unsupported: Unsu
     ]
     if others:
         unsupported.add_active(
-            "actuator", f"actuators with a controller, a delay or a law of their own {listed(others)}"
+            "actuator", f"actuators with a controller, a delay or a law of their own {quote_names(others)}"
         )
     wrapped = [
         names[a]
@@ -115,11 +115,11 @@ def _check_actuators(tree: Tree, tendons: list[Tendon | None], unsupported: Unsu
         and names[a] not in muscles
     ]
     if wrapped:
-        unsupported.add_active("tendon", f"actuators on tendons that wrap {listed(wrapped)}")
+        unsupported.add_active("tendon", f"actuators on tendons that wrap {quote_names(wrapped)}")
     early = [names[a] for a in working if m.actuator_actearly[a] and m.actuator_dyntype[a]]
     if early:
         unsupported.add_note(
-            f"actearly of {listed(early)} shifts activations by MuJoCo's time step, and is left out"
+            f"actearly of {quote_names(early)} shifts activations by MuJoCo's time step, and is left out"
         )
 
 
@@ -138,33 +138,33 @@ def _check_tendons(tree: Tree, tendons: list[Tendon | None], unsupported: Unsupp
     idle = [names[i] for i in wrapping if not moving[i]]
     if active:
         unsupported.add_active(
-            "tendon", f"springs, damping or friction of tendons that wrap {listed(active)}"
+            "tendon", f"springs, damping or friction of tendons that wrap {quote_names(active)}"
         )
     if idle:
-        unsupported.add_note(f"tendons that wrap around geoms are left out: {listed(idle)}")
+        unsupported.add_note(f"tendons that wrap around geoms are left out: {quote_names(idle)}")
     inertia = m.tendon_armature + actuator_share(m, m.actuator_armature[:, None], joints=False)[:, 0]
     heavy = [names[i] for i in np.flatnonzero(inertia)]
     if heavy:
         unsupported.add_active(
-            "tendon", f"armature of tendons {listed(heavy)}, which no mass matrix of a tree holds"
+            "tendon", f"armature of tendons {quote_names(heavy)}, which no mass matrix of a tree holds"
         )
     plastic = [names[i] for i in range(m.ntendon) if m.tendon_plasticadr[i] >= 0]
     plastic += [tree.joint_name(j) for j in range(m.njnt) if m.jnt_plasticadr[j] >= 0]
     if plastic:
-        unsupported.add_active("plasticity", f"springs that yield {listed(plastic)}")
+        unsupported.add_active("plasticity", f"springs that yield {quote_names(plastic)}")
 
 
 def _check_bodies(tree: Tree, unsupported: UnsupportedFeatures) -> None:
     m = tree.compiled
     if m.nmocap:
         names = [tree.body_names[b] for b in np.flatnonzero(m.body_mocapid >= 0)]
-        unsupported.add_note(f"mocap bodies {listed(names)} are held where they start")
+        unsupported.add_note(f"mocap bodies {quote_names(names)} are held where they start")
     elliptic = np.unique(m.geom_bodyid[m.geom_fluid[:, 0] > 0.0])
     if elliptic.size:
         still = "for their bodies do not move"
         if not (m.opt.density or m.opt.viscosity):
             still = "for there is no density and no viscosity"
-        what = f"fluid forces on ellipsoids of bodies {listed([tree.body_names[b] for b in elliptic])}"
+        what = f"fluid forces on ellipsoids of bodies {quote_names([tree.body_names[b] for b in elliptic])}"
         moving = any(tree.bodies[b][0] for b in elliptic)
         if moving and (m.opt.density or m.opt.viscosity):
             unsupported.add_active("fluid", what)
@@ -226,7 +226,9 @@ def _check_limits(tree: Tree, tendons: list[Tendon | None], unsupported: Unsuppo
     limited = np.flatnonzero(tree.compiled.tendon_limited).tolist()
     wrapping = [tendon_name(tree, i) for i in limited if tendons[i] is None]
     if wrapping:
-        unsupported.add_note(f"ranges of tendons that wrap around geoms are left out: {listed(wrapping)}")
+        unsupported.add_note(
+            f"ranges of tendons that wrap around geoms are left out: {quote_names(wrapping)}"
+        )
 
 
 def _check_options(mujoco: Mujoco, tree: Tree, unsupported: UnsupportedFeatures) -> None:
@@ -247,7 +249,7 @@ def _check_options(mujoco: Mujoco, tree: Tree, unsupported: UnsupportedFeatures)
     ]
     if floating:
         unsupported.add_note(
-            f"armature of free joints {listed(floating)}: MuJoCo gives it no Coriolis force along the "
+            f"armature of free joints {quote_names(floating)}: MuJoCo gives it no Coriolis force along the "
             "world's axes; a given force makes it the same here"
         )
     unknown = [

@@ -10,7 +10,7 @@ import pinocchio as pin
 from pin_nonideal.types import Array, CollisionGeometry
 
 from .validation import pose
-from .xml import listed, numbers
+from .xml import numbers, quote_names
 
 # Minimum volume of a closed mesh, relative to its bounding box. Meshes with less volume are replaced by the
 # box.
@@ -52,9 +52,13 @@ def add_inertias(root: ElementTree.Element, density: float, notes: list[str]) ->
         if total.mass > 0.0:
             link.append(_element(total))
     if names:
-        notes.append(f"inertias of links {listed(names)} are those of their shapes at {density:g} kg/m^3")
+        notes.append(
+            f"inertias of links {quote_names(names)} are those of their shapes at {density:g} kg/m^3"
+        )
     if boxes:
-        notes.append(f"meshes that are not closed count as their bounding boxes, in links {listed(boxes)}")
+        notes.append(
+            f"meshes that are not closed count as their bounding boxes, in links {quote_names(boxes)}"
+        )
 
 
 def _inertia(shape: ElementTree.Element, density: float, link: str, boxes: list[str]) -> pin.Inertia:

@@ -15,7 +15,7 @@ from pin_nonideal.types import Model
 # Threshold of singularity. The rounding of M is a few units in the last place of the largest term of each
 # entry. After rows and columns are scaled to a unit diagonal, smaller eigenvalues cannot be distinguished
 # from zero.
-SINGULAR = 16.0 * float(np.finfo(float).eps)
+MIN_EIGENVALUE = 16.0 * float(np.finfo(float).eps)
 
 
 def mass_diagnosis(model: Model, q: ArrayLike | None = None) -> str | None:
@@ -37,18 +37,18 @@ def mass_diagnosis(model: Model, q: ArrayLike | None = None) -> str | None:
     M = runner.terms(q, np.zeros(model.nv))[0].reshape(model.nv, model.nv)
     diagonal = M.diagonal()
     largest = float(diagonal.max())
-    bare = [i for i in range(model.nv) if not diagonal[i] > SINGULAR**2 * max(largest, 0.0)]
-    if bare:
-        joints = _joints_of(model, bare)
+    weightless_dofs = [i for i in range(model.nv) if not diagonal[i] > MIN_EIGENVALUE**2 * max(largest, 0.0)]
+    if weightless_dofs:
+        joints = _joints_of(model, weightless_dofs)
         return (
-            f"{_quoted('joint', [model.names[j] for j in joints])} {'moves' if len(joints) == 1 else 'move'} "
-            f"no inertia: give {_quoted('link', _links_beyond(model, joints))} a mass and a moment of "
+            f"{_quote('joint', [model.names[j] for j in joints])} {'moves' if len(joints) == 1 else 'move'} "
+            f"no inertia: give {_quote('link', _links_beyond(model, joints))} a mass and a moment of "
             "inertia in the robot's file, or make the joint fixed"
         )
     scale = 1.0 / np.sqrt(diagonal)
     scaled = scale[:, None] * M * scale
     try:  # Much cheaper than eigenvalues, and sufficient for nearly every robot.
-        np.linalg.cholesky(scaled - SINGULAR * model.nv * np.eye(model.nv))
+        np.linalg.cholesky(scaled - MIN_EIGENVALUE * model.nv * np.eye(model.nv))
         return None
     except np.linalg.LinAlgError:
         values, vectors = np.linalg.eigh(scaled)
@@ -56,8 +56,8 @@ def mass_diagnosis(model: Model, q: ArrayLike | None = None) -> str | None:
     joints = _joints_of(model, [int(i) for i in np.flatnonzero(direction > 0.1 * direction.max())])
     suspects = _light_links(model, joints) or _links_beyond(model, joints)
     return (
-        f"a motion of {_quoted('joint', [model.names[j] for j in joints])} meets no inertia (smallest "
-        f"eigenvalue of the scaled M is {values[0]:.1e}): give {_quoted('link', suspects)} a mass and a "
+        f"a motion of {_quote('joint', [model.names[j] for j in joints])} meets no inertia (smallest "
+        f"eigenvalue of the scaled M is {values[0]:.1e}): give {_quote('link', suspects)} a mass and a "
         "moment of inertia, start elsewhere if axes are parallel only here, or make three revolute "
         "joints in a row one ball joint"
     )
@@ -104,7 +104,7 @@ def _light_links(model: Model, joints: Sequence[int]) -> list[str]:
     return _links_beyond(model, light) if light else []
 
 
-def _quoted(word: str, names: Sequence[str]) -> str:
+def _quote(word: str, names: Sequence[str]) -> str:
     """Return a word, plural if needed, with up to four quoted names."""
     shown = ", ".join(f'"{n}"' for n in names[:4]) + (", ..." if len(names) > 4 else "")
     return f"{word}{'' if len(names) == 1 else 's'} {shown}"

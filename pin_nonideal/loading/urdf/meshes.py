@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from .xml import listed, numbers
+from .xml import numbers, quote_names
 
 SCHEMES = ("package://", "model://")
 MESHES = "meshes"  # folder of a package in which meshes of broken paths are searched
@@ -70,12 +70,12 @@ def resolve_meshes(root: ElementTree.Element, path: Path, package_dirs: Sequence
     if guessed:
         first = next(iter(guessed))
         notes.append(
-            f"paths of meshes {listed(guessed)} lead nowhere; they are the only ones beneath a folder "
+            f"paths of meshes {quote_names(guessed)} lead nowhere; they are the only ones beneath a folder "
             f'"{MESHES}" that end so, such as "{guessed[first]}"'
         )
     if drawn:
         units = ", ".join(f"{meter:g} m" for meter in sorted(set(drawn.values())))
-        notes.append(f"meshes {listed(drawn)} are drawn in units of {units}, as their files say")
+        notes.append(f"meshes {quote_names(drawn)} are drawn in units of {units}, as their files say")
     return notes
 
 

@@ -30,7 +30,7 @@ from .meshes import resolve_meshes
 from .repair import repair_urdf
 from .validation import check_urdf
 from .xacro import urdf_text
-from .xml import listed, numbers, parse_xml, read_text
+from .xml import numbers, parse_xml, quote_names, read_text
 
 
 class Keyframe(NamedTuple):
@@ -119,7 +119,7 @@ def read_urdf(
     check_urdf(root, path, ("universe", "root_joint") if free_flyer else ("universe",))
     shaped = links_without_inertia(root)
     notes += resolve_meshes(root, path, package_dirs)
-    bare = links_without_inertia(root)
+    massless_links = links_without_inertia(root)
     if density is not None:
         add_inertias(root, density, notes)
     xml = ElementTree.tostring(root, encoding="unicode")
@@ -138,13 +138,13 @@ def read_urdf(
     robot.to_float = "load(..., free_flyer=True) gives the root link a floating base"
     robot.open_loops = loops
     robot.joint_order = tuple(j.get("name", "") for j in root.findall("joint"))
-    lost = [link for link in shaped if link not in bare]
-    if lost and (density is not None or not bare):
+    missing_links = [link for link in shaped if link not in massless_links]
+    if missing_links and (density is not None or not massless_links):
         robot.advice = (
-            f"the meshes of links {listed(lost)}, which state no inertia, were not found: put them there, or "
-            "name the folders of their packages with package_dirs"
+            f"the meshes of links {quote_names(missing_links)}, which state no inertia, were not found: put "
+            "them there, or name the folders of their packages with package_dirs"
         )
-    elif bare and density is None:
+    elif massless_links and density is None:
         robot.advice = "load(..., density=1000.0) computes the inertia of such links from their shapes"
     return robot
 
@@ -233,10 +233,10 @@ def _unused_notes(root: ElementTree.Element) -> list[str]:
     joints = {j.get("name") for j in root.findall("joint")}
     strange = [str(j.get("name")) for j in root.findall("transmission/joint") if j.get("name") not in joints]
     if strange:
-        notes.append(f"transmissions drive joints that do not exist: {listed(strange)}")
+        notes.append(f"transmissions drive joints that do not exist: {quote_names(strange)}")
     if geared:
         notes.append(
-            f"reductions of transmissions {listed(geared)} are not used: torques are those at the joints"
+            f"reductions of transmissions {quote_names(geared)} are not used: torques are those at the joints"
         )
     return notes
 

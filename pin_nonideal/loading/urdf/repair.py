@@ -10,13 +10,13 @@ import numpy as np
 
 from .unread_tags import unread_notes
 from .validation import SHAPES
-from .xml import listed
+from .xml import quote_names
 
 # URDF tags of elements in <robot>; other elements belong to other tools and are removed.
 ROBOT = ("link", "joint", "material", "transmission")
 VERSION = "1.1"  # version of URDF; without it, Pinocchio's parser ignores capsules and quaternions
 WORLD = "world"  # link that many files use without declaring it
-INFINITE = ("inf", "-inf", "+inf", "infinity", "-infinity", "+infinity")  # limits without a bound
+INFINITE_WORDS = ("inf", "-inf", "+inf", "infinity", "-infinity", "+infinity")  # limits without a bound
 NAMESPACE_MARK = "{"  # beginning of tags with a namespace
 # Maximum rounding error of principal moments, relative to the mass times (1 m)^2.
 INERTIA_ROUNDING = 1e-12
@@ -49,7 +49,7 @@ def repair_urdf(root: ElementTree.Element) -> list[str]:
                     sizeless.append(str(link.get("name")))
                 _uniform_scale(shape)
     if sizeless:
-        notes.append(f"shapes of size zero are left out, in links {listed(sizeless)}")
+        notes.append(f"shapes of size zero are left out, in links {quote_names(sizeless)}")
     return notes + _inertias(root) + _limits(root)
 
 
@@ -75,15 +75,19 @@ def _remove_foreign(root: ElementTree.Element) -> list[str]:
 
 def _remove_stray_shapes(root: ElementTree.Element) -> list[str]:
     """Remove elements of a `<geometry>` other than its shape."""
-    lost: dict[str, None] = {}
+    ignored_elements: dict[str, None] = {}
     for link in root.findall("link"):
         for geometry in (g for kind in ("visual", "collision") for g in link.findall(f"{kind}/geometry")):
             stray = [e for e in geometry if e.tag not in SHAPES]
             if len(geometry) - len(stray) == 1:
                 for element in stray:
                     geometry.remove(element)
-                    lost[f'<{element.tag}> in link "{link.get("name")}"'] = None
-    return [f"elements beside the shape of a <geometry> are not read: {', '.join(lost)}"] if lost else []
+                    ignored_elements[f'<{element.tag}> in link "{link.get("name")}"'] = None
+    return (
+        [f"elements beside the shape of a <geometry> are not read: {', '.join(ignored_elements)}"]
+        if ignored_elements
+        else []
+    )
 
 
 def _world(root: ElementTree.Element) -> list[str]:
@@ -111,7 +115,7 @@ def _colors(root: ElementTree.Element) -> list[str]:
                 material.remove(color)
                 bad.append(str(material.get("name")))
     return (
-        [f"colors that are not four numbers from 0 to 1 are left out, of materials {listed(bad)}"]
+        [f"colors that are not four numbers from 0 to 1 are left out, of materials {quote_names(bad)}"]
         if bad
         else []
     )
@@ -129,7 +133,7 @@ def _undefined_materials(root: ElementTree.Element) -> list[str]:
                     lost.append(str(material.get("name")))
     for material in [m for m in root.findall("material") if not len(m)]:
         root.remove(material)
-    notes = [f"materials that are not defined are left out: {listed(lost)}"] if lost else []
+    notes = [f"materials that are not defined are left out: {quote_names(lost)}"] if lost else []
     named: set[str | None] = set()
     twice = []
     for material in root.findall("material"):
@@ -137,7 +141,7 @@ def _undefined_materials(root: ElementTree.Element) -> list[str]:
             root.remove(material)
             twice.append(str(material.get("name")))
         named.add(material.get("name"))
-    return notes + ([f"of materials defined twice the first counts: {listed(twice)}"] if twice else [])
+    return notes + ([f"of materials defined twice the first counts: {quote_names(twice)}"] if twice else [])
 
 
 def _sizeless(shape: ElementTree.Element) -> bool:
@@ -188,11 +192,11 @@ def _inertias(root: ElementTree.Element) -> list[str]:
             unbalanced.append(str(link.get("name")))
     notes = []
     if rounded:
-        notes.append(f"moments of inertia below zero by rounding are zero, of links {listed(rounded)}")
+        notes.append(f"moments of inertia below zero by rounding are zero, of links {quote_names(rounded)}")
     if unbalanced:
         notes.append(
-            f"inertias that no body has are taken as they are, of links {listed(unbalanced)}: their largest "
-            "principal moment exceeds the sum of the others"
+            f"inertias that no body has are taken as they are, of links {quote_names(unbalanced)}: their "
+            "largest principal moment exceeds the sum of the others"
         )
     return notes
 
@@ -208,7 +212,7 @@ def _limits(root: ElementTree.Element) -> list[str]:
         if limit is None:
             continue
         for key in ("effort", "velocity", "lower", "upper"):
-            if (limit.get(key) or "").strip().lower() in INFINITE:
+            if (limit.get(key) or "").strip().lower() in INFINITE_WORDS:
                 limit.set(key, repr(math.copysign(sys.float_info.max, float(limit.get(key, "0")))))
                 mended.append(str(joint.get("name")))
         for key in ("effort", "velocity"):
@@ -229,5 +233,6 @@ def _limits(root: ElementTree.Element) -> list[str]:
     if not mended:
         return []
     return [
-        f"limits that are none, missing, negative or turned around are mended, of joints {listed(mended)}"
+        f"limits that are none, missing, negative or turned around are mended, of joints "
+        f"{quote_names(mended)}"
     ]

@@ -25,8 +25,9 @@ ATTRIBUTES: dict[str, tuple[str, ...]] = {
     "dynamics": ("damping", "friction"),
     "mimic": ("joint", "multiplier", "offset"),
 }
-SEVERAL = ("visual", "collision", "material")
-TRANSPOSED = {"iyx": "ixy", "izx": "ixz", "izy": "iyz"}  # equal to the symmetric entry, written by some tools
+REPEATABLE_TAGS = ("visual", "collision", "material")
+# Entries of the other triangle, which some tools write; each is equal to the symmetric entry.
+TRANSPOSED_ENTRIES = {"iyx": "ixy", "izx": "ixz", "izy": "iyz"}
 
 
 def unread_notes(root: ElementTree.Element) -> list[str]:
@@ -40,11 +41,11 @@ def unread_notes(root: ElementTree.Element) -> list[str]:
     repeated: dict[str, None] = {}
     for top in (*root.findall("link"), *root.findall("joint")):
         where = f'{top.tag} "{top.get("name")}"'
-        for element in _known(top):
+        for element in _urdf_elements(top):
             counts = Counter(str(child.tag) for child in element)
             inside = f"<{element.tag}>"
             unknown |= {f"<{tag}> in {inside}": None for tag in counts if tag not in _may_hold(element)}
-            twice = [tag for tag, n in counts.items() if n > 1 and tag not in SEVERAL]
+            twice = [tag for tag, n in counts.items() if n > 1 and tag not in REPEATABLE_TAGS]
             repeated |= {f"<{tag}> in {where}": None for tag in twice if tag in _may_hold(element)}
             misspelt |= {f"{key} in {inside}": None for key in element.attrib if not _is_known(element, key)}
     notes = []
@@ -57,12 +58,12 @@ def unread_notes(root: ElementTree.Element) -> list[str]:
     return notes
 
 
-def _known(top: ElementTree.Element) -> list[ElementTree.Element]:
+def _urdf_elements(top: ElementTree.Element) -> list[ElementTree.Element]:
     """Return an element and its URDF elements, without shapes."""
     below = [
         child for child in top if child.tag in CHILDREN.get(str(top.tag), ()) and child.tag != "material"
     ]
-    return [top, *(element for child in below for element in _known(child))]
+    return [top, *(element for child in below for element in _urdf_elements(child))]
 
 
 def _may_hold(element: ElementTree.Element) -> tuple[str, ...]:
@@ -70,6 +71,6 @@ def _may_hold(element: ElementTree.Element) -> tuple[str, ...]:
 
 
 def _is_known(element: ElementTree.Element, key: str) -> bool:
-    if element.tag == "inertia" and key in TRANSPOSED:
-        return element.get(key) == element.get(TRANSPOSED[key])
+    if element.tag == "inertia" and key in TRANSPOSED_ENTRIES:
+        return element.get(key) == element.get(TRANSPOSED_ENTRIES[key])
     return key in ATTRIBUTES.get(str(element.tag), (key,))

@@ -22,7 +22,7 @@ SHAPES: dict[str, dict[str, int]] = {
     "sphere": {"radius": 1},
     "mesh": {"scale": 3},
 }
-MOVING = ("revolute", "continuous", "prismatic", "floating", "planar")
+MOVING_JOINT_TYPES = ("revolute", "continuous", "prismatic", "floating", "planar")
 
 
 def check_urdf(root: ElementTree.Element, path: Path, barred: Collection[str] = ()) -> None:
@@ -180,9 +180,11 @@ def _check_joint(joint: ElementTree.Element, path: Path) -> None:
     """Check that a joint has a known type, a nonzero axis, and nonnegative damping and friction."""
     where = f'"{path}": joint "{joint.get("name")}"'
     kind = joint.get("type")
-    if kind not in (*MOVING, "fixed"):
+    if kind not in (*MOVING_JOINT_TYPES, "fixed"):
         stated = "none" if kind is None else f'"{kind}"'
-        raise LoadingError(f"{where}: type must be one of {', '.join(MOVING)}, fixed; got {stated}")
+        raise LoadingError(
+            f"{where}: type must be one of {', '.join(MOVING_JOINT_TYPES)}, fixed; got {stated}"
+        )
     pose(joint.find("origin"), where)
     axis = numbers(joint.find("axis"), "xyz", 3, (1, 0, 0), where)
     if kind in ("revolute", "continuous", "prismatic", "planar") and not axis.any():

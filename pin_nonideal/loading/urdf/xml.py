@@ -15,7 +15,7 @@ from pin_nonideal.errors import LoadingError
 # Numbers that all readers of such files accept; Python's float also accepts 1_000 and digits of other
 # scripts.
 NUMBER = re.compile(r"[-+]?((\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|inf|infinity|nan)", re.ASCII | re.IGNORECASE)
-FOREIGN = "unbound:"  # namespace of prefixes that a file does not declare
+UNDECLARED_NAMESPACE = "unbound:"  # namespace of prefixes that a file does not declare
 
 
 def read_text(path: Path) -> str:
@@ -56,11 +56,11 @@ def _declare_prefixes(text: str, root: str) -> str:
     used = set(re.findall(r"</?([\w.-]+):[\w.-]", text)) | set(re.findall(r"\s([\w.-]+):[\w.-]+\s*=", text))
     declared = set(re.findall(r"xmlns:([\w.-]+)\s*=", text))
     unbound = sorted(used - declared - {"xmlns", "xml"})
-    names = "".join(f' xmlns:{prefix}="{FOREIGN}{prefix}"' for prefix in unbound)
+    names = "".join(f' xmlns:{prefix}="{UNDECLARED_NAMESPACE}{prefix}"' for prefix in unbound)
     return re.sub(rf"<{root}(?=[\s/>])", f"<{root}{names}", text, count=1) if unbound else text
 
 
-def listed(names: Iterable[str]) -> str:
+def quote_names(names: Iterable[str]) -> str:
     """Return up to four quoted names, and the number of the remaining ones.
 
     Args:

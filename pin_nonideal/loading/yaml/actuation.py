@@ -42,7 +42,7 @@ def _drive(model: Model, entry: object, motors: Sequence[str], where: str, liste
     if kind == "torques":
         if not isinstance(values, dict):
             raise LoadingError(f"{where}: torques must be a table by joint name; got {short_repr(values)}")
-        named = _checked(model, values, f"{where}: torques", signed=True)
+        named = _joint_numbers(model, values, f"{where}: torques", signed=True)
         return named if listed else _by_joint(model, named)
     if kind in ("SampledControl", "function"):
         raise LoadingError(
@@ -64,11 +64,13 @@ def _gain(model: Model, gain: object, motors: Sequence[str], where: str, listed:
         gain = dict.fromkeys(motors, gain)
     if not isinstance(gain, dict):
         return gain
-    named = _checked(model, gain, where, signed=False)
+    named = _joint_numbers(model, gain, where, signed=False)
     return named if listed else _by_joint(model, named)
 
 
-def _checked(model: Model, table: Mapping[Any, object], where: str, *, signed: bool) -> dict[str, float]:
+def _joint_numbers(
+    model: Model, table: Mapping[Any, object], where: str, *, signed: bool
+) -> dict[str, float]:
     """Return numbers by joint name.
 
     Raises:

@@ -61,7 +61,7 @@ def scene_arguments(
     optional_string(table, "description", where)
     exchange_joints(robot, table, where, notes, merge)
     place_base(robot, table, where)
-    if robot.model.nv == 0:  # a robot without joints and base was meant to float
+    if robot.model.nv == 0:  # a robot without joints and base is probably a floating robot
         notes.append(f"nothing moves: {robot.to_float}" if robot.to_float else "nothing moves")
     if "gravity" in table:
         robot.model.gravity = pin.Motion(

@@ -14,7 +14,7 @@ from pin_nonideal.loading.urdf.reader import RobotFile
 from pin_nonideal.states.held import Held
 from pin_nonideal.states.joint_order import describe_order, order_words
 from pin_nonideal.states.parsing import (
-    joint_named,
+    find_joint,
     named_configuration,
     named_coordinates,
     named_entries,
@@ -138,7 +138,7 @@ def requested_state(
 
 
 def held_entries(robot: RobotFile, table: Mapping[str, Any], start: Start, speed: Start) -> Held:
-    """Return the entries that the arguments of `load` name, or else the tables of the file.
+    """Return the entries that the arguments of `load` name, else the entries that robot.yaml names.
 
     Args:
         robot: content of the robot's file, with the joints of the scene.
@@ -161,7 +161,7 @@ def held_entries(robot: RobotFile, table: Mapping[str, Any], start: Start, speed
 
 def _moves(model: Model, name: object) -> bool:
     try:
-        joint_named(model, name, "initial")
+        find_joint(model, name, "initial")
     except UnknownNameError:
         return False
     return True

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
 
 # Residual of closed loops, relative to the size of the mechanism or to 1 rad: far below a pixel.
-CLOSED = 1e-6
+CLOSURE_TOL = 1e-6
 
 
 class Cubics:
@@ -77,20 +77,20 @@ class Cubics:
         return np.array(each).reshape(-1, self.model.nv)
 
     def closed(self, k: NDArray[np.int64], s: Array, size: float, unseen: float) -> tuple[Array, Array]:
-        """Configurations on the cubics with closed loops, and what they tell.
+        """Compute configurations on the cubics with closed loops, and the displacements that close the loops.
 
-        Newton's method of the core closes the loops, a microsecond a frame.
+        Newton's method of the core closes the loops in a microsecond per frame.
 
         Args:
             k: samples, (n,).
             s: parts of the way to the next sample, 0 to 1, (n,).
-            size: of the mechanism [m].
+            size: size of the mechanism [m].
             unseen: residual that is too small to be seen [m or rad].
 
         Returns:
             The configurations, (n, nq), and the largest displacement of a coordinate that closes the loops
-            [m or rad], (n,).  Where they cannot be closed the configuration is that of the cubic, and the
-            displacement is zero where its residual is too small to be seen, else NaN.
+            [m or rad], (n,).  If the loops cannot be closed, the configuration stays on the cubic, and the
+            displacement is zero if its residual is too small to be seen, else NaN.
         """
         q = self.configurations(k, s)
         if not self.run.scene.constraint_slices or not len(q):
@@ -102,7 +102,7 @@ class Cubics:
         v = (1.0 - part) * self.run.v[k] + part * self.run.v[k + 1]
         t = self.t[k] + s * (self.t[k + 1] - self.t[k])
         on, after = _closest(program, q, v, t, np.inf)
-        moved, tolerance = np.abs(on - q).max(axis=1, initial=0.0), CLOSED * min(1.0, size)
+        moved, tolerance = np.abs(on - q).max(axis=1, initial=0.0), CLOSURE_TOL * min(1.0, size)
         failed = np.flatnonzero(~(after <= tolerance))
         if len(failed):
             on[failed] = q[failed]
@@ -111,7 +111,7 @@ class Cubics:
         return on, moved
 
     def _at(self, k: NDArray[np.int64], s: Array) -> tuple[Array, Array]:
-        """What leads from the samples to the cubics, and its rate in time, (n, nv) each."""
+        """Return displacements from the samples to the cubics, and their rates in time, (n, nv) each."""
         run = self.run
         q0, q1, v0, v1 = run.q[k], run.q[k + 1], run.v[k], run.v[k + 1]
         h, part = (self.t[k + 1] - self.t[k])[:, None], s[:, None]
@@ -128,7 +128,7 @@ class Cubics:
         return xi, rate
 
     def _steps(self, q0: Array, q1: Array, v1: Array) -> tuple[Array, Array]:
-        """Differences of configurations, and rates at their ends in the tangent space at q0, (n, nv) each."""
+        """Return differences of configurations, and end rates in the tangent space at q0, (n, nv) each."""
         steps = np.empty(v1.shape)
         dof, first = self._lines.T
         steps[:, dof] = q1[:, first] - q0[:, first]
@@ -138,7 +138,7 @@ class Cubics:
         return steps, v1
 
     def _curved_steps(self, k: NDArray[np.int64]) -> tuple[Array, Array]:
-        """Differences and rates at their ends, as `_steps`, of joints on any manifold."""
+        """Return differences and rates at their ends, as `_steps`, for joints on any manifold."""
         steps, rates = self._differences
         for one in np.unique(k[~self._known[k]]):
             pair = self.run.q[one], self.run.q[one + 1]
@@ -149,14 +149,14 @@ class Cubics:
 
 
 def _closest(program: core.Program, q: Array, v: Array, t: Array, far: float) -> tuple[Array, Array]:
-    """Configurations with closed loops, (n, nq), and their largest residuals, NaN where there is none, (n,).
+    """Return configurations with closed loops, (n, nq), and their largest residuals or NaN, (n,).
 
     Newton's method starts from residuals up to `far`; others are returned as they are.
     """
     if not any(block.moves_in_time for block in program.constraints):
-        none: Any = np.zeros((len(q), 0))
+        no_values: Any = np.zeros((len(q), 0))
         closed, _, after, _ = core.nearest_states(
-            program, q, v, t=float(t[0]), far=far, threads=1, names=[], values=none
+            program, q, v, t=float(t[0]), far=far, threads=1, names=[], values=no_values
         )
         return np.array(closed).reshape(q.shape), np.asarray(after)
     projected, residual, runner = q.copy(), np.full(len(q), np.nan), program.runner()

@@ -15,8 +15,8 @@ from .visuals import LINK_COLORS, Visual, visuals_of
 if TYPE_CHECKING:
     from pin_nonideal.scene.scene import Scene
 
-# Collision shapes with more triangles are not carried.
-TRIANGLES = 20_000
+# Collision shapes with more triangles are left out.
+MAX_TRIANGLES = 20_000
 
 
 def inertia_box(inertia: pin.Inertia) -> Table:
@@ -32,11 +32,11 @@ def inertia_box(inertia: pin.Inertia) -> Table:
 
 
 def collisions_of(scene: Scene) -> list[Visual]:
-    """Collision shapes, without those of too many triangles in all."""
+    """Collision shapes, unless they have too many triangles in total."""
     if scene.collision_model is None:
         return []
-    overlays, room = [], TRIANGLES
-    for visual in visuals_of(scene.collision_model, TRIANGLES):
+    overlays, room = [], MAX_TRIANGLES
+    for visual in visuals_of(scene.collision_model, MAX_TRIANGLES):
         if visual.shape.kind != "plane" and len(visual.shape.triangles) <= room:
             room -= len(visual.shape.triangles)
             overlays.append(visual)

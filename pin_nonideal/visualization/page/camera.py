@@ -65,7 +65,7 @@ def view(
         shown: additional points of the world in the view [m], (k, 3).
     """
     model = scene.model
-    up = upward(model)
+    up = up_direction(model)
     coarse = motion.only(np.unique(np.linspace(0, len(motion.times) - 1, BOX_FRAMES).astype(int)))
     clouds = [(joint, coarse.point(joint, np.zeros(3))) for joint in range(1, model.njoints)]
     clouds += [(joint, coarse.point(joint, local)) for joint, local in marks]
@@ -82,7 +82,7 @@ def view(
     if follow:
         points = points - center_of_mass(model, coarse, stays)[None]
     else:
-        points = np.vstack([points, *_still(coarse, visuals, points)])
+        points = np.vstack([points, *_fixed_corners(coarse, visuals, points)])
     beside = points if follow else np.vstack([points.reshape(-1, 3), shown])
     return View(
         up=up,
@@ -96,7 +96,7 @@ def view(
     )
 
 
-def upward(model: pin.Model) -> Array:
+def up_direction(model: pin.Model) -> Array:
     """Return the direction against gravity, (3,), or z without gravity.
 
     Args:
@@ -124,7 +124,7 @@ def link_length(model: pin.Model, marks: list[tuple[int, Array]], size: float) -
     return min(float(np.median(real)) * 2.0, size) if real else size
 
 
-def _still(motion: Motion, visuals: list[Visual], points: Array) -> list[Array]:
+def _fixed_corners(motion: Motion, visuals: list[Visual], points: Array) -> list[Array]:
     """Return the corners of fixed visuals, (8, n, 3) each, that leave half of the view to the moving ones.
 
     A large floor would make the moving bodies small.

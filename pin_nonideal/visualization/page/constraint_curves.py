@@ -26,11 +26,11 @@ if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
 
 # Steps of a curve over the extent of the path, maximum extents in each direction, and steps across a surface.
-ALONG, EXTENTS, ACROSS = 60, 16, 6
+CURVE_STEPS, MAX_EXTENTS, SURFACE_STEPS = 60, 16, 6
 # Tolerance of A = N J, relative to A.
 POINT_TOLERANCE = 1e-6
 # Step of difference quotients of placements; their error is near 1e-9.
-NUDGE = 1e-6
+DIFFERENCE_STEP = 1e-6
 # Maximum number of degrees of freedom for which points are searched.
 MAX_DOFS = 30
 
@@ -101,12 +101,12 @@ class _Tracer:
         return np.asarray(joint_placements(self.model, q)[self.joint].act(self.local))
 
     def jacobian(self, q: Array) -> Array:
-        nudges = NUDGE * np.eye(self.model.nv)
+        nudges = DIFFERENCE_STEP * np.eye(self.model.nv)
         ends = [
             self.place(pin.integrate(self.model, q, d)) - self.place(pin.integrate(self.model, q, -d))
             for d in nudges
         ]
-        return np.asarray(np.array(ends).T / (2.0 * NUDGE))
+        return np.asarray(np.array(ends).T / (2.0 * DIFFERENCE_STEP))
 
     def normals(self, q: Array, t: float, v: Array | None = None) -> tuple[Array, Array] | None:
         """Return N with A = N J, and J, or None if the rows act on more than the position of the point."""
@@ -146,7 +146,7 @@ class _Tracer:
                 return replace(blank, points=band, columns=2, closed=closed)
             return replace(blank, points=points, closed=closed)
         if space - rank == 2:
-            return replace(blank, kind="surface", points=self.surface(extent), columns=2 * ACROSS + 1)
+            return replace(blank, kind="surface", points=self.surface(extent), columns=2 * SURFACE_STEPS + 1)
         return None
 
     def disk(self, extent: float) -> Guide | None:
@@ -209,12 +209,16 @@ class _Tracer:
 
     def curve(self, q: Array, t: float, path: Array, extent: float) -> tuple[Array, bool]:
         """Return the points of a closed curve, or of the part of an open curve near the path."""
-        length, (first,) = extent / ALONG, self.tangents(q, t)[:1]
-        ahead = [self.place(x) for x in self.walk(q, t, first, length, ALONG * EXTENTS)]
+        length, (first,) = extent / CURVE_STEPS, self.tangents(q, t)[:1]
+        ahead = [self.place(x) for x in self.walk(q, t, first, length, CURVE_STEPS * MAX_EXTENTS)]
         start = self.place(q)
-        if ahead and len(ahead) < ALONG * EXTENTS and np.linalg.norm(ahead[-1] - start) < 0.8 * length:
+        if (
+            ahead
+            and len(ahead) < CURVE_STEPS * MAX_EXTENTS
+            and np.linalg.norm(ahead[-1] - start) < 0.8 * length
+        ):
             return np.array([start, *ahead[:-1], start]), True
-        back = [self.place(x) for x in self.walk(q, t, -first, length, 2 * ALONG)]
+        back = [self.place(x) for x in self.walk(q, t, -first, length, 2 * CURVE_STEPS)]
         points = np.array([*reversed(back), start, *ahead])
         thin = path[:: max(1, len(path) // 300)]
         near = np.linalg.norm(points[:, None] - thin[None], axis=2).min(axis=1) < 0.35 * extent
@@ -223,9 +227,9 @@ class _Tracer:
 
     def surface(self, extent: float) -> Array:
         """Return the points of a strip of the surface along the path, in rows across it."""
-        rows, length = [], 0.25 * extent / ACROSS
+        rows, length = [], 0.25 * extent / SURFACE_STEPS
         path = self.motion.q
-        chosen = np.unique(np.linspace(0, len(path) - 1, ALONG).astype(int))
+        chosen = np.unique(np.linspace(0, len(path) - 1, CURVE_STEPS).astype(int))
         t, across = float(self.run.t[0]), np.zeros(3)
         for k in chosen:
             q = self.step(np.asarray(path[k]), t, np.zeros(3))
@@ -237,9 +241,9 @@ class _Tracer:
             side = np.cross(N[0], ahead)
             side = side / np.linalg.norm(side) if np.linalg.norm(side) > 0.0 else tangents[0]
             across = side if side @ across >= 0.0 else -side
-            left = [self.place(x) for x in self.walk(q, t, across, length, ACROSS)]
-            right = [self.place(x) for x in self.walk(q, t, -across, length, ACROSS)]
-            if len(left) == len(right) == ACROSS:
+            left = [self.place(x) for x in self.walk(q, t, across, length, SURFACE_STEPS)]
+            right = [self.place(x) for x in self.walk(q, t, -across, length, SURFACE_STEPS)]
+            if len(left) == len(right) == SURFACE_STEPS:
                 rows += [*reversed(right), self.place(q), *left]
         return np.array(rows).reshape(-1, 3)
 

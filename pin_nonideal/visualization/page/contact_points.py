@@ -68,14 +68,14 @@ def contact_points(run: Trajectory, motion: Motion) -> list[ContactPoint]:
         for k, name in enumerate(names)
         if hasattr(compiled.described[name], "plane") or name in struck or name not in left_out
     ]
-    lines, closed = _action_lines(run, motion, chosen), _closed(run, [names[k] for k in chosen])
+    lines, closed = _action_lines(run, motion, chosen), _closed_mask(run, [names[k] for k in chosen])
     return [
         _contact_point(run, names[k], lines[:, column], closed[motion.before, column])
         for column, k in enumerate(chosen)
     ]
 
 
-def _closed(run: Trajectory, names: list[str]) -> NDArray[np.bool_]:
+def _closed_mask(run: Trajectory, names: list[str]) -> NDArray[np.bool_]:
     """Check if contacts are closed at each sample, (nt, n)."""
     closed = getattr(run, "closed", None)
     if closed is None:

@@ -38,8 +38,8 @@ PAPER: Table = {
 }
 
 
-def _checked(style: Mapping[str, object]) -> Table:
-    """Return settings that matplotlib knows.
+def _check_settings(style: Mapping[str, object]) -> Table:
+    """Return settings, checked to be settings of matplotlib.
 
     Raises:
         InputError: matplotlib has no setting of a name, or refuses its value.
@@ -70,7 +70,7 @@ class Style:
             choice("plot: style", style, STYLES)
         self.settings = dict(PAPER if self.print else SCREEN)
         if isinstance(style, Mapping):
-            self.settings |= _checked(style)
+            self.settings |= _check_settings(style)
         self.width = WIDTHS[columns]
         self.height = RATIOS[columns] * self.width
 

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 # largest moment and the largest force times the length of a link.
 MIN_RELATIVE_SIZE = 1e-9
 # Joints of several degrees of freedom with constant directions of motion in their own frame.
-STEADY = ("JointModelFreeFlyer", "JointModelSpherical", "JointModelTranslation")
+CONSTANT_AXES_JOINTS = ("JointModelFreeFlyer", "JointModelSpherical", "JointModelTranslation")
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ def arrows_of(
     ]
     if run.lam is not None:
         for name, item, shown in constraints_of(run.scene):
-            if shown == core.Shown.contact:  # the forces of contacts are drawn at their points
+            if shown == core.DisplayKind.contact:  # the forces of contacts are drawn at their points
                 continue
             rows = run.scene.constraint_slices[name]
             parts = {"total": motion.of(run.lam[:, rows])}
@@ -125,26 +125,26 @@ def _above_rounding(arrows: list[Arrow], model: pin.Model, size: float) -> list[
 
 
 def _reaction(
-    scene: Scene, motion: Motion, name: str, kind: str, item: Any, shown: core.Shown, lam: Array
+    scene: Scene, motion: Motion, name: str, kind: str, item: Any, shown: core.DisplayKind, lam: Array
 ) -> list[Arrow]:
     """Return the arrows of one constraint: the force on its first body, or the force on its joints."""
     model = scene.model
     if hasattr(item, "lower"):  # the force of a stop points away from the stop
         way = -1.0 if name.endswith(" upper") else 1.0
         return along(model, motion, name, kind, model.getJointId(item.joint), way * lam[:, 0])
-    if shown in (core.Shown.anchor, core.Shown.rod):
+    if shown in (core.DisplayKind.anchor, core.DisplayKind.rod):
         return _connection_arrows(scene, motion, name, kind, item, shown, lam)
-    if shown == core.Shown.rolling:
+    if shown == core.DisplayKind.rolling:
         body = side_of(model, item.frame)
-        force, place = _rolling(model, motion, item, lam)
+        force, place = _rolling_force(model, motion, item, lam)
         return [Arrow(name, kind, "N", force, body.joint, place)]
-    if shown == core.Shown.edge:
+    if shown == core.DisplayKind.edge:
         edge = side_of(model, item.frame)
         force = edge.turned(motion, lam[:, :1] * np.array(unit_axis("axis", item.axis)))
         return [Arrow(name, kind, "N", force, edge.joint, motion.point(edge.joint, edge.point))]
-    if shown == core.Shown.drive:
+    if shown == core.DisplayKind.drive:
         return along(model, motion, name, kind, model.getJointId(item.joint), lam[:, 0])
-    if shown == core.Shown.gear:
+    if shown == core.DisplayKind.gear:
         driven = along(model, motion, name, kind, model.getJointId(item.joint1), lam[:, 0])
         leading = along(model, motion, name, kind, model.getJointId(item.joint2), -item.ratio * lam[:, 0])
         return driven + leading
@@ -162,12 +162,12 @@ def _user_gap_arrows(run: Trajectory, motion: Motion, name: str, lam: Array) -> 
 
 
 def _connection_arrows(
-    scene: Scene, motion: Motion, name: str, kind: str, item: Any, shown: core.Shown, lam: Array
+    scene: Scene, motion: Motion, name: str, kind: str, item: Any, shown: core.DisplayKind, lam: Array
 ) -> list[Arrow]:
     """Return the force on the first of two connected frames, and the moment if the constraint has one."""
     first, second = sides_of(scene, item)
     origin = motion.point(first.joint, first.point)
-    if shown == core.Shown.rod:
+    if shown == core.DisplayKind.rod:
         force = lam[:, :1] * _unit(origin - motion.point(second.joint, second.point))
         return [Arrow(name, kind, "N", force, first.joint, origin)]
     axes = ["xyz".index(axis) for axis in getattr(item, "axes", "xyz")]
@@ -183,7 +183,7 @@ def _connection_arrows(
     return arrows
 
 
-def _rolling(model: pin.Model, motion: Motion, item: Any, lam: Array) -> tuple[Array, Array]:
+def _rolling_force(model: pin.Model, motion: Motion, item: Any, lam: Array) -> tuple[Array, Array]:
     """Return the force on a rolling sphere or disk, and the contact point, (n, 3) each."""
     t1, t2, normal = (np.array(axis) for axis in axis_triad(unit_axis("normal", item.normal)))
     local = lam @ np.array([t1, t2, normal])
@@ -232,7 +232,7 @@ def _at_joints(model: pin.Model, motion: Motion, kind: str, force: Array) -> lis
     for joint in reversed(range(1, model.njoints)):
         if joint in covered:
             continue
-        chain = _sliding(model, joint)
+        chain = _particle_joints(model, joint)
         covered.update(chain)
         name = ", ".join(str(model.names[j]) for j in reversed(chain))
         if len(chain) > 1:
@@ -247,7 +247,7 @@ def _at_joints(model: pin.Model, motion: Motion, kind: str, force: Array) -> lis
     return arrows
 
 
-def _sliding(model: pin.Model, joint: int) -> list[int]:
+def _particle_joints(model: pin.Model, joint: int) -> list[int]:
     """Return a joint and the joints before it that move the same particle."""
     chain = [joint]
     while _slides(model, joint):
@@ -268,7 +268,7 @@ def _wrench(model: pin.Model, motion: Motion, kind: str, joint: int, force: Arra
     item, name = model.joints[joint], str(model.names[joint])
     data, own = item.createData(), force[:, item.idx_v : item.idx_v + item.nv]
     item.calc(data, motion.q[0])
-    if item.shortname() in STEADY:
+    if item.shortname() in CONSTANT_AXES_JOINTS:
         local = own @ np.linalg.pinv(np.asarray(data.S))
     else:
         local = np.empty((len(force), 6))

@@ -13,7 +13,7 @@ from pin_nonideal.errors import InputError
 from pin_nonideal.types import Array
 
 from .between_samples import Cubics
-from .joint_tracks import Tracks, halfway, turned
+from .joint_tracks import Tracks, halfway, rotate_vectors
 
 if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
@@ -31,7 +31,7 @@ MAX_MISMATCH = 0.3
 # Width of tables from which columns of zeros, such as those of open contacts, are not interpolated.
 MIN_WIDTH = 100
 # Rounds of bisection: up to 2^12 frames between two samples.
-ROUNDS = 12
+MAX_BISECTIONS = 12
 
 
 @dataclass(frozen=True)
@@ -92,18 +92,21 @@ class Motion:
     def rotation(self, joint: int) -> Array:
         """Return the orientation of a joint in the world at each frame, (n, 3, 3)."""
         columns = [
-            turned(self.poses[:, joint, 3:], np.tile(axis, (len(self.times), 1))) for axis in np.eye(3)
+            rotate_vectors(self.poses[:, joint, 3:], np.tile(axis, (len(self.times), 1)))
+            for axis in np.eye(3)
         ]
         return np.stack(columns, axis=-1)
 
     def point(self, joint: int, local: Array) -> Array:
         """Return the world position of a point on a joint at each frame [m], (n, 3)."""
         moved = np.broadcast_to(np.asarray(local, dtype=float), (len(self.times), 3))
-        return np.asarray(self.poses[:, joint, :3] + turned(self.poses[:, joint, 3:], moved))
+        return np.asarray(self.poses[:, joint, :3] + rotate_vectors(self.poses[:, joint, 3:], moved))
 
     def along(self, joint: int, vectors: Array) -> Array:
         """Transform vectors from world axes to the axes of a joint, (n, 3)."""
-        return turned(self.poses[:, joint, 3:] * np.array([-1.0, -1.0, -1.0, 1.0]), np.asarray(vectors))
+        return rotate_vectors(
+            self.poses[:, joint, 3:] * np.array([-1.0, -1.0, -1.0, 1.0]), np.asarray(vectors)
+        )
 
     def local(self, joint: int, points: Array) -> Array:
         """Transform points from the world to the frame of a joint [m], (n, 3)."""
@@ -153,7 +156,9 @@ class _Frames:
         self.reach = np.minimum(np.maximum(self.tracks.reaches(start), self.link), self.size)
         self.dense = getattr(run, "dense", None) is not None
         self.well_sampled = (
-            np.ones(max(len(self.t) - 1, 0), dtype=bool) if self.dense else _well_sampled(run, self.size)
+            np.ones(max(len(self.t) - 1, 0), dtype=bool)
+            if self.dense
+            else _resolved_intervals(run, self.size)
         )
         self.before, self.part = np.zeros(0, dtype=np.int64), np.zeros(0)
         self.q, self.rows = np.zeros((0, run.q.shape[1])), np.zeros((0, self.tracks.width))
@@ -186,7 +191,7 @@ class _Frames:
         self.rows = self.tracks.steady(self.tracks.coordinates(self.q))
         longest = (self.t[-1] - self.t[0]) / self.least
         open_ones = np.ones(max(len(self.before) - 1, 0), dtype=bool)
-        for _ in range(ROUNDS):
+        for _ in range(MAX_BISECTIONS):
             room = most - len(self.before)
             where = np.flatnonzero(open_ones & self._divisible())
             if room <= 0 or not len(where):
@@ -213,8 +218,10 @@ class _Frames:
     def _divisible(self) -> NDArray[np.bool_]:
         """Return the intervals with a positive length and sufficient sampling."""
         last = len(self.well_sampled) - 1
-        alone = self.before[:-1] == np.where(self.part[1:] == 0.0, self.before[1:] - 1, self.before[1:])
-        is_resolved = ~alone | (self.well_sampled[np.clip(self.before[:-1], 0, last)] if last >= 0 else False)
+        is_adjacent = self.before[:-1] == np.where(self.part[1:] == 0.0, self.before[1:] - 1, self.before[1:])
+        is_resolved = ~is_adjacent | (
+            self.well_sampled[np.clip(self.before[:-1], 0, last)] if last >= 0 else False
+        )
         return np.asarray((np.diff(self.times()) > 1e-12 * (1.0 + abs(self.t[-1]))) & is_resolved)
 
     def _middle(self, where: NDArray[np.int64]) -> tuple[NDArray[np.int64], Array]:
@@ -253,7 +260,7 @@ class _Frames:
         )
 
 
-def _well_sampled(run: Trajectory, size: float) -> NDArray[np.bool_]:
+def _resolved_intervals(run: Trajectory, size: float) -> NDArray[np.bool_]:
     """Return the intervals between samples that are sampled finely enough, (nt - 1,).
 
     In such an interval the displacement is the mean rate times the duration, up to the curvature. Continuous
@@ -293,9 +300,10 @@ def _base(run: Trajectory, size: float, most: int) -> NDArray[np.int64]:
 def _sizes(model: pin.Model, poses: Array) -> tuple[float, float]:
     """Return the diagonal of the box around all joints and centers of mass, and the smallest link [m]."""
     levers = np.array([model.inertias[joint].lever for joint in range(model.njoints)])
-    centers = poses[:, :3] + turned(poses[:, 3:], levers)
+    centers = poses[:, :3] + rotate_vectors(poses[:, 3:], levers)
     frames = [
-        poses[f.parentJoint, :3] + turned(poses[f.parentJoint, None, 3:], f.placement.translation[None])[0]
+        poses[f.parentJoint, :3]
+        + rotate_vectors(poses[f.parentJoint, None, 3:], f.placement.translation[None])[0]
         for f in model.frames
     ]
     size = float(np.linalg.norm(np.ptp(np.vstack([poses[:, :3], centers, *frames]), axis=0)))

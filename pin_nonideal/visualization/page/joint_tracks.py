@@ -102,8 +102,8 @@ class Tracks:
         for number, track in self.moving():
             c = track.columns
             if track.axis is None:
-                turned = np.sum(result[1:, c][:, 3:] * result[:-1, c][:, 3:], axis=1) < 0.0
-                result[1:, c.start + 3 : c.stop] *= np.cumprod(np.where(turned, -1.0, 1.0))[:, None]
+                rotate_vectors = np.sum(result[1:, c][:, 3:] * result[:-1, c][:, 3:], axis=1) < 0.0
+                result[1:, c.start + 3 : c.stop] *= np.cumprod(np.where(rotate_vectors, -1.0, 1.0))[:, None]
             elif track.turning and self.model.joints[number].nq == 2:
                 result[:, c] = np.unwrap(result[:, c], axis=0)
         return np.asarray(result)
@@ -113,7 +113,7 @@ class Tracks:
         world = np.zeros((len(coordinates), len(self.joints), 7))
         world[:, 0, 6] = 1.0
         for number, track in self.moving():
-            start = _after(world[:, track.parent], np.broadcast_to(track.place, (len(world), 7)))
+            start = _placement_products(world[:, track.parent], np.broadcast_to(track.place, (len(world), 7)))
             values = coordinates[:, track.columns]
             move = values
             if track.axis is not None:
@@ -123,13 +123,13 @@ class Tracks:
                     move[:, 3:6], move[:, 6] = np.sin(values / 2.0) * track.axis, np.cos(values[:, 0] / 2.0)
                 else:
                     move[:, :3] = values * track.axis
-            world[:, number] = _after(start, move)
+            world[:, number] = _placement_products(start, move)
         return world
 
     def reaches(self, poses: Array) -> Array:
         """Return the maximum distance of the points that a joint moves from its origin [m], (njoints,)."""
         levers = np.array([inertia.lever for inertia in self.model.inertias])
-        ends = poses[:, :3] + turned(poses[:, 3:], levers)
+        ends = poses[:, :3] + rotate_vectors(poses[:, 3:], levers)
         lengths = np.zeros(len(self.joints))
         for frame in self.model.frames:
             joint = frame.parentJoint
@@ -164,13 +164,13 @@ class Tracks:
         return np.asarray(total.max(axis=1))
 
 
-def _after(first: Array, second: Array) -> Array:
+def _placement_products(first: Array, second: Array) -> Array:
     """Return products of placements, (n, 7) each."""
-    moved = first[:, :3] + turned(first[:, 3:], second[:, :3])
+    moved = first[:, :3] + rotate_vectors(first[:, 3:], second[:, :3])
     return np.column_stack([moved, _product(first[:, 3:], second[:, 3:])])
 
 
-def turned(quaternions: Array, vectors: Array) -> Array:
+def rotate_vectors(quaternions: Array, vectors: Array) -> Array:
     """Return vectors (n, 3) rotated by quaternions x, y, z, w, (n, 4)."""
     x, y, z, w = quaternions.T
     a, b, c = vectors.T
@@ -188,7 +188,7 @@ def slopes(times: Array, values: Array) -> tuple[Array, Array]:
     """Return the rates of change at both ends of every interval, (n - 1, c) each, for the page.
 
     Inner frames have the rate of the parabola through three frames. Frames with equal times, as at an impact,
-    and the ends of the run have the one-sided rate of the parabola that ends there.
+    and the ends of the run have the one-sided rate of the adjacent parabola.
     """
     h = np.diff(times)[:, None]
     chord = np.divide(np.diff(values, axis=0), h, out=np.zeros((len(h), values.shape[1])), where=h > 0.0)

@@ -88,7 +88,7 @@ def marks_of(scene: Scene) -> list[Mark]:
             side = side_of(scene.model, item.frame)
             point = side.placement.act(np.array(item.offset))
             marks.append(Mark(name, "contact", side.joint, point, side.joint, point))
-        elif shown in (core.Shown.anchor, core.Shown.rod):
+        elif shown in (core.DisplayKind.anchor, core.DisplayKind.rod):
             marks.append(_tie(scene, name, shown.name, item))
     springs = [item for item in scene.forces if isinstance(item, SpringDamper)]
     return marks + [_tie(scene, item.name or f"spring {item.frame1}", "spring", item) for item in springs]
@@ -102,7 +102,7 @@ def _tie(scene: Scene, name: str, kind: str, item: Any) -> Mark:
     return Mark(name, kind, first.joint, first.point, second.joint, second.point, axes)
 
 
-def constraints_of(scene: Scene) -> list[tuple[str, Any, core.Shown]]:
+def constraints_of(scene: Scene) -> list[tuple[str, Any, core.DisplayKind]]:
     """Return constraints and contacts with the names of their rows and their display kinds from the core.
 
     Args:

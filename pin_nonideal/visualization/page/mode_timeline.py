@@ -52,9 +52,9 @@ def bands_of(run: Trajectory) -> list[tuple[str, Bands]]:
     named_bands: list[tuple[str, Bands]] = []
     if run.modes is not None:
         modes = np.asarray(run.modes)
-        met = np.any(modes != OPEN, axis=0)
+        is_ever_closed = np.any(modes != OPEN, axis=0)
         struck = {str(event.element) for event in run.events}
-        shown = [k for k, name in enumerate(run.element_names) if met[k] or name in struck]
+        shown = [k for k, name in enumerate(run.element_names) if is_ever_closed[k] or name in struck]
         bands = mode_bands(run.t, modes[:, shown])
         named_bands = [(run.element_names[k], band) for k, band in zip(shown, bands, strict=True)]
     closed = getattr(run, "closed", None)

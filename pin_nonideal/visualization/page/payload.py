@@ -14,7 +14,7 @@ from pin_nonideal.types import Array, Table
 from .applied_forces import applied_force_arrows
 from .binary import Payload, Shapes
 from .body_overlays import collisions_of, colored_collisions, inertia_box
-from .camera import link_length, pattern_spacings, upward, view
+from .camera import link_length, pattern_spacings, up_direction, view
 from .constraint_curves import Guide, guides_of
 from .contact_points import contact_point_marks, contact_points
 from .contact_surfaces import contact_surfaces
@@ -83,8 +83,8 @@ def packed_runs(
     finer, motion = known[0]
     stage("shapes")
     ends = [(m.joint1, m.point1) for m in marks] + [(m.joint2, m.point2) for m in marks]
-    visuals, bare = _drawn(scene, motion, ends)
-    visuals = visuals + contact_surfaces(finer, motion, visuals, upward(model))
+    visuals, has_no_shapes = _drawn(scene, motion, ends)
+    visuals = visuals + contact_surfaces(finer, motion, visuals, up_direction(model))
     guides = guides_of(finer, motion)
     shapes = Shapes(payload)
     looking = view(scene, motion, visuals, ends, np.vstack([np.zeros((0, 3)), *(g.points for g in guides)]))
@@ -111,14 +111,14 @@ def packed_runs(
         "visuals": drawn,
         "name": names[0],
         "others": [
-            _other(payload, shapes, *other) for other in zip(runs[1:], motions[1:], names[1:], strict=True)
+            _ghost(payload, shapes, *other) for other in zip(runs[1:], motions[1:], names[1:], strict=True)
         ],
         "marks": [
             stored_mark(payload, motion, mark)
             for mark in [*marks, *contact_point_marks(touches, motion, marks)]
         ],
         "guides": [stored_guide(payload, guide) for guide in guides],
-        "trails": [{"joint": j, "point": point} for j, point in _trails(model, guides, bare)],
+        "trails": [{"joint": j, "point": point} for j, point in _trails(model, guides, has_no_shapes)],
         "arrows": [stored_arrow(payload, motion, arrow) for arrow in arrows],
         "plots": _plots(payload, runs, [one for one, _ in known], names, curves, rounding),
         "events": _events(payload, run),
@@ -145,7 +145,7 @@ def _drawn(scene: Scene, motion: Motion, ends: list[tuple[int, Array]]) -> tuple
     return link_bars(scene.model, ends, link_length(scene.model, ends, motion.size)), True
 
 
-def _other(payload: Payload, shapes: Shapes, run: Trajectory, motion: Motion, name: str) -> Table:
+def _ghost(payload: Payload, shapes: Shapes, run: Trajectory, motion: Motion, name: str) -> Table:
     """Return a run as a ghost: its motion and its bodies."""
     marks = marks_of(run.scene)
     ends = [(m.joint1, m.point1) for m in marks] + [(m.joint2, m.point2) for m in marks]
@@ -190,13 +190,13 @@ def _plots(
         for number, others in enumerate(each[1:], 1):
             for other in others:
                 if (other.title, other.unit) == (plot.title, plot.unit):
-                    stored["curves"] += _compared(payload, plot, other, number, names[number])
+                    stored["curves"] += _common_curves(payload, plot, other, number, names[number])
         plots.append(stored)
     return plots
 
 
 def _without_noise(plot: Plot, rounding: dict[str, float]) -> Plot:
-    """A plot with zero in place of rounding; on a logarithmic axis rounding is what is shown."""
+    """Return a plot with zero in place of rounding, which only logarithmic axes show."""
     if plot.log:
         return plot
     least = rounding_of((plot.unit, values) for values in plot.curves.values())
@@ -204,7 +204,7 @@ def _without_noise(plot: Plot, rounding: dict[str, float]) -> Plot:
     return replace(plot, curves={k: without_rounding(v, level) for k, v in plot.curves.items()})
 
 
-def _compared(payload: Payload, plot: Plot, other: Plot, number: int, name: str) -> list[Table]:
+def _common_curves(payload: Payload, plot: Plot, other: Plot, number: int, name: str) -> list[Table]:
     """Return the curves of another run that the first run also has."""
     t, common = payload.add(other.t, "f8"), {k: v for k, v in other.curves.items() if k in plot.curves}
     return [
@@ -241,10 +241,10 @@ def _joints(payload: Payload, model: pin.Model, motion: Motion) -> list[Table]:
     return joints
 
 
-def _trails(model: pin.Model, guides: list[Guide], bare: bool) -> list[tuple[int, list[float]]]:
+def _trails(model: pin.Model, guides: list[Guide], has_no_shapes: bool) -> list[tuple[int, list[float]]]:
     """Return the points with drawn paths: points on guides, and the ends of a model without shapes."""
     trails = {guide.joint: guide.point.tolist() for guide in guides}
-    for joint in range(1, model.njoints) if bare else ():
+    for joint in range(1, model.njoints) if has_no_shapes else ():
         if not len(model.children[joint]):
             trails.setdefault(joint, np.asarray(model.inertias[joint].lever).tolist())
     return list(trails.items())

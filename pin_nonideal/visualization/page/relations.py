@@ -16,16 +16,16 @@ from .xy_plots import Relation, available, is_relation, relations_of
 if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
 
-# Points of a curve at most, of all curves together, and of what a law allows.
-MOST, POINTS, BOUNDS = 1_500, 60_000, 300
+# Maximum number of points of one curve, of all curves together, and of the limits of a law.
+MAX_CURVE_POINTS, MAX_POINTS, MAX_LIMIT_POINTS = 1_500, 60_000, 300
 
 
 def names_relation(run: Trajectory, item: Any) -> bool:
-    """Whether an item of `plots` names a relation and not a joint.
+    """Check if an item of `plots` names a relation and not a joint.
 
     Args:
         run: the run.
-        item: of `plots`.
+        item: entry of `plots`.
     """
     return is_relation(item) and item not in list(run.scene.model.names)
 
@@ -33,25 +33,25 @@ def names_relation(run: Trajectory, item: Any) -> bool:
 def stored_relations(
     payload: Payload, run: Trajectory, finer: Trajectory, requested: list[str]
 ) -> list[Table]:
-    """The relations of a run: those asked for, which are shown, and those that a reader may choose.
+    """Return the relations of a run: the requested ones, which are shown, and others for the reader's choice.
 
     Args:
-        payload: that carries their points.
+        payload: payload that stores their points.
         run: the run.
-        finer: the same with more samples, for phase planes.
+        finer: the same run with more samples, for phase planes.
         requested: names, as `relations_of` takes them.
     """
     more = [name for name in available(run) if name not in requested]
-    each = min(MOST, POINTS // max(len(requested) + len(more), 1))
+    each = min(MAX_CURVE_POINTS, MAX_POINTS // max(len(requested) + len(more), 1))
     stored = []
     for name in [*requested, *more]:
         own = finer if name.split(" ", 1)[0] == "phase" else run
         for relation in relations_of(own, name):
-            stored.append(_stored(payload, own, name, relation, each) | {"shown": name in requested})
+            stored.append(_store(payload, own, name, relation, each) | {"shown": name in requested})
     return stored
 
 
-def _stored(payload: Payload, run: Trajectory, name: str, relation: Relation, points: int) -> Table:
+def _store(payload: Payload, run: Trajectory, name: str, relation: Relation, points: int) -> Table:
     curves = [_curve(payload, run, label, *pair, points) for label, pair in relation.curves.items()]
     bounds = [_bound(payload, label, *pair) for label, pair in relation.bounds.items()]
     quantity, _, unit = relation.y.partition(" ")
@@ -67,22 +67,22 @@ def _stored(payload: Payload, run: Trajectory, name: str, relation: Relation, po
 
 
 def _curve(payload: Payload, run: Trajectory, label: str, x: Array, y: Array, points: int) -> Table:
-    """Points of a curve with their times; where it breaks, numbers that are none."""
+    """Return the points of a curve with their times; NaN separates the parts of a broken curve."""
     t = np.asarray(run.t, dtype=float)
-    if len(x) > len(t):  # breaks were put in
+    if len(x) > len(t):  # the curve has breaks
         at = np.flatnonzero(np.isnan(x)) - np.arange(len(x) - len(t))
         t = np.insert(t, at, t[at])
     thin = Plot(label, "", t, {"x": x, "y": y}).thinned(max(points // 4, 25))
-    values = {key: without_rounding(part, 1e-12 * _largest(part)) for key, part in thin.curves.items()}
+    values = {key: without_rounding(part, 1e-12 * _largest_value(part)) for key, part in thin.curves.items()}
     return {"label": label, "t": payload.add(thin.t, "f8")} | {k: payload.curve(v) for k, v in values.items()}
 
 
 def _bound(payload: Payload, label: str, x: Array, y: Array) -> Table:
-    """Points of a law, in the order of x."""
-    chosen = np.unique(np.linspace(0, len(x) - 1, BOUNDS).astype(int))
+    """Return the points of a law, in the order of x."""
+    chosen = np.unique(np.linspace(0, len(x) - 1, MAX_LIMIT_POINTS).astype(int))
     order = chosen[np.argsort(x[chosen], kind="stable")]
     return {"label": label, "x": payload.add(x[order]), "y": payload.add(y[order])}
 
 
-def _largest(values: Array) -> float:
+def _largest_value(values: Array) -> float:
     return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))

@@ -19,9 +19,19 @@ from .frames import MIN_FRAMES, Motion
 if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
 
-# Fields with values at the samples; the fields in `NAMED` are dictionaries by name.
-SAMPLED = ("violation", "violation_rate", "a", "tau", "F_ideal", "F_nonideal", "lam", "lam_ideal", "limits")
-NAMED = ("energy", "power", "law_forces", "reactions", "contact_forces")
+# Fields with values at the samples; the fields in `TABLE_FIELDS` are dictionaries by name.
+SAMPLED_FIELDS = (
+    "violation",
+    "violation_rate",
+    "a",
+    "tau",
+    "F_ideal",
+    "F_nonideal",
+    "lam",
+    "lam_ideal",
+    "limits",
+)
+TABLE_FIELDS = ("energy", "power", "law_forces", "reactions", "contact_forces")
 
 
 def resample(run: Trajectory, motion: Motion) -> tuple[Trajectory, Motion]:
@@ -53,13 +63,13 @@ def resample(run: Trajectory, motion: Motion) -> tuple[Trajectory, Motion]:
         "q": motion.q,
         "v": _velocities(run, motion, inner),
     }
-    for key in SAMPLED:
+    for key in SAMPLED_FIELDS:
         if getattr(run, key, None) is not None:
             values[key] = at_frames(getattr(run, key), getattr(dense, key, None))
-    for key in NAMED:
+    for key in TABLE_FIELDS:
         parts = getattr(run, key, None)
         if parts is not None:
-            values[key] = _Resampled(key, parts, getattr(dense, key, None) or {}, at_frames)
+            values[key] = _ResampledFields(key, parts, getattr(dense, key, None) or {}, at_frames)
     for key in ("modes", "closed"):  # constant from a sample to the next
         if getattr(run, key, None) is not None:
             values[key] = np.asarray(getattr(run, key))[motion.before]
@@ -77,7 +87,7 @@ def resample(run: Trajectory, motion: Motion) -> tuple[Trajectory, Motion]:
     return samples, replace(motion, before=np.arange(count), part=np.zeros(count))
 
 
-class _Resampled(Group):
+class _ResampledFields(Group):
     """Values by name at the frames of a replay, each resampled when it is read first.
 
     Args:

@@ -22,19 +22,19 @@ def subtitle_of(run: Trajectory) -> str:
     model = run.scene.model
     contacts = sum(is_contact for _, _, is_contact in run.rows.values())
     constraints = len(run.rows) - contacts
-    words = [_counted(model.njoints - 1, "joint")]
-    words += [_counted(constraints, "constraint")] if constraints or not contacts else []
-    words += [_counted(contacts, "contact")] if contacts else []
+    words = [_count(model.njoints - 1, "joint")]
+    words += [_count(constraints, "constraint")] if constraints or not contacts else []
+    words += [_count(contacts, "contact")] if contacts else []
     if run.rows:
-        words.append(f"violation below {_above(float(np.max(run.violation)))}")
+        words.append(f"violation below {_rounded_up(float(np.max(run.violation)))}")
     return " · ".join(words)
 
 
-def _counted(count: int, word: str) -> str:
+def _count(count: int, word: str) -> str:
     return f"{count or 'no'} {word}{'' if count == 1 else 's'}"
 
 
-def _above(value: float) -> str:
+def _rounded_up(value: float) -> str:
     """Return a value rounded up to two digits."""
     if not value > 0.0:
         return "1e-16"

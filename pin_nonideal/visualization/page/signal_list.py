@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
 
 # Number of points of all signals, and minimum and maximum number of points of one signal.
-POINTS, LEAST, MOST = 120_000, 100, 800
+MAX_POINTS, MIN_SIGNAL_POINTS, MAX_SIGNAL_POINTS = 120_000, 100, 800
 # Sections of the list, in order.
 TORQUES, FRICTION, REACTIONS = "Torques of the actuation", "Friction", "Reactions and loads"
 ENERGY, MOTION, OTHERS = "Energy and power", "Positions, velocities, accelerations", "Violation and states"
 SECTIONS = (TORQUES, FRICTION, REACTIONS, ENERGY, MOTION, OTHERS)
 # Fields with smooth curves between samples; other fields are linear.
-SMOOTH = ("q", "v", "energy")
+SMOOTH_FIELDS = ("q", "v", "energy")
 FORCES = ("N", "N m", "N, N m")
 WRENCH = ("force x", "force y", "force z", "moment x", "moment y", "moment z")
 
@@ -77,24 +77,25 @@ def signals_of(run: Trajectory, finer: Trajectory) -> list[Signal]:
     """
     if getattr(run, "dense", None) is not None:
         run = finer
-    signals = [*_labelled(run, finer), *_loads(run)]
+    signals = [*_component_signals(run, finer), *_loads(run)]
     known = {word for item in signals for word in item.words.split("\n")}
-    fine, reader = motion_columns(finer, SMOOTH), _Columns(run)
+    fine, reader = motion_columns(finer, SMOOTH_FIELDS), _Columns(run)
     for name, values in acting_columns(run).items():
         if name == "t" or name in known:
             continue
         item = reader.signal(name, values)
-        smooth = item.words.split("\n")[-1] in SMOOTH and name in fine
+        smooth = item.words.split("\n")[-1] in SMOOTH_FIELDS and name in fine
         signals.append(replace(item, values=fine[name], smooth=True) if smooth else item)
     order = {section: place for place, section in enumerate(SECTIONS)}
     signals.sort(key=lambda item: order[item.section])
-    each = int(np.clip(POINTS // max(len(signals), 1), LEAST, MOST))
+    each = int(np.clip(MAX_POINTS // max(len(signals), 1), MIN_SIGNAL_POINTS, MAX_SIGNAL_POINTS))
     return [
-        _thinned(item, np.asarray((finer if item.smooth else run).t, dtype=float), each) for item in signals
+        _thin_signal(item, np.asarray((finer if item.smooth else run).t, dtype=float), each)
+        for item in signals
     ]
 
 
-def _labelled(run: Trajectory, finer: Trajectory) -> Iterator[_RecordedSignal]:
+def _component_signals(run: Trajectory, finer: Trajectory) -> Iterator[_RecordedSignal]:
     """Return positions, velocities and accelerations by the names of their components."""
     model = run.scene.model
     for kind, field, own, items in (
@@ -233,7 +234,7 @@ def _signal_of(
     return _RecordedSignal(label, unit, section, f"{name}\n{words}\n{field}", np.asarray(values, dtype=float))
 
 
-def _thinned(item: _RecordedSignal, t: Array, points: int) -> Signal:
+def _thin_signal(item: _RecordedSignal, t: Array, points: int) -> Signal:
     """Return the signal with few points; two points if its value is constant."""
     values, label, words = item.values, item.label, item.words.replace("\n", " ")
     if len(t) > 2 and (values == values[0]).all():

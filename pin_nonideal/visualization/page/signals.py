@@ -124,11 +124,11 @@ def default_plot_names(run: Trajectory) -> list[str]:
     driven = getattr(run, "tau", None) is not None and bool(np.any(run.tau))
     first = ("tau", "F_nonideal") if driven else ()
     return [
-        name for name in (*first, "energy", "gaps", "violation", "reactions", "q") if _recorded(run, name)
+        name for name in (*first, "energy", "gaps", "violation", "reactions", "q") if _record_of(run, name)
     ]
 
 
-def _recorded(run: Trajectory, name: str) -> bool:
+def _record_of(run: Trajectory, name: str) -> bool:
     if name in ("energy", "work", "power"):
         return bool(getattr(run, name.replace("work", "energy"), None))
     if name == "violation":
@@ -153,7 +153,7 @@ def _plot(run: Trajectory, name: str) -> list[Plot]:
     joints = [str(joint) for joint in model.names[1:]]
     if name not in names and name not in joints:
         raise UnknownNameError(f'no plot and no joint "{name}"{nearest(name, [*names, *joints])}')
-    if not _recorded(run, name):
+    if not _record_of(run, name):
         if name in ("violation", "reactions") and not run.scene.constraint_slices:
             raise InputError(f'plot "{name}" needs a constraint, and this scene has none')
         if name == "contacts" and not run.scene.contacts:
@@ -175,16 +175,18 @@ def _plot(run: Trajectory, name: str) -> list[Plot]:
     if name == "reactions" and run.lam is not None:
         slices, left_out = run.scene.constraint_slices, open_contacts(run)
         size = {k: np.linalg.norm(run.lam[:, s], axis=1) for k, s in slices.items() if k not in left_out}
-        return [Plot("Reactions, |lam|", "N, N m", t, _largest(size), note=omission_note(len(size)))]
+        return [Plot("Reactions, |lam|", "N, N m", t, _widest_curves(size), note=omission_note(len(size)))]
     if name == "power":
-        return [Plot("Power", "W", t, _largest(run.power or {}), note=omission_note(len(run.power or {})))]
+        return [
+            Plot("Power", "W", t, _widest_curves(run.power or {}), note=omission_note(len(run.power or {})))
+        ]
     if name == "contacts" and run.lam is not None:
         slices = list(run.scene.constraint_slices.items())[len(run.scene.constraints) :]
         normal = {key: run.lam[:, rows.stop - 1] for key, rows in slices}
-        return [Plot("Normal force", "N", t, _largest(normal), note=omission_note(len(normal)))]
+        return [Plot("Normal force", "N", t, _widest_curves(normal), note=omission_note(len(normal)))]
     if name == "gaps":
         times, gaps = gaps_of(run)
-        return [Plot("Gaps", "m, rad", times, _largest(gaps), note=omission_note(len(gaps)))]
+        return [Plot("Gaps", "m, rad", times, _widest_curves(gaps), note=omission_note(len(gaps)))]
     if name == "tau":
         return _in_joints("Actuation", model, t, np.asarray(run.tau))
     if name == "F_nonideal":
@@ -211,8 +213,8 @@ def _in_joints(title: str, model: pin.Model, t: Array, tau: Array) -> list[Plot]
             name, unit = str(model.names[joint]), "N m" if joint_axis(model, joint)[1] else "N"
             torques.append(Coordinate(name, name, unit, tau[:, model.joints[joint].idx_v]))
     acting = [c for c in torques if np.any(c.values)] or torques
-    idle = len(torques) - len(acting)
-    note = f"zero in {idle} other joint{'s' if idle > 1 else ''}" if idle else ""
+    zero_count = len(torques) - len(acting)
+    note = f"zero in {zero_count} other joint{'s' if zero_count > 1 else ''}" if zero_count else ""
     plots = _by_unit(title, t, acting)
     return [replace(plot, note=", ".join(filter(None, [plot.note, note]))) for plot in plots]
 
@@ -242,7 +244,7 @@ def _by_unit(title: str, t: Array, coordinates: list[Coordinate]) -> list[Plot]:
     plots = []
     for unit in dict.fromkeys(c.unit for c in coordinates):
         every = {c.label: c.values for c in coordinates if c.unit == unit}
-        plots.append(Plot(title, unit, t, _largest(every), note=omission_note(len(every))))
+        plots.append(Plot(title, unit, t, _widest_curves(every), note=omission_note(len(every))))
     return plots
 
 
@@ -255,7 +257,7 @@ def omission_note(count: int) -> str:
     return f"{MAX_CURVES} of {count}, those that move most" if count > MAX_CURVES else ""
 
 
-def _largest(curves: dict[str, Array]) -> dict[str, Array]:
+def _widest_curves(curves: dict[str, Array]) -> dict[str, Array]:
     """Return the curves with the largest range, in the given order."""
     if len(curves) <= MAX_CURVES:
         return curves

@@ -23,7 +23,7 @@ Indices = NDArray[np.int64]
 Color = tuple[float, float, float, float]
 
 # Tolerance of equal vertices relative to the mesh's diagonal; STL files repeat all vertices.
-WELD = 1e-5
+VERTEX_TOL = 1e-5
 COLLADA = "{http://www.collada.org/2005/11/COLLADASchema}"
 
 # Colors of links, used cyclically, and color of the joints between them.
@@ -156,7 +156,7 @@ def _mesh(vertices: Array, triangles: Indices, path: str | None = None) -> Shape
         colors = [(len(triangles), None)]
     part = np.repeat(np.arange(len(colors)), [count for count, _ in colors])
 
-    cell = WELD * max(float(np.linalg.norm(np.ptp(vertices, axis=0))), 1e-12)
+    cell = VERTEX_TOL * max(float(np.linalg.norm(np.ptp(vertices, axis=0))), 1e-12)
     _, first, inverse = np.unique(
         np.round(vertices / cell).astype(np.int64), axis=0, return_index=True, return_inverse=True
     )

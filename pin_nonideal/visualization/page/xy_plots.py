@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
 
 KINDS = ("phase", "friction", "load")
-# Of so many joints and laws a page carries relations.
-MOST = 16
+# Maximum number of joints and of laws with relations on a page.
+MAX_RELATIONS = 16
 
 
 @dataclass(frozen=True)
@@ -44,18 +44,18 @@ class Relation:
 
 
 def available(run: Trajectory) -> list[str]:
-    """Names of the relations that a run has, one joint or law each, those that move most of each kind.
+    """Return the names of a run's relations, one joint or law each: the ones of each kind that move most.
 
     Args:
         run: the run.
     """
     model = run.scene.model
     joints = [joint for joint in range(1, model.njoints) if model.joints[joint].nv == 1]
-    joints = sorted(joints, key=lambda joint: -_spread(run, joint))[:MOST]
+    joints = sorted(joints, key=lambda joint: -_spread(run, joint))[:MAX_RELATIONS]
     names = []
     if run.law_forces:
         known = friction_joints(run)
-        laws = sorted(known, key=lambda law: -_spread(run, known[law]))[:MOST]
+        laws = sorted(known, key=lambda law: -_spread(run, known[law]))[:MAX_RELATIONS]
         kinds = ("friction", "load") if run.reactions else ("friction",)
         names = [f"{kind} {law}" for kind in kinds for law in laws if law in run.law_forces]
     return names + [f"phase {model.names[joint]}" for joint in sorted(joints)]

@@ -64,7 +64,8 @@ double LeastMove::longest_single(int i, const VecX& r) {
     return longest;
 }
 
-// Replace a move by that of its forces f = -G (r + J dx) on the rows. The rows may have changed since the factor.
+// Replace a move by the move due to its forces f = -G (r + J dx) on the rows. The rows may have changed since the
+// factor.
 void LeastMove::exert(int i, const VecX& r, VecX& move) {
     for (int k : islands_[i].elements) {
         const BlockElement& e = problem.elements[k];
@@ -121,8 +122,8 @@ bool LeastMove::find(const VecX& r, double floor, VecX& move) {
     return moves;
 }
 
-// Move the nodes of an island at random, against the weighted rows. A motion in which the rows leave a freedom keeps
-// its part along it: (M + J^T G J)^-1 M x = x there.
+// Move the nodes of an island at random, against the weighted rows. If the rows leave a freedom, the part of the motion
+// along this freedom is unchanged: (M + J^T G J)^-1 M x = x.
 void LeastMove::probe(int i) {
     probed_[i] = 1;
     if (!factor(i)) return;

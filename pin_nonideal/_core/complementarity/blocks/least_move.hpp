@@ -2,8 +2,8 @@
 //
 // The rows count with weights G far above their inertia: (M + J^T G J) dx = -J^T G r. Redundant rows need no choice.
 // A move reduces the residual of a row by the ratio of its inertia to its weight, so two or three moves, with r evaluated
-// between them, reach rounding. Rows that contradict each other, or nearly do, would ask for a long move: with lower
-// weights they share the residual that is left.
+// between them, reach rounding. Contradicting rows, and nearly contradicting ones, would need a long move. With lower
+// weights they share the remaining residual.
 #pragma once
 
 #include "complementarity/blocks/factor.hpp"
@@ -26,14 +26,14 @@ public:
     using Parameters = LeastMoveParameters;
     static constexpr Parameters parameters{};
 
-    // Nodes, elements, M and J are set by the caller. J may be set anew after pose: moves then follow the new rows, with
-    // the factor of the old ones, and exert equal and opposite forces on two nodes.
+    // Nodes, elements, M and J are set by the caller. J may change after pose. Moves then follow the new rows with the
+    // factor of the old rows, and exert equal and opposite forces on two nodes.
     BlockProblem problem;
 
     // Prepare the problem once it is set. Return false if an inertia is not positive definite.
     bool pose();
-    // Compute the move that the residuals `r` ask for, by unknown of the whole scene. Islands whose residuals are at
-    // most `floor` do not move. Return false if there are none to move.
+    // Compute the move that reduces the residuals `r`, by unknown of the whole scene. Islands whose residuals are at
+    // most `floor` do not move. Return false if no island moves.
     bool find(const VecX& r, double floor, VecX& move);
     // Largest residual.
     double largest(const VecX& r) const { return problem.rows > 0 ? r.head(problem.rows).cwiseAbs().maxCoeff() : 0.0; }

@@ -2,8 +2,8 @@
 //
 // A node is a tree with its inertia matrix M. An element acts on one or two nodes:
 //     M (x - free) = J^T f,   w = J x + offset,
-// with x the accelerations, or velocities at the end of a step over its length. Laws between f and w are those of
-// cone/problem.hpp. M has one block a node, and J one block for each node of an element. Matrices are stored by rows.
+// with x the accelerations, or velocities at the end of a step over its length. cone/problem.hpp states the laws
+// between f and w. M has one block a node, and J one block for each node of an element. Matrices are stored by rows.
 #pragma once
 
 #include <vector>
@@ -16,7 +16,7 @@ using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::Ro
 using BlockMap = Eigen::Map<RowMajor>;
 using ConstBlockMap = Eigen::Map<const RowMajor>;
 
-// Response of a direction of an element that counts as none, relative to its other directions.
+// Response below which a direction of an element counts as immovable, relative to its other directions.
 constexpr double min_block_response = 1e-13;
 
 struct BlockNode {

@@ -40,7 +40,7 @@ public:
     // response to its forces if that is larger.
     ConeResiduals residuals(const VecX& f) const;
 
-    // Element that misses the laws most in its own units, and the velocity by which it misses them.
+    // Element with the largest error of the laws in its own units, and this error as a velocity.
     struct Miss { int element = -1; double velocity = 0.0; };
     const Miss& miss() const { return miss_; }
     double error() const { return error_; }  // largest relative error of an element

@@ -14,8 +14,8 @@ double outside_dual(const ConeElement& e, const Eigen::Ref<const VecX>& u) {
     return std::max(0.0, e.bound * u.tail(e.dim - 1).norm() - u[0]);
 }
 
-// Find y that shows that no forces prevent penetration. It projects zero on { w_n + p >= 0 of some forces }, and
-// Farkas' alternative is the optimality condition.
+// Find y that shows that no forces prevent penetration. The method projects zero on { w_n + p >= 0 of some forces }.
+// Farkas' alternative is its optimality condition.
 bool no_forces(const ConeProblem& p, VecX& y) {
     std::vector<int> rows;
     std::vector<ConeElement> elements = p.elements;

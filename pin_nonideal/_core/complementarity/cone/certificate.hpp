@@ -1,4 +1,4 @@
-// Certificates that a cone problem may have no solution, as forces that anyone can check.
+// Certificates that a cone problem may have no solution: forces that prove it by a few products.
 #pragma once
 
 #include "complementarity/cone/interior_point.hpp"

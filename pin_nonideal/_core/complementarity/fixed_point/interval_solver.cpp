@@ -27,7 +27,7 @@ private:
     bool follow(VecX& z, double s) const;
     double reach(const Part& part, VecX& r) const;
     void interval_slope(const VecX& z, double s, const VecX& r, double r_s, int column, MatX& A, MatX& D) const;
-    bool settled(const Part& part);
+    bool is_settled(const Part& part);
     bool polish(int column, VecX& z, double& s) const;
     void keep(const VecX& z, double s);
     void split(const Part& part);
@@ -209,7 +209,7 @@ void Search::split(const Part& part) {
 }
 
 // Check if a part holds no solution, or if its only solution is stored (Krawczyk's test).
-bool Search::settled(const Part& part) {
+bool Search::is_settled(const Part& part) {
     VecX z = VecX::Zero(n_), g(n_), r;
     for (int i = 0; i < halved(); ++i) z[halved_[i]] = part.center[i];
     double s = part.center[halved()];
@@ -259,7 +259,7 @@ ReactionRoots Search::run() {
         }
         const Part part = parts_.back();
         parts_.pop_back();
-        if (settled(part)) continue;
+        if (is_settled(part)) continue;
         if (*std::max_element(part.half.begin(), part.half.begin() + halved() + 1) > parameters.min_box_part) split(part);
         else found_.at_edge = true;
     }

@@ -20,20 +20,20 @@ using Short = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1>;
 using Turned = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 3>;
 
 // Interval of a value: middle and radius.
-struct Length {
+struct Interval {
     double middle, radius;
-    double least() const { return std::max(0.0, middle - radius); }
-    double most() const { return middle + radius; }
+    double lower() const { return std::max(0.0, middle - radius); }
+    double upper() const { return middle + radius; }
 };
 
 // Interval of a vector that is linear in the point, and its direction within `turn`. If the vector may vanish, the
 // direction is arbitrary.
-struct Arrow {
+struct VectorInterval {
     Short middle, along;
-    Length length;
+    Interval length;
     double turn = 1.0;
 
-    Arrow(const Rows& rows, const Point& x, const Point& radius)
+    VectorInterval(const Rows& rows, const Point& x, const Point& radius)
         : middle(rows * x), along(Short::Zero(rows.rows())), length{middle.norm(), (rows.cwiseAbs() * radius).norm()} {
         if (length.middle <= length.radius) return;
         along = middle / length.middle;
@@ -55,7 +55,7 @@ struct Slopes {
 };
 
 struct Limit {
-    Length size;
+    Interval size;
     Slopes slopes;
 };
 
@@ -73,7 +73,7 @@ struct Element {
         Limit out{{constant * x[tau], constant * radius[tau]}, {Rows::Zero(1, tau + 1), Rows::Zero(1, tau + 1)}};
         out.slopes.middle(0, tau) = constant;
         for (const Rows& vector : vectors) {
-            const Arrow arrow(vector, x, radius);
+            const VectorInterval arrow(vector, x, radius);
             out.size.middle += arrow.length.middle;
             out.size.radius += arrow.length.radius;
             out.slopes.middle += arrow.along.transpose() * vector;
@@ -84,12 +84,12 @@ struct Element {
 
     // Check if the element neither sticks nor begins to slip anywhere in the box.
     bool is_excluded(const Point& x, const Point& radius) const {
-        const Length limit = this->limit(x, radius).size;
-        const Arrow own(force, x, radius), accelerated(response, x, radius);
-        if (may_stick && accelerated.length.least() == 0.0 && own.length.least() <= limit.most()) return false;
+        const Interval limit = this->limit(x, radius).size;
+        const VectorInterval own(force, x, radius), accelerated(response, x, radius);
+        if (may_stick && accelerated.length.lower() == 0.0 && own.length.lower() <= limit.upper()) return false;
         const Short along = may_stick ? accelerated.along : direction;
         const double turn = may_stick ? accelerated.turn : 0.0;
-        return (own.middle + limit.middle * along).norm() > own.length.radius + limit.radius + turn * limit.most();
+        return (own.middle + limit.middle * along).norm() > own.length.radius + limit.radius + turn * limit.upper();
     }
 
     // Return the residual of the equation in the middle of a box. `slopes` bounds its derivatives anywhere in the box.
@@ -99,9 +99,9 @@ struct Element {
             slopes = {force + direction * limit.slopes.middle, direction.cwiseAbs() * limit.slopes.radius};
             return force * x + limit.size.middle * direction;
         }
-        const Arrow point(asked, x, radius);
-        const bool inside = point.length.least() <= limit.size.most(),
-                   outside = point.length.most() >= limit.size.least();
+        const VectorInterval point(asked, x, radius);
+        const bool inside = point.length.lower() <= limit.size.upper(),
+                   outside = point.length.upper() >= limit.size.lower();
         if (inside) slopes = {response, Rows::Zero(dim, x.size())};
         if (outside && inside) slopes.join(slope_outside(point, limit));
         else if (outside) slopes = slope_outside(point, limit);
@@ -110,10 +110,10 @@ struct Element {
     }
 
     // Return the derivatives of x - limit p / |p|, with p = x - rho alpha beyond the limit.
-    Slopes slope_outside(const Arrow& p, const Limit& limit) const {
-        const double most = std::min(1.0, limit.size.most() / std::max(p.length.least(), 1e-300));
-        const double least = std::min(most, limit.size.least() / p.length.most());
-        const double part = 0.5 * (most + least), part_radius = 0.5 * (most - least);
+    Slopes slope_outside(const VectorInterval& p, const Limit& limit) const {
+        const double upper = std::min(1.0, limit.size.upper() / std::max(p.length.lower(), 1e-300));
+        const double lower = std::min(upper, limit.size.lower() / p.length.upper());
+        const double part = 0.5 * (upper + lower), part_radius = 0.5 * (upper - lower);
         const Rows steep = limit.slopes.middle, steep_radius = limit.slopes.radius;
         Slopes out{force - p.along * steep,
                    p.along.cwiseAbs() * steep_radius +
@@ -121,7 +121,7 @@ struct Element {
         if (dim == 1) return out;
         const Turned across = Turned::Identity(dim, dim) - p.along * p.along.transpose();
         const Turned across_radius =
-            part_radius * across.cwiseAbs() + 2.0 * most * p.turn * Turned::Ones(dim, dim);
+            part_radius * across.cwiseAbs() + 2.0 * upper * p.turn * Turned::Ones(dim, dim);
         out.middle -= part * across * asked;
         out.radius += across_radius * asked.cwiseAbs();
         return out;
@@ -179,7 +179,7 @@ struct Search {
         return e;
     }
 
-    // Open a face of the cube of (x, tau), with tau >= 0.
+    // Add a face of the cube of (x, tau), with tau >= 0, to the boxes of the search.
     void open_face(int face, double side) {
         if (face == n && side < 0.0) return;
         Box box{Point::Zero(n + 1), Point::Ones(n + 1), face};

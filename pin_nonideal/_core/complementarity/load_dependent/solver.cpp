@@ -11,14 +11,14 @@ namespace pn {
 namespace {
 
 // Alternation of limits and forces. For given limits the forces are a convex program.
-struct Turns {
+struct Alternation {
     const RestEquation& equation;
     std::vector<int> dims, rows;
     MatX W;
     VecX alpha;
     FrictionLimits limits;
 
-    explicit Turns(const RestEquation& e) : equation(e) {
+    explicit Alternation(const RestEquation& e) : equation(e) {
         for (const RestElement& element : e.elements) {
             if (!element.may_stick) continue;
             dims.push_back(element.dim);
@@ -82,22 +82,22 @@ VecX newton_step(const RestEquation& equation, const VecX& x, const VecX& lack) 
 }
 
 bool follow_path(const RestEquation& equation, VecX& x) {
-    RestEquation partly = equation;
+    RestEquation partial_equation = equation;
     VecX alpha;
-    equation.respond(x, alpha, partly.fixed);
-    partly.frozen = 1.0;
-    if (!Turns(partly).iterate(x)) return false;
+    equation.respond(x, alpha, partial_equation.fixed);
+    partial_equation.frozen = 1.0;
+    if (!Alternation(partial_equation).iterate(x)) return false;
     double stretch = load_dependent_parameters.first_continuation_step;
-    while (partly.frozen > 0.0) {
+    while (partial_equation.frozen > 0.0) {
         VecX ahead = x;
-        const double before = partly.frozen;
-        partly.frozen = std::max(0.0, before - stretch);
-        if (refine_rest(partly, ahead)) {
+        const double before = partial_equation.frozen;
+        partial_equation.frozen = std::max(0.0, before - stretch);
+        if (refine_rest(partial_equation, ahead)) {
             x = ahead;
             stretch *= 2.0;
             continue;
         }
-        partly.frozen = before;
+        partial_equation.frozen = before;
         stretch *= 0.25;
         if (stretch < load_dependent_parameters.min_continuation_step) return false;
     }
@@ -193,7 +193,7 @@ bool refine_rest(const RestEquation& equation, VecX& x) {
 }
 
 VecX onset_accelerations(const RestEquation& equation, const VecX& x) {
-    Turns turns(equation);
+    Alternation turns(equation);
     VecX out, own;
     FrictionLimits held;
     turns.ask(x, out, held, own);
@@ -205,12 +205,12 @@ VecX onset_accelerations(const RestEquation& equation, const VecX& x) {
 bool solve_rest(const RestEquation& equation, VecX& x) {
     if (equation.n == 0) return true;
     const VecX guess = x;
-    if (Turns(equation).iterate(x)) return true;
+    if (Alternation(equation).iterate(x)) return true;
     bool found = refine_rest(equation, x);
     if (!found) found = refine_rest(equation, x = guess);
     if (!found) found = follow_path(equation, x = guess);
     if (!found) return false;
-    const VecX at_limits = Turns(equation).next(x);  // slipping forces are exactly at their limits
+    const VecX at_limits = Alternation(equation).next(x);  // slipping forces are exactly at their limits
     if (equation.error(at_limits) <= load_dependent_parameters.tolerance + equation.error(x)) x = at_limits;
     return true;
 }

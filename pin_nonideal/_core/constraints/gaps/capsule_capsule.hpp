@@ -9,20 +9,20 @@
 
 namespace pn {
 
-struct CapsulesRow {
+struct CapsuleCapsuleRow {
     static constexpr const char* name = "capsules";
     static constexpr Role role = Role::contact;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr int pressing = 0;
-    static constexpr Shown shown = Shown::contact;
+    static constexpr DisplayKind shown = DisplayKind::contact;
 
     Frame frame1, frame2;
     double half1, half2, radius;  // radius: sum of both radii
 
     static constexpr auto data() {
-        return std::tuple(Datum{"frame1", &CapsulesRow::frame1}, Datum{"frame2", &CapsulesRow::frame2},
-                          Datum{"half1", &CapsulesRow::half1}, Datum{"half2", &CapsulesRow::half2},
-                          Datum{"radius", &CapsulesRow::radius});
+        return std::tuple(Field{"frame1", &CapsuleCapsuleRow::frame1}, Field{"frame2", &CapsuleCapsuleRow::frame2},
+                          Field{"half1", &CapsuleCapsuleRow::half1}, Field{"half2", &CapsuleCapsuleRow::half2},
+                          Field{"radius", &CapsuleCapsuleRow::radius});
     }
     int size() const { return 1; }
     bool is_holonomic(int) const { return true; }
@@ -40,7 +40,7 @@ struct CapsulesRow {
         out.wrench[0] = force_at(p.c1, p.n);
     }
     template <class Sides, class Out>
-    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+    PN_INLINE void rate_and_bias(const Sides& s, Out& out) const {
         const NearestPoints<Sides> p(s, half1, half2);
         const NearestMotion<Sides> m(s, p);
         out.rate[0] = p.n.dot(m.u);

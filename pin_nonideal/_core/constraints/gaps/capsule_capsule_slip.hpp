@@ -9,16 +9,18 @@
 
 namespace pn {
 
-struct CapsulesSlipRows : SlipDirections {
+struct CapsuleCapsuleSlipRows : SlipDirections {
     static constexpr const char* name = "capsules_slip";
 
     Frame frame1, frame2;
     double half1, half2, radius1;
 
     static constexpr auto data() {
-        return std::tuple(Datum{"frame1", &CapsulesSlipRows::frame1}, Datum{"frame2", &CapsulesSlipRows::frame2},
-                          Datum{"half1", &CapsulesSlipRows::half1}, Datum{"half2", &CapsulesSlipRows::half2},
-                          Datum{"radius1", &CapsulesSlipRows::radius1});
+        return std::tuple(Field{"frame1", &CapsuleCapsuleSlipRows::frame1},
+                          Field{"frame2", &CapsuleCapsuleSlipRows::frame2},
+                          Field{"half1", &CapsuleCapsuleSlipRows::half1},
+                          Field{"half2", &CapsuleCapsuleSlipRows::half2},
+                          Field{"radius1", &CapsuleCapsuleSlipRows::radius1});
     }
     int size() const { return 2; }
 
@@ -30,7 +32,7 @@ struct CapsulesSlipRows : SlipDirections {
         for (int k = 0; k < 2; ++k) out.wrench[k] = force_at(contact, along.t[k]);
     }
     template <class Sides, class Out>
-    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+    PN_INLINE void rate_and_bias(const Sides& s, Out& out) const {
         const NearestPoints<Sides> p(s, half1, half2);
         const NearestMotion<Sides> m(s, p);
         const TurningTangents<Sides> along(s, p.n, m.dn);

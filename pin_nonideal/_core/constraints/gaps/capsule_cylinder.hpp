@@ -9,21 +9,21 @@
 
 namespace pn {
 
-struct LineRow {
+struct CapsuleCylinderRow {
     static constexpr const char* name = "line";
     static constexpr Role role = Role::contact;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr int pressing = 0;
-    static constexpr Shown shown = Shown::contact;
+    static constexpr DisplayKind shown = DisplayKind::contact;
 
     Frame frame1, frame2;
     Revolved solid;
     double half1, radius;  // half length of the segment, and sum of both radii
 
     static constexpr auto data() {
-        return std::tuple(Datum{"frame1", &LineRow::frame1}, Datum{"frame2", &LineRow::frame2},
-                          Datum{"solid", &LineRow::solid}, Datum{"half1", &LineRow::half1},
-                          Datum{"radius", &LineRow::radius});
+        return std::tuple(Field{"frame1", &CapsuleCylinderRow::frame1}, Field{"frame2", &CapsuleCylinderRow::frame2},
+                          Field{"solid", &CapsuleCylinderRow::solid}, Field{"half1", &CapsuleCylinderRow::half1},
+                          Field{"radius", &CapsuleCylinderRow::radius});
     }
     int size() const { return 1; }
     bool is_holonomic(int) const { return true; }
@@ -40,7 +40,7 @@ struct LineRow {
         out.wrench[0] = force_at(p.place(), p.at.n);
     }
     template <class Sides, class Out>
-    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+    PN_INLINE void rate_and_bias(const Sides& s, Out& out) const {
         const NearestAlongLine<Sides> p(s, solid, half1);
         const AlongLineMotion<Sides> m(s, p);
         out.rate[0] = p.at.n.dot(m.u);

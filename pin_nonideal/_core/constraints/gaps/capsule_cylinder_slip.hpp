@@ -10,7 +10,7 @@
 
 namespace pn {
 
-struct LineSlipRows : SlipDirections {
+struct CapsuleCylinderSlipRows : SlipDirections {
     static constexpr const char* name = "line_slip";
 
     Frame frame1, frame2;
@@ -18,9 +18,11 @@ struct LineSlipRows : SlipDirections {
     double half1, radius1;
 
     static constexpr auto data() {
-        return std::tuple(Datum{"frame1", &LineSlipRows::frame1}, Datum{"frame2", &LineSlipRows::frame2},
-                          Datum{"solid", &LineSlipRows::solid}, Datum{"half1", &LineSlipRows::half1},
-                          Datum{"radius1", &LineSlipRows::radius1});
+        return std::tuple(Field{"frame1", &CapsuleCylinderSlipRows::frame1},
+                          Field{"frame2", &CapsuleCylinderSlipRows::frame2},
+                          Field{"solid", &CapsuleCylinderSlipRows::solid},
+                          Field{"half1", &CapsuleCylinderSlipRows::half1},
+                          Field{"radius1", &CapsuleCylinderSlipRows::radius1});
     }
     int size() const { return 2; }
 
@@ -32,7 +34,7 @@ struct LineSlipRows : SlipDirections {
         for (int k = 0; k < 2; ++k) out.wrench[k] = force_at(contact, along.t[k]);
     }
     template <class Sides, class Out>
-    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+    PN_INLINE void rate_and_bias(const Sides& s, Out& out) const {
         const NearestAlongLine<Sides> p(s, solid, half1);
         const AlongLineMotion<Sides> m(s, p);
         const TurningTangents<Sides> along(s, p.at.n, m.dn);

@@ -9,21 +9,21 @@
 
 namespace pn {
 
-struct RimsRow {
+struct CylinderCylinderRow {
     static constexpr const char* name = "rims";
     static constexpr Role role = Role::contact;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr int pressing = 0;
-    static constexpr Shown shown = Shown::nothing;
+    static constexpr DisplayKind shown = DisplayKind::nothing;
 
     Frame frame1, frame2;
     Revolved first, second;
     double radius;  // sum of both radii
 
     static constexpr auto data() {
-        return std::tuple(Datum{"frame1", &RimsRow::frame1}, Datum{"frame2", &RimsRow::frame2},
-                          Datum{"first", &RimsRow::first}, Datum{"second", &RimsRow::second},
-                          Datum{"radius", &RimsRow::radius});
+        return std::tuple(Field{"frame1", &CylinderCylinderRow::frame1}, Field{"frame2", &CylinderCylinderRow::frame2},
+                          Field{"first", &CylinderCylinderRow::first}, Field{"second", &CylinderCylinderRow::second},
+                          Field{"radius", &CylinderCylinderRow::radius});
     }
     int size() const { return 1; }
     bool is_holonomic(int) const { return true; }
@@ -41,7 +41,7 @@ struct RimsRow {
         out.wrench[0] = force_at(p.found.place, p.n);
     }
     template <class Sides, class Out>
-    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+    PN_INLINE void rate_and_bias(const Sides& s, Out& out) const {
         const NearestOfCylinders<Sides> p(s, first, second);
         const CylindersMotion<Sides> m(p.mover(s), p.found);
         out.rate[0] = p.found.at.n.dot(m.u);

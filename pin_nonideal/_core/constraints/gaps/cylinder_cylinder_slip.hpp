@@ -10,7 +10,7 @@
 
 namespace pn {
 
-struct RimsSlipRows : SlipDirections {
+struct CylinderCylinderSlipRows : SlipDirections {
     static constexpr const char* name = "rims_slip";
 
     Frame frame1, frame2;
@@ -18,9 +18,12 @@ struct RimsSlipRows : SlipDirections {
     double radius1, radius2;
 
     static constexpr auto data() {
-        return std::tuple(Datum{"frame1", &RimsSlipRows::frame1}, Datum{"frame2", &RimsSlipRows::frame2},
-                          Datum{"first", &RimsSlipRows::first}, Datum{"second", &RimsSlipRows::second},
-                          Datum{"radius1", &RimsSlipRows::radius1}, Datum{"radius2", &RimsSlipRows::radius2});
+        return std::tuple(Field{"frame1", &CylinderCylinderSlipRows::frame1},
+                          Field{"frame2", &CylinderCylinderSlipRows::frame2},
+                          Field{"first", &CylinderCylinderSlipRows::first},
+                          Field{"second", &CylinderCylinderSlipRows::second},
+                          Field{"radius1", &CylinderCylinderSlipRows::radius1},
+                          Field{"radius2", &CylinderCylinderSlipRows::radius2});
     }
     int size() const { return 2; }
 
@@ -31,7 +34,7 @@ struct RimsSlipRows : SlipDirections {
         for (int k = 0; k < 2; ++k) out.wrench[k] = force_at(contact(p), along.t[k]);
     }
     template <class Sides, class Out>
-    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+    PN_INLINE void rate_and_bias(const Sides& s, Out& out) const {
         const NearestOfCylinders<Sides> p(s, first, second);
         const Sides mover = p.mover(s);
         const CylindersMotion<Sides> m(mover, p.found);

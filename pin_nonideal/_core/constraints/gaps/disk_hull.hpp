@@ -9,21 +9,21 @@
 
 namespace pn {
 
-struct RimRow {
+struct DiskHullRow {
     static constexpr const char* name = "rim";
     static constexpr Role role = Role::contact;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr int pressing = 0;
-    static constexpr Shown shown = Shown::contact;
+    static constexpr DisplayKind shown = DisplayKind::contact;
 
     Frame frame1, frame2;
     Hull solid;
     double rim, radius;  // radius of the disk, and radius around the hull
 
     static constexpr auto data() {
-        return std::tuple(Datum{"frame1", &RimRow::frame1}, Datum{"frame2", &RimRow::frame2},
-                          Datum{"solid", &RimRow::solid}, Datum{"rim", &RimRow::rim},
-                          Datum{"radius", &RimRow::radius});
+        return std::tuple(Field{"frame1", &DiskHullRow::frame1}, Field{"frame2", &DiskHullRow::frame2},
+                          Field{"solid", &DiskHullRow::solid}, Field{"rim", &DiskHullRow::rim},
+                          Field{"radius", &DiskHullRow::radius});
     }
     int size() const { return 1; }
     bool is_holonomic(int) const { return true; }
@@ -39,9 +39,10 @@ struct RimRow {
         out.residual[0] = p.distance - radius;
         out.wrench[0] = force_at(p.place, p.n);
     }
-    // Over a face the rates are those of a disk over a plane. Beside an edge they are those of the edge over the disk.
+    // Over a face, the rates equal the rates of a disk over a plane. Beside an edge, they equal the rates of the edge
+    // over the disk.
     template <class Sides, class Out>
-    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+    PN_INLINE void rate_and_bias(const Sides& s, Out& out) const {
         const NearestOnDisk<Sides> p(s, solid, rim);
         if (p.lowest) {
             sliding_row(s, out, 0, p.n, p.place, p.lowest->velocity(s, {rim, rim, 0.0}));

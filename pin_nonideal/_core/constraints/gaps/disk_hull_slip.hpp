@@ -10,7 +10,7 @@
 
 namespace pn {
 
-struct RimSlipRows : SlipDirections {
+struct DiskHullSlipRows : SlipDirections {
     static constexpr const char* name = "rim_slip";
 
     Frame frame1, frame2;
@@ -18,8 +18,8 @@ struct RimSlipRows : SlipDirections {
     double rim;
 
     static constexpr auto data() {
-        return std::tuple(Datum{"frame1", &RimSlipRows::frame1}, Datum{"frame2", &RimSlipRows::frame2},
-                          Datum{"solid", &RimSlipRows::solid}, Datum{"rim", &RimSlipRows::rim});
+        return std::tuple(Field{"frame1", &DiskHullSlipRows::frame1}, Field{"frame2", &DiskHullSlipRows::frame2},
+                          Field{"solid", &DiskHullSlipRows::solid}, Field{"rim", &DiskHullSlipRows::rim});
     }
     int size() const { return 2; }
 
@@ -30,7 +30,7 @@ struct RimSlipRows : SlipDirections {
         for (int k = 0; k < 2; ++k) out.wrench[k] = force_at(p.place, along.t[k]);
     }
     template <class Sides, class Out>
-    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+    PN_INLINE void rate_and_bias(const Sides& s, Out& out) const {
         using Vec = typename Sides::Vec;
         const NearestOnDisk<Sides> p(s, solid, rim);
         if (p.lowest) {
@@ -40,7 +40,8 @@ struct RimSlipRows : SlipDirections {
         const Sides turned = p.from_hull(s);
         const AlongLineMotion<Sides> m(turned, *p.line);
         const TurningTangents<Sides> along(s, p.n, -m.dn);
-        // Velocity of the point on the disk: that of the point on the edge, and the rate of the vector between both points.
+        // Velocity of the point on the disk: velocity of the point on the edge, plus the rate of the vector between
+        // both points.
         const Vec moves = turned.a.velocity(p.line->place()) + m.slides * p.line->e +
                           p.line->at.n.dot(m.u) * p.n - p.distance * m.dn;
         slide(s, out, along, p.place, moves);

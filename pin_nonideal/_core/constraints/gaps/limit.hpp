@@ -14,14 +14,14 @@ struct LimitRow {
     static constexpr Role role = Role::contact;
     static constexpr bool constant_A = true, affine_rate = true, comparable_rows = false;
     static constexpr int pressing = 0;
-    static constexpr Shown shown = Shown::nothing;
+    static constexpr DisplayKind shown = DisplayKind::nothing;
 
     int joint;
     double bound, sign;  // sign: +1 for a lower stop, -1 for an upper one
 
     static constexpr auto data() {
-        return std::tuple(Datum{"joint", &LimitRow::joint}, Datum{"bound", &LimitRow::bound},
-                          Datum{"sign", &LimitRow::sign});
+        return std::tuple(Field{"joint", &LimitRow::joint}, Field{"bound", &LimitRow::bound},
+                          Field{"sign", &LimitRow::sign});
     }
     int size() const { return 1; }
     bool is_holonomic(int) const { return true; }
@@ -37,7 +37,7 @@ struct LimitRow {
         out.A(0, s.mechanism.joints[joint].iv) = sign;
     }
     template <class State, class Out>
-    PN_INLINE void rate_and_drift(const State& s, Out& out) const {
+    PN_INLINE void rate_and_bias(const State& s, Out& out) const {
         out.rate[0] = sign * s.v[s.mechanism.joints[joint].iv];
     }
 };

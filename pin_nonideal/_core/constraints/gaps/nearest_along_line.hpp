@@ -78,8 +78,8 @@ private:
         out.a.x = place();
         return out;
     }
-    // Return the point nearest to the solid's axis. If the segment is parallel to the axis, return the middle of its
-    // part beside the solid.
+    // Return the point nearest to the solid's axis. If the segment is parallel to the axis, return the middle of their
+    // overlap.
     Scalar first(const Sides& s, const Revolved& solid, double half) const {
         const Vec axis = s.b.R * Vec3::UnitZ(), apart = middle - s.b.x;
         const Scalar cosine = e.dot(axis), square = 1.0 - cosine * cosine, up = apart.dot(axis);
@@ -87,9 +87,9 @@ private:
         if (square > parallel_segments) {
             nearest = (up * cosine - e.dot(apart)) / square;
         } else {
-            const Scalar least = up - half > -solid.half ? Scalar(up - half) : Scalar(-solid.half);
-            const Scalar most = up + half < solid.half ? Scalar(up + half) : Scalar(solid.half);
-            nearest = cosine * (0.5 * (least + most) - up);
+            const Scalar lower = up - half > -solid.half ? Scalar(up - half) : Scalar(-solid.half);
+            const Scalar upper = up + half < solid.half ? Scalar(up + half) : Scalar(solid.half);
+            nearest = cosine * (0.5 * (lower + upper) - up);
         }
         return nearest > half ? Scalar(half) : nearest < -half ? Scalar(-half) : nearest;
     }

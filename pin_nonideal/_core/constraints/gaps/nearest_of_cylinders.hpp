@@ -105,7 +105,7 @@ private:
     }
 };
 
-// Motion of the nearest points. u, dn and drift are those of body 1 against body 2, or the reverse if the point on body
+// Motion of the nearest points. u, dn and drift describe body 1 relative to body 2, or the reverse if the point on body
 // 2 slides.
 template <class Sides>
 struct CylindersMotion {

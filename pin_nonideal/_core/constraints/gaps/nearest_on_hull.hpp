@@ -53,9 +53,9 @@ struct Hull {
     }
     // Return the largest component of the points along a direction in the hull's axes.
     double support(const Vec3& direction) const {
-        double most = direction.dot(points[0]);
-        for (const Vec3& point : points) most = std::max(most, direction.dot(point));
-        return most;
+        double support = direction.dot(points[0]);
+        for (const Vec3& point : points) support = std::max(support, direction.dot(point));
+        return support;
     }
 
     // Return half of the least distance between a face and the points behind it.
@@ -94,7 +94,7 @@ struct Hull {
     }
 
 private:
-    // The other face slopes away beyond the edge, so its normal has an outward component there.
+    // The other face slopes away beyond the edge, so its normal has an outward component at the edge.
     void add_side(const Edge& edge, int face, int other) {
         Vec3 side = faces[face].normal.cross(points[edge.to] - points[edge.from]).normalized();
         if (side.dot(faces[other].normal) < 0.0) side = -side;

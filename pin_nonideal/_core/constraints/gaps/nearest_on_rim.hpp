@@ -55,7 +55,7 @@ struct NearestAroundRim {
     using Vec = typename Sides::Vec;
     using Scalar = typename Sides::Scalar;
     using OnSolid = NearestOnRevolved<Sides>;
-    struct Way { Scalar x, y; };  // vector from the center, in the axes of the rim
+    struct Direction { Scalar x, y; };  // vector from the center, in the axes of the rim
     Vec ex, ey, middle;
     double radius;
 
@@ -69,12 +69,12 @@ struct NearestAroundRim {
     NearestToRevolved<Sides> find(const Sides& s, const Revolved& solid) const {
         NearestToRevolved<Sides> out(s, middle, solid);
         if (radius == 0.0) return out;
-        Way now = start(s, out.at);
+        Direction now = start(s, out.at);
         Arc arc{{now.y, -now.x}, {-now.y, now.x}};
         Scalar steepest = HUGE_VAL;
         for (int look = 0; look < rim_search_parameters.most_looks; ++look) {
             const OnSolid at = nearest(s, solid, now);
-            const Way slope = slope_of(at);
+            const Direction slope = slope_of(at);
             if (!(dot(slope, slope) > rim_search_parameters.level * rim_search_parameters.level))
                 break;  // the solid lies below the whole disk
             const Scalar around = cross(now, slope), outward = dot(now, slope), steep = around < 0.0 ? -around : around;
@@ -88,8 +88,8 @@ struct NearestAroundRim {
             const Scalar bend = radius * curvature(at, now) - outward;
             const bool fast = steep < 0.5 * steepest && bend > 0.0;
             steepest = steep;
-            const Way newton = turned(now, fast ? Scalar(-around / bend) : Scalar(0.0));
-            const Way next = fast && arc.holds(newton) ? newton : arc.middle();
+            const Direction newton = turned(now, fast ? Scalar(-around / bend) : Scalar(0.0));
+            const Direction next = fast && arc.holds(newton) ? newton : arc.middle();
             if (!arc.holds(next)) break;
             now = next;
         }
@@ -98,28 +98,28 @@ struct NearestAroundRim {
     }
 
 private:
-    static Scalar dot(const Way& a, const Way& b) { return a.x * b.x + a.y * b.y; }
-    static Scalar cross(const Way& a, const Way& b) { return a.x * b.y - a.y * b.x; }
-    static Way unit(const Way& a) {
+    static Scalar dot(const Direction& a, const Direction& b) { return a.x * b.x + a.y * b.y; }
+    static Scalar cross(const Direction& a, const Direction& b) { return a.x * b.y - a.y * b.x; }
+    static Direction unit(const Direction& a) {
         using std::sqrt;
         const Scalar length = sqrt(dot(a, a));
         return {a.x / length, a.y / length};
     }
-    static Way turned(const Way& a, const Scalar& by) { return unit({a.x - by * a.y, a.y + by * a.x}); }
+    static Direction turned(const Direction& a, const Scalar& by) { return unit({a.x - by * a.y, a.y + by * a.x}); }
     // Arc of at most half the rim, counted around the axis.
     struct Arc {
-        Way low, high;
-        bool holds(const Way& way) const { return cross(low, way) > 0.0 && cross(way, high) > 0.0; }
-        Way middle() const {
-            const Way sum{low.x + high.x, low.y + high.y};
-            return dot(sum, sum) > rim_search_parameters.level ? unit(sum) : Way{-low.y, low.x};
+        Direction low, high;
+        bool holds(const Direction& direction) const { return cross(low, direction) > 0.0 && cross(direction, high) > 0.0; }
+        Direction middle() const {
+            const Direction sum{low.x + high.x, low.y + high.y};
+            return dot(sum, sum) > rim_search_parameters.level ? unit(sum) : Direction{-low.y, low.x};
         }
     };
     // Cut the arc along the chord through a point of the arc. Returns false if a piece would remain at either end.
-    static bool cut(Arc& arc, const Way& now, const Way& slope) {
-        const Way down = unit({-slope.x, -slope.y});
+    static bool cut(Arc& arc, const Direction& now, const Direction& slope) {
+        const Direction down = unit({-slope.x, -slope.y});
         const Scalar part = 2.0 * dot(now, down);
-        const Way across = unit({part * down.x - now.x, part * down.y - now.y});
+        const Direction across = unit({part * down.x - now.x, part * down.y - now.y});
         const bool ahead = cross(now, slope) < 0.0;
         const Arc behind{arc.low, now}, before{now, arc.high}, kept = ahead ? before : behind;
         const Arc rest = ahead ? behind : before;
@@ -128,11 +128,11 @@ private:
         if (arc.holds(across)) (ahead ? arc.high : arc.low) = across;
         return true;
     }
-    // Return the direction of the nearest point of the whole disk, by bisection over the chords along `way`. The least
+    // Return the direction of the nearest point of the whole disk, by bisection over the chords along `direction`. The least
     // distance of a chord is convex across them.
-    Way of_chords(const Sides& s, const Revolved& solid, const Way& way) const {
-        const Vec along = out(way), beside = around(way);
-        Way found = way;
+    Direction of_chords(const Sides& s, const Revolved& solid, const Direction& direction) const {
+        const Vec along = out(direction), beside = around(direction);
+        Direction found = direction;
         double low = -1.0, high = 1.0;
         for (int look = 0; look < rim_search_parameters.most_chords; ++look) {
             const double part = 0.5 * (low + high), half = radius * std::sqrt(1.0 - part * part);
@@ -141,31 +141,31 @@ private:
             const Scalar ahead = line.part / radius, far = inside ? Scalar(0.0) : Scalar(part / ahead);
             // The ends of the chords lie on the rim and recede along it.
             (line.at.n.dot(beside) - far * line.at.n.dot(along) > 0.0 ? high : low) = part;
-            found = {ahead * way.x - part * way.y, ahead * way.y + part * way.x};
+            found = {ahead * direction.x - part * direction.y, ahead * direction.y + part * direction.x};
         }
-        return dot(found, found) > 0.0 ? unit(found) : way;
+        return dot(found, found) > 0.0 ? unit(found) : direction;
     }
-    OnSolid nearest(const Sides& s, const Revolved& solid, const Way& way) const {
-        return OnSolid(NearestToRevolved<Sides>::there(s, place(way)), solid);
+    OnSolid nearest(const Sides& s, const Revolved& solid, const Direction& direction) const {
+        return OnSolid(NearestToRevolved<Sides>::there(s, place(direction)), solid);
     }
-    Way slope_of(const OnSolid& at) const { return {at.n.dot(ex), at.n.dot(ey)}; }
-    Vec place(const Way& way) const { return middle + radius * out(way); }
-    Vec out(const Way& way) const { return way.x * ex + way.y * ey; }
-    Vec around(const Way& way) const { return way.x * ey - way.y * ex; }
-    Scalar curvature(const OnSolid& at, const Way& way) const {
-        const Vec t = around(way);
+    Direction slope_of(const OnSolid& at) const { return {at.n.dot(ex), at.n.dot(ey)}; }
+    Vec place(const Direction& direction) const { return middle + radius * out(direction); }
+    Vec out(const Direction& direction) const { return direction.x * ex + direction.y * ey; }
+    Vec around(const Direction& direction) const { return direction.x * ey - direction.y * ex; }
+    Scalar curvature(const OnSolid& at, const Direction& direction) const {
+        const Vec t = around(direction);
         return t.dot(at.turning(t));
     }
     // Return the first direction: down the slope at the center, or toward the center of the solid if the slope vanishes
     // over a face.
-    Way start(const Sides& s, const OnSolid& at) const {
-        const Way slope = slope_of(at);
+    Direction start(const Sides& s, const OnSolid& at) const {
+        const Direction slope = slope_of(at);
         if (dot(slope, slope) > rim_search_parameters.level) return unit({-slope.x, -slope.y});
         const Vec toward = s.b.x - middle;
-        const Way there{toward.dot(ex), toward.dot(ey)};
-        return dot(there, there) > 0.0 ? unit(there) : Way{Scalar(1.0), Scalar(0.0)};
+        const Direction there{toward.dot(ex), toward.dot(ey)};
+        return dot(there, there) > 0.0 ? unit(there) : Direction{Scalar(1.0), Scalar(0.0)};
     }
-    void polish(const Sides& s, const Revolved& solid, Way now, NearestToRevolved<Sides>& out) const {
+    void polish(const Sides& s, const Revolved& solid, Direction now, NearestToRevolved<Sides>& out) const {
         for (int step = 0; step < 2; ++step) {
             out.place = place(now);
             out.along[0] = around(now);

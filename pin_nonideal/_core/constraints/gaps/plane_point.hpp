@@ -8,11 +8,11 @@
 
 namespace pn {
 
-struct ContactRow {
+struct PlanePointRow {
     static constexpr const char* name = "contact";
     static constexpr Role role = Role::contact;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
-    static constexpr Shown shown = Shown::contact;
+    static constexpr DisplayKind shown = DisplayKind::contact;
     static constexpr int pressing = 0;
 
     Frame frame1, frame2;
@@ -20,8 +20,8 @@ struct ContactRow {
     double radius;
 
     static constexpr auto data() {
-        return std::tuple(Datum{"frame", &ContactRow::frame1}, Datum{"plane", &ContactRow::frame2},
-                          Datum{"normal", &ContactRow::normal}, Datum{"radius", &ContactRow::radius});
+        return std::tuple(Field{"frame", &PlanePointRow::frame1}, Field{"plane", &PlanePointRow::frame2},
+                          Field{"normal", &PlanePointRow::normal}, Field{"radius", &PlanePointRow::radius});
     }
     int size() const { return 1; }
     bool is_holonomic(int) const { return true; }
@@ -36,7 +36,7 @@ struct ContactRow {
         out.wrench[0] = force_at(s.a.x, s.b.R * normal);
     }
     template <class Sides, class Out>
-    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+    PN_INLINE void rate_and_bias(const Sides& s, Out& out) const {
         PointMotion<typename Sides::Pose>(s).row(out, 0, s.b.R * normal);
     }
 };

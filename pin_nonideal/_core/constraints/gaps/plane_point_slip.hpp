@@ -8,7 +8,7 @@
 
 namespace pn {
 
-struct ContactSlipRows : SlipDirections {
+struct PlanePointSlipRows : SlipDirections {
     static constexpr const char* name = "contact_slip";
 
     Frame frame1, frame2;
@@ -16,9 +16,11 @@ struct ContactSlipRows : SlipDirections {
     Vec3 tangent1, tangent2, normal;
 
     static constexpr auto data() {
-        return std::tuple(Datum{"frame", &ContactSlipRows::frame1}, Datum{"plane", &ContactSlipRows::frame2},
-                          Datum{"radius", &ContactSlipRows::radius}, Datum{"tangent1", &ContactSlipRows::tangent1},
-                          Datum{"tangent2", &ContactSlipRows::tangent2}, Datum{"normal", &ContactSlipRows::normal});
+        return std::tuple(Field{"frame", &PlanePointSlipRows::frame1}, Field{"plane", &PlanePointSlipRows::frame2},
+                          Field{"radius", &PlanePointSlipRows::radius},
+                          Field{"tangent1", &PlanePointSlipRows::tangent1},
+                          Field{"tangent2", &PlanePointSlipRows::tangent2},
+                          Field{"normal", &PlanePointSlipRows::normal});
     }
     int size() const { return 2; }
 
@@ -29,7 +31,7 @@ struct ContactSlipRows : SlipDirections {
         out.wrench[1] = force_at(contact, s.b.R * tangent2);
     }
     template <class Sides, class Out>
-    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+    PN_INLINE void rate_and_bias(const Sides& s, Out& out) const {
         const auto n = s.b.R * normal, contact = s.a.x - radius * n;
         const auto rate = s.a.velocity(s.a.x) - radius * s.b.omega().cross(n);
         sliding_row(s, out, 0, s.b.R * tangent1, contact, rate);

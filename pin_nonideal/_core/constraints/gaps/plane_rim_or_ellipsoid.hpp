@@ -10,19 +10,19 @@
 
 namespace pn {
 
-struct EllipsoidRow {
+struct PlaneEllipsoidRow {
     static constexpr const char* name = "ellipsoid";
     static constexpr Role role = Role::contact;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr int pressing = 0;
-    static constexpr Shown shown = Shown::contact;
+    static constexpr DisplayKind shown = DisplayKind::contact;
 
     Frame frame1, frame2;
     Vec3 normal, semiaxes;
 
     static constexpr auto data() {
-        return std::tuple(Datum{"frame", &EllipsoidRow::frame1}, Datum{"plane", &EllipsoidRow::frame2},
-                          Datum{"normal", &EllipsoidRow::normal}, Datum{"semiaxes", &EllipsoidRow::semiaxes});
+        return std::tuple(Field{"frame", &PlaneEllipsoidRow::frame1}, Field{"plane", &PlaneEllipsoidRow::frame2},
+                          Field{"normal", &PlaneEllipsoidRow::normal}, Field{"semiaxes", &PlaneEllipsoidRow::semiaxes});
     }
     double reach() const { return std::max({semiaxes[0], semiaxes[1], semiaxes[2]}); }
     int size() const { return 1; }
@@ -41,7 +41,7 @@ struct EllipsoidRow {
         out.wrench[0] = force_at(lowest.place, lowest.n);
     }
     template <class Sides, class Out>
-    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+    PN_INLINE void rate_and_bias(const Sides& s, Out& out) const {
         const LowestOnEllipsoid<Sides> lowest(s, normal, semiaxes);
         sliding_row(s, out, 0, lowest.n, lowest.place, lowest.velocity(s, semiaxes));
     }

@@ -9,18 +9,19 @@
 
 namespace pn {
 
-struct EllipsoidSlipRows : SlipDirections {
+struct PlaneEllipsoidSlipRows : SlipDirections {
     static constexpr const char* name = "ellipsoid_slip";
 
     Frame frame1, frame2;
     Vec3 semiaxes, tangent1, tangent2, normal;
 
     static constexpr auto data() {
-        return std::tuple(Datum{"frame", &EllipsoidSlipRows::frame1}, Datum{"plane", &EllipsoidSlipRows::frame2},
-                          Datum{"semiaxes", &EllipsoidSlipRows::semiaxes},
-                          Datum{"tangent1", &EllipsoidSlipRows::tangent1},
-                          Datum{"tangent2", &EllipsoidSlipRows::tangent2},
-                          Datum{"normal", &EllipsoidSlipRows::normal});
+        return std::tuple(Field{"frame", &PlaneEllipsoidSlipRows::frame1},
+                          Field{"plane", &PlaneEllipsoidSlipRows::frame2},
+                          Field{"semiaxes", &PlaneEllipsoidSlipRows::semiaxes},
+                          Field{"tangent1", &PlaneEllipsoidSlipRows::tangent1},
+                          Field{"tangent2", &PlaneEllipsoidSlipRows::tangent2},
+                          Field{"normal", &PlaneEllipsoidSlipRows::normal});
     }
     int size() const { return 2; }
 
@@ -31,7 +32,7 @@ struct EllipsoidSlipRows : SlipDirections {
         out.wrench[1] = force_at(lowest.place, s.b.R * tangent2);
     }
     template <class Sides, class Out>
-    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+    PN_INLINE void rate_and_bias(const Sides& s, Out& out) const {
         const LowestOnEllipsoid<Sides> lowest(s, normal, semiaxes);
         const auto rate = lowest.velocity(s, semiaxes);
         sliding_row(s, out, 0, s.b.R * tangent1, lowest.place, rate);

@@ -9,20 +9,20 @@
 
 namespace pn {
 
-struct BoxRow {
+struct PointBoxRow {
     static constexpr const char* name = "box";
     static constexpr Role role = Role::contact;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr int pressing = 0;
-    static constexpr Shown shown = Shown::contact;
+    static constexpr DisplayKind shown = DisplayKind::contact;
 
     Frame frame1, frame2;
     Vec3 half;
     double radius;  // sum of both radii
 
     static constexpr auto data() {
-        return std::tuple(Datum{"frame1", &BoxRow::frame1}, Datum{"frame2", &BoxRow::frame2},
-                          Datum{"half", &BoxRow::half}, Datum{"radius", &BoxRow::radius});
+        return std::tuple(Field{"frame1", &PointBoxRow::frame1}, Field{"frame2", &PointBoxRow::frame2},
+                          Field{"half", &PointBoxRow::half}, Field{"radius", &PointBoxRow::radius});
     }
     int size() const { return 1; }
     bool is_holonomic(int) const { return true; }
@@ -39,7 +39,7 @@ struct BoxRow {
         out.wrench[0] = force_at(s.a.x, p.n);
     }
     template <class Sides, class Out>
-    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+    PN_INLINE void rate_and_bias(const Sides& s, Out& out) const {
         const NearestOnBox<Sides> p(s, half);
         const PointMotion<typename Sides::Pose> motion(s);
         out.rate[0] = p.n.dot(motion.u);

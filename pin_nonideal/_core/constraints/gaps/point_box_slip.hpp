@@ -10,7 +10,7 @@
 
 namespace pn {
 
-struct BoxSlipRows : SlipDirections {
+struct PointBoxSlipRows : SlipDirections {
     static constexpr const char* name = "box_slip";
 
     Frame frame1, frame2;
@@ -18,8 +18,8 @@ struct BoxSlipRows : SlipDirections {
     double radius1;
 
     static constexpr auto data() {
-        return std::tuple(Datum{"frame1", &BoxSlipRows::frame1}, Datum{"frame2", &BoxSlipRows::frame2},
-                          Datum{"half", &BoxSlipRows::half}, Datum{"radius1", &BoxSlipRows::radius1});
+        return std::tuple(Field{"frame1", &PointBoxSlipRows::frame1}, Field{"frame2", &PointBoxSlipRows::frame2},
+                          Field{"half", &PointBoxSlipRows::half}, Field{"radius1", &PointBoxSlipRows::radius1});
     }
     int size() const { return 2; }
 
@@ -31,7 +31,7 @@ struct BoxSlipRows : SlipDirections {
         for (int k = 0; k < 2; ++k) out.wrench[k] = force_at(contact, along.t[k]);
     }
     template <class Sides, class Out>
-    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+    PN_INLINE void rate_and_bias(const Sides& s, Out& out) const {
         const NearestOnBox<Sides> p(s, half);
         const auto dn = s.b.omega().cross(p.n) + p.turning(s.a.velocity(s.a.x) - s.b.velocity(s.a.x));
         const TurningTangents<Sides> along(s, p.n, dn);

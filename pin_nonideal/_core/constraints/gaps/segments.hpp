@@ -1,5 +1,5 @@
-// The nearest points of two segments, one on each body, their motion, and the directions of a contact there. Spheres
-// and capsules are segments with a radius. A point is a segment without length and radius.
+// The nearest points of two segments, one on each body, their motion, and the directions of a contact at these points.
+// Spheres and capsules are segments with a radius. A point is a segment without length and radius.
 #pragma once
 
 #include <cmath>

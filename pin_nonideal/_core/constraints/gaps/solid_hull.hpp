@@ -12,20 +12,20 @@ namespace pn {
 
 // Solid: a shape in the axes of frame 2 that computes its nearest point, its reach and its supporting planes.
 template <class Solid>
-struct SolidRow {
+struct SolidHullRow {
     static constexpr const char* name = Solid::gap;
     static constexpr Role role = Role::contact;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr int pressing = 0;
-    static constexpr Shown shown = Shown::contact;
+    static constexpr DisplayKind shown = DisplayKind::contact;
 
     Frame frame1, frame2;
     Solid solid;
     double radius;  // sum of both radii
 
     static constexpr auto data() {
-        return std::tuple(Datum{"frame1", &SolidRow::frame1}, Datum{"frame2", &SolidRow::frame2},
-                          Datum{"solid", &SolidRow::solid}, Datum{"radius", &SolidRow::radius});
+        return std::tuple(Field{"frame1", &SolidHullRow::frame1}, Field{"frame2", &SolidHullRow::frame2},
+                          Field{"solid", &SolidHullRow::solid}, Field{"radius", &SolidHullRow::radius});
     }
     int size() const { return 1; }
     bool is_holonomic(int) const { return true; }
@@ -44,7 +44,7 @@ struct SolidRow {
         out.wrench[0] = force_at(s.a.x, p.n);
     }
     template <class Sides, class Out>
-    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+    PN_INLINE void rate_and_bias(const Sides& s, Out& out) const {
         const auto p = nearest(s);
         const PointMotion<typename Sides::Pose> motion(s);
         out.rate[0] = p.n.dot(motion.u);
@@ -52,7 +52,7 @@ struct SolidRow {
     }
 };
 
-using HullRow = SolidRow<Hull>;
-using RevolvedRow = SolidRow<Revolved>;
+using HullRow = SolidHullRow<Hull>;
+using RevolvedRow = SolidHullRow<Revolved>;
 
 }  // namespace pn

@@ -12,7 +12,7 @@
 namespace pn {
 
 template <class Solid>
-struct SolidSlipRows : SlipDirections {
+struct SolidHullSlipRows : SlipDirections {
     static constexpr const char* name = Solid::slip;
 
     Frame frame1, frame2;
@@ -20,8 +20,8 @@ struct SolidSlipRows : SlipDirections {
     double radius1;
 
     static constexpr auto data() {
-        return std::tuple(Datum{"frame1", &SolidSlipRows::frame1}, Datum{"frame2", &SolidSlipRows::frame2},
-                          Datum{"solid", &SolidSlipRows::solid}, Datum{"radius1", &SolidSlipRows::radius1});
+        return std::tuple(Field{"frame1", &SolidHullSlipRows::frame1}, Field{"frame2", &SolidHullSlipRows::frame2},
+                          Field{"solid", &SolidHullSlipRows::solid}, Field{"radius1", &SolidHullSlipRows::radius1});
     }
     int size() const { return 2; }
 
@@ -35,7 +35,7 @@ struct SolidSlipRows : SlipDirections {
         for (int k = 0; k < 2; ++k) out.wrench[k] = force_at(contact, along.t[k]);
     }
     template <class Sides, class Out>
-    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+    PN_INLINE void rate_and_bias(const Sides& s, Out& out) const {
         const auto p = nearest(s);
         const auto dn = s.b.omega().cross(p.n) + p.turning(s.a.velocity(s.a.x) - s.b.velocity(s.a.x));
         const TurningTangents<Sides> along(s, p.n, dn);
@@ -44,7 +44,7 @@ struct SolidSlipRows : SlipDirections {
     }
 };
 
-using HullSlipRows = SolidSlipRows<Hull>;
-using RevolvedSlipRows = SolidSlipRows<Revolved>;
+using HullSlipRows = SolidHullSlipRows<Hull>;
+using RevolvedSlipRows = SolidHullSlipRows<Revolved>;
 
 }  // namespace pn

@@ -10,15 +10,15 @@ struct UserGapRow {
     static constexpr Role role = Role::contact;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr int pressing = 0;
-    static constexpr Shown shown = Shown::nothing;
+    static constexpr DisplayKind shown = DisplayKind::nothing;
 
     decltype(UserRows::function) function;
     decltype(UserRows::residual_function) gap;
     decltype(UserRows::rate_function) gap_rate;
 
     static constexpr auto data() {
-        return std::tuple(Datum{"rows", &UserGapRow::function}, Datum{"gap", &UserGapRow::gap},
-                          Datum{"rate", &UserGapRow::gap_rate});
+        return std::tuple(Field{"rows", &UserGapRow::function}, Field{"gap", &UserGapRow::gap},
+                          Field{"rate", &UserGapRow::gap_rate});
     }
     int size() const { return 1; }
     bool is_holonomic(int) const { return true; }
@@ -37,7 +37,7 @@ struct UserGapRow {
         out.drift[0] = -out.b[0];
     }
     template <class State, class Out>
-    PN_INLINE void rate_and_drift(const State& s, Out& out) const {
+    PN_INLINE void rate_and_bias(const State& s, Out& out) const {
         gap_rate(s.t, s.q, s.v, out.scratch);
         out.rate[0] = out.scratch[0];
     }

@@ -13,16 +13,16 @@ struct CouplingRows {
     static constexpr const char* name = "coupling";
     static constexpr Role role = Role::constraint;
     static constexpr bool constant_A = true, affine_rate = true, comparable_rows = false;
-    static constexpr Shown shown = Shown::gear;
+    static constexpr DisplayKind shown = DisplayKind::gear;
 
     int joint1, joint2;
     double ratio, offset, period;  // period of the residual for unbounded joints (0: none)
     bool position;                 // false: no angle determines the residual, and only the rate is constrained
 
     static constexpr auto data() {
-        return std::tuple(Datum{"joint1", &CouplingRows::joint1}, Datum{"joint2", &CouplingRows::joint2},
-                          Datum{"ratio", &CouplingRows::ratio}, Datum{"offset", &CouplingRows::offset},
-                          Datum{"period", &CouplingRows::period}, Datum{"position", &CouplingRows::position});
+        return std::tuple(Field{"joint1", &CouplingRows::joint1}, Field{"joint2", &CouplingRows::joint2},
+                          Field{"ratio", &CouplingRows::ratio}, Field{"offset", &CouplingRows::offset},
+                          Field{"period", &CouplingRows::period}, Field{"position", &CouplingRows::position});
     }
     int size() const { return 1; }
     bool is_holonomic(int) const { return true; }
@@ -41,7 +41,7 @@ struct CouplingRows {
         out.A(0, s.mechanism.joints[joint2].iv) = -ratio;
     }
     template <class State, class Out>
-    PN_INLINE void rate_and_drift(const State& s, Out& out) const {
+    PN_INLINE void rate_and_bias(const State& s, Out& out) const {
         out.rate[0] = s.v[s.mechanism.joints[joint1].iv] - ratio * s.v[s.mechanism.joints[joint2].iv];
     }
 };

@@ -13,14 +13,14 @@ struct CouplingSlipRow {
     static constexpr const char* name = "coupling_slip";
     static constexpr Role role = Role::direction;
     static constexpr bool constant_A = true, affine_rate = true, comparable_rows = false;
-    static constexpr Shown shown = Shown::nothing;
+    static constexpr DisplayKind shown = DisplayKind::nothing;
 
     int joint1, joint2;
     double weight1, weight2;
 
     static constexpr auto data() {
-        return std::tuple(Datum{"joint1", &CouplingSlipRow::joint1}, Datum{"joint2", &CouplingSlipRow::joint2},
-                          Datum{"weight1", &CouplingSlipRow::weight1}, Datum{"weight2", &CouplingSlipRow::weight2});
+        return std::tuple(Field{"joint1", &CouplingSlipRow::joint1}, Field{"joint2", &CouplingSlipRow::joint2},
+                          Field{"weight1", &CouplingSlipRow::weight1}, Field{"weight2", &CouplingSlipRow::weight2});
     }
     int size() const { return 1; }
     bool is_holonomic(int) const { return false; }
@@ -35,7 +35,7 @@ struct CouplingSlipRow {
         out.A(0, s.mechanism.joints[joint2].iv) = weight2;
     }
     template <class State, class Out>
-    PN_INLINE void rate_and_drift(const State& s, Out& out) const {
+    PN_INLINE void rate_and_bias(const State& s, Out& out) const {
         out.rate[0] = weight1 * s.v[s.mechanism.joints[joint1].iv] + weight2 * s.v[s.mechanism.joints[joint2].iv];
     }
 };

@@ -13,14 +13,14 @@ struct DistanceRows {
     static constexpr const char* name = "distance";
     static constexpr Role role = Role::constraint;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
-    static constexpr Shown shown = Shown::rod;
+    static constexpr DisplayKind shown = DisplayKind::rod;
 
     Frame frame1, frame2;
     TimeFunction length;
 
     static constexpr auto data() {
-        return std::tuple(Datum{"frame1", &DistanceRows::frame1}, Datum{"frame2", &DistanceRows::frame2},
-                          Datum{"length", &DistanceRows::length});
+        return std::tuple(Field{"frame1", &DistanceRows::frame1}, Field{"frame2", &DistanceRows::frame2},
+                          Field{"length", &DistanceRows::length});
     }
     int size() const { return 1; }
     bool is_holonomic(int) const { return true; }
@@ -39,7 +39,7 @@ struct DistanceRows {
         out.wrench[0] = force_at(s.a.x, direction(d, d.norm()));
     }
     template <class Sides, class Out>
-    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+    PN_INLINE void rate_and_bias(const Sides& s, Out& out) const {
         using Scalar = typename Sides::Scalar;
         const auto d = s.a.x - s.b.x, u = s.a.velocity(s.a.x) - s.b.velocity(s.b.x);
         const Scalar distance = d.norm();

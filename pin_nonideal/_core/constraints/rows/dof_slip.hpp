@@ -9,15 +9,15 @@
 
 namespace pn {
 
-struct DofRows {
+struct DofSlipRows {
     static constexpr const char* name = "dof_slip";
     static constexpr Role role = Role::direction;
     static constexpr bool constant_A = true, affine_rate = true, comparable_rows = false;
-    static constexpr Shown shown = Shown::nothing;
+    static constexpr DisplayKind shown = DisplayKind::nothing;
 
     int dof, count;
 
-    static constexpr auto data() { return std::tuple(Datum{"dof", &DofRows::dof}, Datum{"count", &DofRows::count}); }
+    static constexpr auto data() { return std::tuple(Field{"dof", &DofSlipRows::dof}, Field{"count", &DofSlipRows::count}); }
     int size() const { return count; }
     bool is_holonomic(int) const { return false; }
     bool moves_in_time() const { return false; }
@@ -34,7 +34,7 @@ struct DofRows {
         for (int k = 0; k < count; ++k) out.A(k, dof + k) = 1.0;
     }
     template <class State, class Out>
-    PN_INLINE void rate_and_drift(const State& s, Out& out) const {
+    PN_INLINE void rate_and_bias(const State& s, Out& out) const {
         for (int k = 0; k < count; ++k) out.rate[k] = s.v[dof + k];
     }
 };

@@ -31,12 +31,12 @@ struct FrameRows {
     static constexpr const char* name = "frame";
     static constexpr Role role = Role::constraint;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
-    static constexpr Shown shown = Shown::anchor;
+    static constexpr DisplayKind shown = DisplayKind::anchor;
 
     Frame frame1, frame2;
 
     static constexpr auto data() {
-        return std::tuple(Datum{"frame1", &FrameRows::frame1}, Datum{"frame2", &FrameRows::frame2});
+        return std::tuple(Field{"frame1", &FrameRows::frame1}, Field{"frame2", &FrameRows::frame2});
     }
     int size() const { return 6; }
     bool is_holonomic(int) const { return true; }
@@ -58,7 +58,7 @@ struct FrameRows {
         }
     }
     template <class Sides, class Out>
-    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+    PN_INLINE void rate_and_bias(const Sides& s, Out& out) const {
         const PointMotion<typename Sides::Pose> point(s);
         const auto omega = s.a.omega() - s.b.omega(), alpha = s.a.alpha() - s.b.alpha() - s.b.omega().cross(omega);
         for (int k = 0; k < 3; ++k) {

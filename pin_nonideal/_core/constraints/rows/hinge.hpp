@@ -1,4 +1,4 @@
-// The origins of two frames coincide, and so do their axes.
+// The origins and the axes of two frames coincide.
 #pragma once
 
 #include <tuple>
@@ -17,15 +17,15 @@ struct HingeRows {
     static constexpr const char* name = "hinge";
     static constexpr Role role = Role::constraint;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
-    static constexpr Shown shown = Shown::anchor;
+    static constexpr DisplayKind shown = DisplayKind::anchor;
 
     Frame frame1, frame2;
     Vec3 axis, normal1, normal2;  // right-handed, in both frames
 
     static constexpr auto data() {
-        return std::tuple(Datum{"frame1", &HingeRows::frame1}, Datum{"frame2", &HingeRows::frame2},
-                          Datum{"axis", &HingeRows::axis}, Datum{"normal1", &HingeRows::normal1},
-                          Datum{"normal2", &HingeRows::normal2});
+        return std::tuple(Field{"frame1", &HingeRows::frame1}, Field{"frame2", &HingeRows::frame2},
+                          Field{"axis", &HingeRows::axis}, Field{"normal1", &HingeRows::normal1},
+                          Field{"normal2", &HingeRows::normal2});
     }
     int size() const { return 5; }
     bool is_holonomic(int) const { return true; }
@@ -53,7 +53,7 @@ struct HingeRows {
         out.wrench[4] = couple_at(s.a.x, e.cross(s.b.R * normal2));
     }
     template <class Sides, class Out>
-    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+    PN_INLINE void rate_and_bias(const Sides& s, Out& out) const {
         const PointMotion<typename Sides::Pose> point(s);
         for (int k = 0; k < 3; ++k) point.row(out, k, s.b.R.col(k));
         axis_row(s, out, 3, s.b.R * normal1);

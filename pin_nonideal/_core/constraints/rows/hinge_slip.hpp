@@ -15,8 +15,8 @@ struct HingeSlipRows : SlipDirections {
     Vec3 axis;
 
     static constexpr auto data() {
-        return std::tuple(Datum{"frame1", &HingeSlipRows::frame1}, Datum{"frame2", &HingeSlipRows::frame2},
-                          Datum{"axis", &HingeSlipRows::axis});
+        return std::tuple(Field{"frame1", &HingeSlipRows::frame1}, Field{"frame2", &HingeSlipRows::frame2},
+                          Field{"axis", &HingeSlipRows::axis});
     }
     int size() const { return 1; }
 
@@ -25,7 +25,7 @@ struct HingeSlipRows : SlipDirections {
         out.wrench[0] = couple_at(s.a.x, s.a.R * axis);
     }
     template <class Sides, class Out>
-    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+    PN_INLINE void rate_and_bias(const Sides& s, Out& out) const {
         const auto e = s.a.R * axis, omega = s.a.omega() - s.b.omega();
         out.rate[0] = e.dot(omega);
         out.drift[0] = e.dot(s.a.alpha() - s.b.alpha()) + s.a.omega().cross(e).dot(omega);

@@ -8,17 +8,17 @@
 
 namespace pn {
 
-struct KnifeRows {
+struct KnifeEdgeRows {
     static constexpr const char* name = "knife";
     static constexpr Role role = Role::constraint;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
-    static constexpr Shown shown = Shown::edge;
+    static constexpr DisplayKind shown = DisplayKind::edge;
 
     Frame frame1, frame2;  // frame2 is the world's
     Vec3 axis;
 
     static constexpr auto data() {
-        return std::tuple(Datum{"frame", &KnifeRows::frame1}, Datum{"axis", &KnifeRows::axis});
+        return std::tuple(Field{"frame", &KnifeEdgeRows::frame1}, Field{"axis", &KnifeEdgeRows::axis});
     }
     int size() const { return 1; }
     bool is_holonomic(int) const { return false; }
@@ -31,7 +31,7 @@ struct KnifeRows {
         out.wrench[0] = force_at(s.a.x, s.a.R * axis);
     }
     template <class Sides, class Out>
-    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+    PN_INLINE void rate_and_bias(const Sides& s, Out& out) const {
         const auto e = s.a.R * axis, u = s.a.velocity(s.a.x);
         out.rate[0] = e.dot(u);  // Eq. (2)
         out.drift[0] = e.dot(s.a.acceleration(s.a.x)) + s.a.omega().cross(e).dot(u);

@@ -14,15 +14,15 @@ struct MotionRows {
     static constexpr const char* name = "motion";
     static constexpr Role role = Role::constraint;
     static constexpr bool constant_A = true, affine_rate = true, comparable_rows = false;
-    static constexpr Shown shown = Shown::drive;
+    static constexpr DisplayKind shown = DisplayKind::drive;
 
     int joint;
     TimeFunction function;
     double period;  // period of the residual for an unbounded joint (0: none)
 
     static constexpr auto data() {
-        return std::tuple(Datum{"joint", &MotionRows::joint}, Datum{"function", &MotionRows::function},
-                          Datum{"period", &MotionRows::period});
+        return std::tuple(Field{"joint", &MotionRows::joint}, Field{"function", &MotionRows::function},
+                          Field{"period", &MotionRows::period});
     }
     int size() const { return 1; }
     bool is_holonomic(int) const { return true; }
@@ -41,7 +41,7 @@ struct MotionRows {
         out.A(0, s.mechanism.joints[joint].iv) = 1.0;
     }
     template <class State, class Out>
-    PN_INLINE void rate_and_drift(const State& s, Out& out) const {
+    PN_INLINE void rate_and_bias(const State& s, Out& out) const {
         out.rate[0] = s.v[s.mechanism.joints[joint].iv] + out.phi_t[0];
         out.drift[0] = out.phi_tt[0];
     }

@@ -13,14 +13,14 @@ struct PointRows {
     static constexpr const char* name = "point";
     static constexpr Role role = Role::constraint;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = true;
-    static constexpr Shown shown = Shown::anchor;
+    static constexpr DisplayKind shown = DisplayKind::anchor;
 
     Frame frame1, frame2;
     std::vector<int> axes;
 
     static constexpr auto data() {
-        return std::tuple(Datum{"frame1", &PointRows::frame1}, Datum{"frame2", &PointRows::frame2},
-                          Datum{"axes", &PointRows::axes});
+        return std::tuple(Field{"frame1", &PointRows::frame1}, Field{"frame2", &PointRows::frame2},
+                          Field{"axes", &PointRows::axes});
     }
     int size() const { return static_cast<int>(axes.size()); }
     bool is_holonomic(int) const { return true; }
@@ -35,7 +35,7 @@ struct PointRows {
         for (size_t k = 0; k < axes.size(); ++k) out.wrench[k] = force_at(s.a.x, s.b.R.col(axes[k]));
     }
     template <class Sides, class Out>
-    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+    PN_INLINE void rate_and_bias(const Sides& s, Out& out) const {
         const PointMotion<typename Sides::Pose> point(s);
         for (size_t k = 0; k < axes.size(); ++k) point.row(out, static_cast<int>(k), s.b.R.col(axes[k]));
     }

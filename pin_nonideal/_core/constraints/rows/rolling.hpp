@@ -12,7 +12,7 @@ struct RollingRows {
     static constexpr const char* name = "rolling";
     static constexpr Role role = Role::constraint;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
-    static constexpr Shown shown = Shown::rolling;
+    static constexpr DisplayKind shown = DisplayKind::rolling;
     static constexpr int pressing = 2;
 
     Frame frame1, frame2;
@@ -22,10 +22,10 @@ struct RollingRows {
     Vec3 tangent1, tangent2, normal;  // in frame 2
 
     static constexpr auto data() {
-        return std::tuple(Datum{"frame", &RollingRows::frame1}, Datum{"plane", &RollingRows::frame2},
-                          Datum{"radius", &RollingRows::radius}, Datum{"sphere", &RollingRows::sphere},
-                          Datum{"axle", &RollingRows::axle}, Datum{"tangent1", &RollingRows::tangent1},
-                          Datum{"tangent2", &RollingRows::tangent2}, Datum{"normal", &RollingRows::normal});
+        return std::tuple(Field{"frame", &RollingRows::frame1}, Field{"plane", &RollingRows::frame2},
+                          Field{"radius", &RollingRows::radius}, Field{"sphere", &RollingRows::sphere},
+                          Field{"axle", &RollingRows::axle}, Field{"tangent1", &RollingRows::tangent1},
+                          Field{"tangent2", &RollingRows::tangent2}, Field{"normal", &RollingRows::normal});
     }
     int size() const { return 3; }
     bool is_holonomic(int row) const { return row == 2; }
@@ -43,7 +43,7 @@ struct RollingRows {
         out.wrench[2] = force_at(contact.point, s.b.R * normal);
     }
     template <class Sides, class Out>
-    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+    PN_INLINE void rate_and_bias(const Sides& s, Out& out) const {
         const Contact<Sides> contact(*this, s);
         sliding_row(s, out, 0, s.b.R * tangent1, contact.point, contact.rate);
         sliding_row(s, out, 1, s.b.R * tangent2, contact.point, contact.rate);

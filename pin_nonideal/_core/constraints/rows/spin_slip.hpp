@@ -10,15 +10,15 @@
 
 namespace pn {
 
-struct TurnSlipRows : SlipDirections {
+struct SpinSlipRows : SlipDirections {
     static constexpr const char* name = "turn_slip";
 
     Frame frame1, frame2;
     std::vector<int> axes;
 
     static constexpr auto data() {
-        return std::tuple(Datum{"frame1", &TurnSlipRows::frame1}, Datum{"frame2", &TurnSlipRows::frame2},
-                          Datum{"axes", &TurnSlipRows::axes});
+        return std::tuple(Field{"frame1", &SpinSlipRows::frame1}, Field{"frame2", &SpinSlipRows::frame2},
+                          Field{"axes", &SpinSlipRows::axes});
     }
     int size() const { return static_cast<int>(axes.size()); }
 
@@ -27,7 +27,7 @@ struct TurnSlipRows : SlipDirections {
         for (size_t k = 0; k < axes.size(); ++k) out.wrench[k] = couple_at(s.a.x, s.b.R.col(axes[k]));
     }
     template <class Sides, class Out>
-    PN_INLINE void rate_and_drift(const Sides& s, Out& out) const {
+    PN_INLINE void rate_and_bias(const Sides& s, Out& out) const {
         const auto omega = s.a.omega() - s.b.omega(), alpha = s.a.alpha() - s.b.alpha() - s.b.omega().cross(omega);
         for (size_t k = 0; k < axes.size(); ++k) {
             out.rate[k] = s.b.R.col(axes[k]).dot(omega);

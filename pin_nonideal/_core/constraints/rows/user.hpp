@@ -15,7 +15,7 @@ struct UserRows {
     static constexpr Role role = Role::constraint;
     // A may depend on v. The rate is then not A v + phi_t.
     static constexpr bool constant_A = false, affine_rate = false, comparable_rows = false;
-    static constexpr Shown shown = Shown::nothing;
+    static constexpr DisplayKind shown = DisplayKind::nothing;
 
     int count = 0;
     std::function<void(double t, const VecX& q, const VecX& v, MatX& A, VecX& b)> function;
@@ -23,8 +23,8 @@ struct UserRows {
     std::function<void(double t, const VecX& q, const VecX& v, VecX& rate)> rate_function;    // may be empty
 
     static constexpr auto data() {
-        return std::tuple(Datum{"size", &UserRows::count}, Datum{"rows", &UserRows::function},
-                          Datum{"residual", &UserRows::residual_function}, Datum{"rate", &UserRows::rate_function});
+        return std::tuple(Field{"size", &UserRows::count}, Field{"rows", &UserRows::function},
+                          Field{"residual", &UserRows::residual_function}, Field{"rate", &UserRows::rate_function});
     }
     int size() const { return count; }
     bool is_holonomic(int) const { return static_cast<bool>(residual_function); }
@@ -44,7 +44,7 @@ struct UserRows {
         for (int k = 0; k < count; ++k) out.drift[k] = -out.b[k];
     }
     template <class State, class Out>
-    PN_INLINE void rate_and_drift(const State& s, Out& out) const {
+    PN_INLINE void rate_and_bias(const State& s, Out& out) const {
         if (!rate_function) return;
         rate_function(s.t, s.q, s.v, out.scratch);
         for (int k = 0; k < count; ++k) out.rate[k] = out.scratch[k];

@@ -18,13 +18,13 @@ struct UserSlipRows {
     static constexpr const char* name = "user_slip";
     static constexpr Role role = Role::direction;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
-    static constexpr Shown shown = Shown::nothing;
+    static constexpr DisplayKind shown = DisplayKind::nothing;
 
     int count = 1;
-    std::function<void(double t, const VecX& q, VecX& rows)> directions;  // one after the other
+    std::function<void(double t, const VecX& q, VecX& rows)> directions;  // in sequence
 
     static constexpr auto data() {
-        return std::tuple(Datum{"size", &UserSlipRows::count}, Datum{"directions", &UserSlipRows::directions});
+        return std::tuple(Field{"size", &UserSlipRows::count}, Field{"directions", &UserSlipRows::directions});
     }
     int size() const { return count; }
     bool is_holonomic(int) const { return false; }
@@ -40,7 +40,7 @@ struct UserSlipRows {
     }
     // Compute the bias d(n(t, q))/dt . v by a central difference along the motion.
     template <class State, class Out>
-    PN_INLINE void rate_and_drift(const State& s, Out& out) const {
+    PN_INLINE void rate_and_bias(const State& s, Out& out) const {
         const double h = direction_step;
         const auto nv = s.v.size();
         VecX ahead(s.q.size()), before(count * nv), after(count * nv);

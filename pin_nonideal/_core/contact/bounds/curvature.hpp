@@ -8,9 +8,9 @@
 
 namespace pn {
 
-class Reach {
+class CurvatureBounds {
 public:
-    explicit Reach(const Program& p);
+    explicit CurvatureBounds(const Program& p);
 
     // Set the largest |v| and |a| of each dof over a step of length h. The bodies in the workspace are at one end of
     // the step.
@@ -33,25 +33,25 @@ private:
     };
     Bound joint_bound(const Joint& joint) const;
     Bound frame_bound(const Frame& frame) const;
-    double of(const Workspace& w, const ContactRow& kind) const;
-    double of(const Workspace& w, const EllipsoidRow& kind) const;
-    double of(const Workspace& w, const CapsulesRow& kind) const;
-    double of(const Workspace& w, const BoxRow& kind) const;
-    double of(const Workspace& w, const LineRow& kind) const;
-    double of(const Workspace& w, const RimRow& kind) const;
-    double of(const Workspace& w, const RimsRow& kind) const;
-    template <class Solid> double of(const Workspace& w, const SolidRow<Solid>& kind) const;
+    double of(const Workspace& w, const PlanePointRow& kind) const;
+    double of(const Workspace& w, const PlaneEllipsoidRow& kind) const;
+    double of(const Workspace& w, const CapsuleCapsuleRow& kind) const;
+    double of(const Workspace& w, const PointBoxRow& kind) const;
+    double of(const Workspace& w, const CapsuleCylinderRow& kind) const;
+    double of(const Workspace& w, const DiskHullRow& kind) const;
+    double of(const Workspace& w, const CylinderCylinderRow& kind) const;
+    template <class Solid> double of(const Workspace& w, const SolidHullRow<Solid>& kind) const;
     double of(const Workspace& w, const LimitRow& kind) const;
     double of_points(const Frame& frame1, double reach1, const Frame& frame2, double reach2) const;
     double over_plane(const Workspace& w, const Frame& frame, const Frame& plane, double reach) const;
-    double speed(const ContactRow& kind) const;
-    double speed(const EllipsoidRow& kind) const;
-    double speed(const CapsulesRow& kind) const;
-    double speed(const BoxRow& kind) const;
-    double speed(const LineRow& kind) const;
-    double speed(const RimRow& kind) const;
-    double speed(const RimsRow& kind) const;
-    template <class Solid> double speed(const SolidRow<Solid>& kind) const;
+    double speed(const PlanePointRow& kind) const;
+    double speed(const PlaneEllipsoidRow& kind) const;
+    double speed(const CapsuleCapsuleRow& kind) const;
+    double speed(const PointBoxRow& kind) const;
+    double speed(const CapsuleCylinderRow& kind) const;
+    double speed(const DiskHullRow& kind) const;
+    double speed(const CylinderCylinderRow& kind) const;
+    template <class Solid> double speed(const SolidHullRow<Solid>& kind) const;
     double speed(const LimitRow& kind) const { return speed_[p.mechanism.joints[kind.joint].iv]; }
     template <class K> double speed(const K&) const { return HUGE_VAL; }
     double rise(double reach1, double reach2, const Frame& frame1, const Frame& frame2, double radius) const;

@@ -22,24 +22,24 @@ struct Separation {
     // Check if the gap is of a supported kind.
     static bool has(const Program& p, int gap) {
         const Kind& kind = p.blocks[p.gaps[gap].block].kind;
-        return std::holds_alternative<CapsulesRow>(kind) || std::holds_alternative<BoxRow>(kind) ||
+        return std::holds_alternative<CapsuleCapsuleRow>(kind) || std::holds_alternative<PointBoxRow>(kind) ||
                std::holds_alternative<HullRow>(kind) || std::holds_alternative<RevolvedRow>(kind) ||
-               std::holds_alternative<LineRow>(kind) || std::holds_alternative<RimRow>(kind) ||
-               std::holds_alternative<RimsRow>(kind);
+               std::holds_alternative<CapsuleCylinderRow>(kind) || std::holds_alternative<DiskHullRow>(kind) ||
+               std::holds_alternative<CylinderCylinderRow>(kind);
     }
     static Separation of(const Program& p, const Workspace& w, int gap) {
         const Kind& kind = p.blocks[p.gaps[gap].block].kind;
         const auto& [frame1, frame2] = frames(kind);
         const Sides<Pose> s{{p.mechanism, w.now.terms, *frame1}, {p.mechanism, w.now.terms, *frame2}, 0.0};
-        if (const auto* box = std::get_if<BoxRow>(&kind)) return of(s, *box);
+        if (const auto* box = std::get_if<PointBoxRow>(&kind)) return of(s, *box);
         if (const auto* hull = std::get_if<HullRow>(&kind)) return of(s, *hull);
         if (const auto* revolved = std::get_if<RevolvedRow>(&kind)) return of(s, *revolved);
-        if (const auto* line = std::get_if<LineRow>(&kind)) return of(s, *line);
-        if (const auto* rim = std::get_if<RimRow>(&kind)) return of(s, *rim);
-        if (const auto* rims = std::get_if<RimsRow>(&kind)) return of(s, *rims);
-        return of(s, std::get<CapsulesRow>(kind));
+        if (const auto* line = std::get_if<CapsuleCylinderRow>(&kind)) return of(s, *line);
+        if (const auto* rim = std::get_if<DiskHullRow>(&kind)) return of(s, *rim);
+        if (const auto* rims = std::get_if<CylinderCylinderRow>(&kind)) return of(s, *rims);
+        return of(s, std::get<CapsuleCapsuleRow>(kind));
     }
-    static Separation of(const Sides<Pose>& s, const CapsulesRow& kind) {
+    static Separation of(const Sides<Pose>& s, const CapsuleCapsuleRow& kind) {
         const NearestPoints<Sides<Pose>> nearest(s, kind.half1, kind.half2);
         Separation out{{}, 4, nearest.n, kind.radius};
         for (int k = 0; k < 4; ++k)
@@ -47,7 +47,7 @@ struct Separation {
                            (k & 2 ? kind.half2 : -kind.half2) * nearest.e2;
         return out;
     }
-    static Separation of(const Sides<Pose>& s, const BoxRow& kind) {
+    static Separation of(const Sides<Pose>& s, const PointBoxRow& kind) {
         const NearestOnBox<Sides<Pose>> nearest(s, kind.half);
         Separation out{{}, 8, nearest.n, kind.radius};
         for (int k = 0; k < 8; ++k) {
@@ -58,17 +58,17 @@ struct Separation {
         return out;
     }
     template <class Solid>
-    static Separation of(const Sides<Pose>& s, const SolidRow<Solid>& kind) {
+    static Separation of(const Sides<Pose>& s, const SolidHullRow<Solid>& kind) {
         return of_middles(s, kind.nearest(s).n, kind.radius, Vec3::Zero());
     }
-    static Separation of(const Sides<Pose>& s, const LineRow& kind) {
+    static Separation of(const Sides<Pose>& s, const CapsuleCylinderRow& kind) {
         const NearestAlongLine<Sides<Pose>> nearest(s, kind.solid, kind.half1);
         return of_middles(s, nearest.at.n, kind.radius, kind.half1 * nearest.e);
     }
-    static Separation of(const Sides<Pose>& s, const RimRow& kind) {
+    static Separation of(const Sides<Pose>& s, const DiskHullRow& kind) {
         return of_middles(s, NearestOnDisk<Sides<Pose>>(s, kind.solid, kind.rim).n, kind.radius, s.a.R.col(2));
     }
-    static Separation of(const Sides<Pose>& s, const RimsRow& kind) {
+    static Separation of(const Sides<Pose>& s, const CylinderCylinderRow& kind) {
         return of_middles(s, NearestOfCylinders<Sides<Pose>>(s, kind.first, kind.second).n, kind.radius, s.a.R.col(2));
     }
     static Separation of_middles(const Sides<Pose>& s, const Vec3& normal, double radius, const Vec3& axis_of_first) {
@@ -86,11 +86,11 @@ struct Separation {
             const Vec3 local(direction.dot(apart[1]), direction.dot(apart[2]), direction.dot(apart[3]));
             if (const auto* hull = std::get_if<HullRow>(&kind)) least -= hull->solid.support(local);
             if (const auto* revolved = std::get_if<RevolvedRow>(&kind)) least -= revolved->solid.support(local);
-            if (const auto* line = std::get_if<LineRow>(&kind))
+            if (const auto* line = std::get_if<CapsuleCylinderRow>(&kind))
                 least -= line->solid.support(local) + std::abs(direction.dot(apart[4]));
-            if (const auto* rim = std::get_if<RimRow>(&kind))
+            if (const auto* rim = std::get_if<DiskHullRow>(&kind))
                 least -= rim->solid.support(local) + rim->rim * direction.cross(apart[4]).norm();
-            if (const auto* rims = std::get_if<RimsRow>(&kind))
+            if (const auto* rims = std::get_if<CylinderCylinderRow>(&kind))
                 least -= rims->second.support(local) +
                          rims->first.support(-direction.dot(apart[4]), direction.cross(apart[4]).norm());
         }
@@ -110,14 +110,15 @@ inline bool stays_above(double from, double to, double parabola, double least) {
 // Maximum distance of points of two bodies, for contacts of a rim or a segment with a solid, or of two rims. Infinite
 // for other contacts, which do not need it.
 inline double span(const Kind& kind, const Separation& at) {
-    if (const auto* line = std::get_if<LineRow>(&kind)) return at.apart[0].norm() + line->half1 + line->solid.reach;
-    if (const auto* rim = std::get_if<RimRow>(&kind)) return at.apart[0].norm() + rim->rim + rim->solid.reach;
-    if (const auto* rims = std::get_if<RimsRow>(&kind)) return at.apart[0].norm() + rims->first.reach + rims->second.reach;
+    const double centers = at.apart[0].norm();
+    if (const auto* line = std::get_if<CapsuleCylinderRow>(&kind)) return centers + line->half1 + line->solid.reach;
+    if (const auto* rim = std::get_if<DiskHullRow>(&kind)) return centers + rim->rim + rim->solid.reach;
+    if (const auto* rims = std::get_if<CylinderCylinderRow>(&kind)) return centers + rims->first.reach + rims->second.reach;
     return HUGE_VAL;
 }
 
 // Check if two bodies stay apart over `length` [s]. Along a fixed direction the distance of any two points stays above
-// its chord minus the parabola of accelerations up to `bound`. Rotating bodies rotate their faces and edges. Along a
+// its chord minus the parabola of accelerations up to `bound`. Faces and edges rotate with their bodies. Along a
 // direction that turns uniformly between the normals, the relative speed and distance of the points enlarge the
 // parabola.
 inline bool stays_apart(const Kind& kind, const Separation& a, const Separation& b, double bound, double speed,
@@ -136,19 +137,19 @@ inline bool stays_apart(const Kind& kind, const Separation& a, const Separation&
 // below their rounding radius. A point in a solid is nearest to another face beyond the middle between two faces. Points
 // over planes have no limit.
 inline double rounded_by(const Kind& kind) {
-    if (const auto* capsules = std::get_if<CapsulesRow>(&kind)) return capsules->radius;
-    if (const auto* line = std::get_if<LineRow>(&kind)) return line->radius;
-    if (const auto* rim = std::get_if<RimRow>(&kind)) return rim->radius;
-    if (const auto* rims = std::get_if<RimsRow>(&kind)) return rims->radius;
-    if (const auto* box = std::get_if<BoxRow>(&kind))
+    if (const auto* capsules = std::get_if<CapsuleCapsuleRow>(&kind)) return capsules->radius;
+    if (const auto* line = std::get_if<CapsuleCylinderRow>(&kind)) return line->radius;
+    if (const auto* rim = std::get_if<DiskHullRow>(&kind)) return rim->radius;
+    if (const auto* rims = std::get_if<CylinderCylinderRow>(&kind)) return rims->radius;
+    if (const auto* box = std::get_if<PointBoxRow>(&kind))
         return box->radius + std::min({box->half[0], box->half[1], box->half[2]});
     if (const auto* hull = std::get_if<HullRow>(&kind)) return hull->radius + hull->solid.half_width();
     if (const auto* revolved = std::get_if<RevolvedRow>(&kind)) return revolved->radius + revolved->solid.half_width();
     return HUGE_VAL;
 }
 
-// Depth that a point in front of a face, or behind it, may still reach before another face is nearer, from its distances
-// to the planes of the nearest and of the next face behind which it lies. Both are positive inside.
+// Depth to which a point may move before another face becomes the nearest. `nearest` and `next` are its distances to
+// the planes of both faces, positive inside.
 inline double depth_to_next_face(double nearest, double next) {
     return next > 0.0 ? next - std::max(nearest, 0.0) : 0.0;
 }
@@ -168,7 +169,7 @@ inline double depth_left(const Program& p, const Workspace& w, int gap, double w
         nearest = std::min(nearest, inside);
     };
     double radius = 0.0;
-    if (const auto* box = std::get_if<BoxRow>(&kind)) {
+    if (const auto* box = std::get_if<PointBoxRow>(&kind)) {
         const Vec3 x = at(box->frame1, box->frame2);
         for (int k = 0; k < 3; ++k) add(box->half[k] - std::abs(x[k]));
         radius = box->radius;
@@ -190,9 +191,10 @@ inline double depth_left(const Program& p, const Workspace& w, int gap, double w
     return std::min(all, radius + depth_to_next_face(nearest, next));
 }
 
-// Check if the gap is the lowest point of a body over a plane. Each point then stays above its own bound.
+// Check if the gap is the lowest point of a body over a plane. Then each point of the body separately keeps its
+// distance from the plane.
 inline bool has_lowest_point(const Program& p, int gap) {
-    return std::holds_alternative<EllipsoidRow>(p.blocks[p.gaps[gap].block].kind);
+    return std::holds_alternative<PlaneEllipsoidRow>(p.blocks[p.gaps[gap].block].kind);
 }
 
 template <class Bytes>

@@ -11,19 +11,19 @@ namespace {
 struct Extents { double first = 0.0, second = 0.0; };
 
 Extents extents(const Kind& kind) {
-    if (const auto* capsules = std::get_if<CapsulesRow>(&kind)) return {capsules->half1, capsules->half2};
-    if (const auto* box = std::get_if<BoxRow>(&kind)) return {0.0, box->half.norm()};
-    if (const auto* ellipsoid = std::get_if<EllipsoidRow>(&kind)) return {ellipsoid->reach(), 0.0};
+    if (const auto* capsules = std::get_if<CapsuleCapsuleRow>(&kind)) return {capsules->half1, capsules->half2};
+    if (const auto* box = std::get_if<PointBoxRow>(&kind)) return {0.0, box->half.norm()};
+    if (const auto* ellipsoid = std::get_if<PlaneEllipsoidRow>(&kind)) return {ellipsoid->reach(), 0.0};
     if (const auto* hull = std::get_if<HullRow>(&kind)) return {0.0, hull->solid.reach};
     if (const auto* revolved = std::get_if<RevolvedRow>(&kind)) return {0.0, revolved->solid.reach};
-    if (const auto* line = std::get_if<LineRow>(&kind)) return {line->half1, line->solid.reach};
-    if (const auto* rim = std::get_if<RimRow>(&kind)) return {rim->rim, rim->solid.reach};
-    if (const auto* rims = std::get_if<RimsRow>(&kind)) return {rims->first.reach, rims->second.reach};
+    if (const auto* line = std::get_if<CapsuleCylinderRow>(&kind)) return {line->half1, line->solid.reach};
+    if (const auto* rim = std::get_if<DiskHullRow>(&kind)) return {rim->rim, rim->solid.reach};
+    if (const auto* rims = std::get_if<CylinderCylinderRow>(&kind)) return {rims->first.reach, rims->second.reach};
     return {};
 }
 
 bool has_plane(const Kind& kind) {
-    return std::holds_alternative<ContactRow>(kind) || std::holds_alternative<EllipsoidRow>(kind);
+    return std::holds_alternative<PlanePointRow>(kind) || std::holds_alternative<PlaneEllipsoidRow>(kind);
 }
 
 bool turns(JointKind kind) { return kind != JointKind::prismatic && kind != JointKind::translation; }
@@ -32,24 +32,24 @@ bool slides(JointKind kind) { return kind != JointKind::revolute && kind != Join
 }  // namespace
 
 static void add(const std::vector<double>& parts, std::vector<double>& sums) {
-    for (size_t i = 0; i < sums.size(); ++i) sums[i] = (sums[i] + parts[i]) * WayBound::parameters.rounded_up;
+    for (size_t i = 0; i < sums.size(); ++i) sums[i] = (sums[i] + parts[i]) * TravelBound::parameters.rounded_up;
 }
 
-void Ways::add_bodies() {
+void TravelState::add_bodies() {
     add(body_step, body);
     add(joint_step, joint);
     add(turn_step, turn);
-    most = scene = (scene + scene_step) * WayBound::parameters.rounded_up;
+    max_total = scene = (scene + scene_step) * TravelBound::parameters.rounded_up;
 }
 
-void Ways::go_on() {
+void TravelState::add_step() {
     if (summed) return add_bodies();
     add(slid_step, slid);
     add(turned_step, turned);
-    most = (most + most_step) * WayBound::parameters.rounded_up;
+    max_total = (max_total + max_step) * TravelBound::parameters.rounded_up;
 }
 
-WayBound::WayBound(const Program& program)
+TravelBound::TravelBound(const Program& program)
     : p(program), extent_(program.mechanism.joints.size(), 0.0), pairs_(program.gaps.size()) {
     const std::vector<Joint>& joints = p.mechanism.joints;
     std::vector<char> needed(joints.size(), 0), may_turn(joints.size(), 0);
@@ -88,15 +88,16 @@ WayBound::WayBound(const Program& program)
     }
 }
 
-void WayBound::size(Ways& ways) const {
-    for (auto* each : {&ways.body, &ways.joint, &ways.turn, &ways.lever, &ways.slid, &ways.turned, &ways.body_step,
-                       &ways.joint_step, &ways.turn_step, &ways.slid_step, &ways.turned_step})
+void TravelBound::size(TravelState& travel) const {
+    for (auto* each : {&travel.body, &travel.joint, &travel.turn, &travel.lever, &travel.slid, &travel.turned,
+                       &travel.body_step, &travel.joint_step, &travel.turn_step, &travel.slid_step,
+                       &travel.turned_step})
         each->assign(extent_.size(), 0.0);
-    ways.slid_until.assign(extent_.size(), -1.0);
+    travel.slid_until.assign(extent_.size(), -1.0);
 }
 
 // Motion of a joint's body relative to its parent.
-WayBound::Speeds WayBound::speeds(const Moved& moved, const VecX& speed) {
+TravelBound::Speeds TravelBound::speeds(const Moved& moved, const VecX& speed) {
     if (moved.nv == 1) return {moved.slide * speed[moved.iv], moved.turn * speed[moved.iv]};
     const auto all = speed.segment(moved.iv, moved.nv);
     switch (moved.kind) {
@@ -110,8 +111,8 @@ WayBound::Speeds WayBound::speeds(const Moved& moved, const VecX& speed) {
 
 // Compute levers along the tree, from the farthest point of a body to its joint and on to the parent. Origins of
 // rotating joints are fixed on the parent. Sliding joints get a margin.
-void WayBound::set_levers(const Terms& terms, Ways& ways) const {
-    for (const Moved& moved : moved_) ways.lever[moved.joint] = extent_[moved.joint];
+void TravelBound::set_levers(const Terms& terms, TravelState& travel) const {
+    for (const Moved& moved : moved_) travel.lever[moved.joint] = extent_[moved.joint];
     for (auto moved = moved_.rbegin(); moved != moved_.rend(); ++moved) {
         const int i = moved->joint, parent = moved->parent;
         if (parent == 0) continue;
@@ -119,62 +120,62 @@ void WayBound::set_levers(const Terms& terms, Ways& ways) const {
         double apart = (own.ref + own.p - before.ref - before.p).norm();
         if (slides(moved->kind)) {
             const double room =
-                parameters.room_ahead * apart + parameters.steps_ahead * (ways.slid_step[i] + ways.turned_step[i]);
-            ways.slid_until[i] = ways.joint[i] + room;
+                parameters.room_ahead * apart + parameters.steps_ahead * (travel.slid_step[i] + travel.turned_step[i]);
+            travel.slid_until[i] = travel.joint[i] + room;
             apart += room;
         }
-        ways.lever[parent] = std::max(ways.lever[parent], apart + ways.lever[i]);
+        travel.lever[parent] = std::max(travel.lever[parent], apart + travel.lever[i]);
     }
-    ways.placed = true;
+    travel.placed = true;
 }
 
 // Travel not yet summed uses the old levers.
-void WayBound::step(const Terms& terms, const VecX& speed, double h, Ways& ways) const {
+void TravelBound::step(const Terms& terms, const VecX& speed, double h, TravelState& travel) const {
     const double time = parameters.way_factor * h;
-    bool far = !ways.placed;
+    bool far = !travel.placed;
     for (const Moved& moved : moved_) {
         const int i = moved.joint;
         const Speeds of = speeds(moved, speed);
-        ways.slid_step[i] = time * of.slide;
-        ways.turned_step[i] = time * of.turn;
+        travel.slid_step[i] = time * of.slide;
+        travel.turned_step[i] = time * of.turn;
         if (!moved.drifts) continue;
-        const double come = ways.joint[i] + ways.slid[i] + ways.turned[i];
-        far |= !(come + ways.slid_step[i] + ways.turned_step[i] <= ways.slid_until[i]);
+        const double come = travel.joint[i] + travel.slid[i] + travel.turned[i];
+        far |= !(come + travel.slid_step[i] + travel.turned_step[i] <= travel.slid_until[i]);
     }
     if (far) {
-        sum_up(ways);
-        set_levers(terms, ways);
+        sum_up(travel);
+        set_levers(terms, travel);
     }
-    ways.summed = false;
-    ways.most_step = 0.0;
+    travel.summed = false;
+    travel.max_step = 0.0;
     for (const Moved& moved : moved_)
-        ways.most_step += ways.slid_step[moved.joint] + ways.turned_step[moved.joint] * ways.lever[moved.joint];
-    ways.most_step *= parameters.joints_rounded_up;
+        travel.max_step += travel.slid_step[moved.joint] + travel.turned_step[moved.joint] * travel.lever[moved.joint];
+    travel.max_step *= parameters.joints_rounded_up;
 }
 
-// Propagate along the tree: the travel of a body is that of its parent plus that of its joint.
-void WayBound::spread(const std::vector<double>& slid, const std::vector<double>& turned, Ways& ways) const {
-    ways.scene_step = 0.0;
+// Propagate along the tree: the travel of a body is the travel of its parent plus the travel of its joint.
+void TravelBound::spread(const std::vector<double>& slid, const std::vector<double>& turned, TravelState& travel) const {
+    travel.scene_step = 0.0;
     for (const Moved& moved : moved_) {
         const int i = moved.joint, parent = moved.parent;
-        ways.joint_step[i] = slid[i] + turned[i];
-        ways.turn_step[i] = ways.turn_step[parent] + turned[i];
-        ways.body_step[i] = ways.body_step[parent] + slid[i] + turned[i] * ways.lever[i];
-        ways.scene_step = std::max(ways.scene_step, ways.body_step[i]);
+        travel.joint_step[i] = slid[i] + turned[i];
+        travel.turn_step[i] = travel.turn_step[parent] + turned[i];
+        travel.body_step[i] = travel.body_step[parent] + slid[i] + turned[i] * travel.lever[i];
+        travel.scene_step = std::max(travel.scene_step, travel.body_step[i]);
     }
 }
 
-void WayBound::sum_up(Ways& ways) const {
-    if (ways.summed) return;
-    spread(ways.slid, ways.turned, ways);
-    ways.add_bodies();
-    std::fill(ways.slid.begin(), ways.slid.end(), 0.0);
-    std::fill(ways.turned.begin(), ways.turned.end(), 0.0);
-    spread(ways.slid_step, ways.turned_step, ways);
-    ways.summed = true;
+void TravelBound::sum_up(TravelState& travel) const {
+    if (travel.summed) return;
+    spread(travel.slid, travel.turned, travel);
+    travel.add_bodies();
+    std::fill(travel.slid.begin(), travel.slid.end(), 0.0);
+    std::fill(travel.turned.begin(), travel.turned.end(), 0.0);
+    spread(travel.slid_step, travel.turned_step, travel);
+    travel.summed = true;
 }
 
-double WayBound::apart(const Terms& terms, int gap) const {
+double TravelBound::apart(const Terms& terms, int gap) const {
     const auto& [first, second] = frames(p.blocks[p.gaps[gap].block].kind);
     const Pose one(p.mechanism, terms, *first), other(p.mechanism, terms, *second);
     return (one.x - other.x).norm() + pairs_[gap].reach;

@@ -10,7 +10,7 @@ namespace pn {
 
 // Travel data that lasts from step to step. Travel of a body is in meters, of any of its contact points. Travel of a
 // joint is in the joint's unit, and rotation in radians.
-struct Ways {
+struct TravelState {
     std::vector<double> body, joint, turn;  // by joint: travel of its body, of the joint, rotation of its body
     double scene = 0.0;                     // sum over the steps of the largest body travel
     // Distance [m] of points that a joint moves from its origin. Valid until sliding joints travel beyond slid_until.
@@ -21,11 +21,11 @@ struct Ways {
     // Travel over the current step. Entries of bodies are valid only if `summed`.
     std::vector<double> body_step, joint_step, turn_step, slid_step, turned_step;
     double scene_step = 0.0;
-    double most = 0.0, most_step = 0.0;  // upper bounds of the scene's travel: total, and over the step
+    double max_total = 0.0, max_step = 0.0;  // upper bounds of the scene's travel: total, and over the step
     bool summed = false;
 
     // Add the travel of the step to the totals.
-    void go_on();
+    void add_step();
     // Add the travel of bodies over the current step to the totals.
     void add_bodies();
 };
@@ -43,19 +43,19 @@ struct TravelBoundParameters {
     double lever_of_stop = 1.0;
 };
 
-class WayBound {
+class TravelBound {
 public:
     using Parameters = TravelBoundParameters;
     static constexpr Parameters parameters{};
 
-    explicit WayBound(const Program& p);
+    explicit TravelBound(const Program& p);
 
-    void size(Ways& ways) const;
+    void size(TravelState& travel) const;
     // Compute the travel of joints and the upper bound of the scene's travel over a step of length h. `speed` is the
     // largest |v| of each dof. The bodies are at one end of the step. `sum_up` computes the travel of bodies, total and
     // over the step.
-    void step(const Terms& terms, const VecX& speed, double h, Ways& ways) const;
-    void sum_up(Ways& ways) const;
+    void step(const Terms& terms, const VecX& speed, double h, TravelState& travel) const;
+    void sum_up(TravelState& travel) const;
 
     // Bodies or joint that change a gap.
     struct Pair {
@@ -76,13 +76,13 @@ public:
     }
     // Distance of the bodies of a gap, needed for rotating planes only.
     double apart(const Terms& terms, int gap) const;
-    double way(const Ways& ways, int gap) const {
+    double way(const TravelState& travel, int gap) const {
         const Pair& pair = pairs_[gap];
-        return ways.body[pair.first] + ways.body[pair.second] + ways.joint[pair.joint];
+        return travel.body[pair.first] + travel.body[pair.second] + travel.joint[pair.joint];
     }
-    double way_of_step(const Ways& ways, int gap) const {
+    double way_of_step(const TravelState& travel, int gap) const {
         const Pair& pair = pairs_[gap];
-        return ways.body_step[pair.first] + ways.body_step[pair.second] + ways.joint_step[pair.joint];
+        return travel.body_step[pair.first] + travel.body_step[pair.second] + travel.joint_step[pair.joint];
     }
 
 private:
@@ -94,8 +94,8 @@ private:
     };
     struct Speeds { double slide, turn; };
     static Speeds speeds(const Moved& moved, const VecX& speed);
-    void set_levers(const Terms& terms, Ways& ways) const;
-    void spread(const std::vector<double>& slid, const std::vector<double>& turned, Ways& ways) const;
+    void set_levers(const Terms& terms, TravelState& travel) const;
+    void spread(const std::vector<double>& slid, const std::vector<double>& turned, TravelState& travel) const;
 
     const Program& p;
     std::vector<Moved> moved_;    // each after its parent

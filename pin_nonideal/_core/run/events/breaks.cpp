@@ -77,9 +77,9 @@ void Breaks::enter(double at) {
 }
 
 double Breaks::next(double after) const {
-    const auto stated = std::upper_bound(p.breaks.begin(), p.breaks.end(), after);
+    const auto next_break = std::upper_bound(p.breaks.begin(), p.breaks.end(), after);
     const double found = progress_.detected_break > after ? progress_.detected_break : HUGE_VAL;
-    return std::min(found, stated == p.breaks.end() ? HUGE_VAL : *stated);
+    return std::min(found, next_break == p.breaks.end() ? HUGE_VAL : *next_break);
 }
 
 std::vector<double> Breaks::rates(double t) const {

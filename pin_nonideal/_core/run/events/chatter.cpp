@@ -35,7 +35,7 @@ bool Clusters::dwindles() const {
     return last.size() == parameters.dwindling_events && progress_.t - last.front() <= parameters.window;
 }
 
-// Return the length [s] of the next stretch: twice the last one if events crowded again right after it.
+// Return the length [s] of the next stretch: twice the last one if events accumulated again right after it.
 double Clusters::next_stretch() const {
     const std::vector<double>& recent = progress_.recent_event_times;
     const double first = recent.empty() ? progress_.t : recent.front();

@@ -1,4 +1,4 @@
-// Chatter: crowded events are bridged by time stepping, which locates no events.
+// Chatter: time stepping, which locates no events, bridges accumulations of events.
 #pragma once
 
 #include "run/integrators/stiffness.hpp"
@@ -13,7 +13,7 @@ struct ChatterParameters {
     // finds no motion.
     size_t dwindling_events = 6;
     int steps = 50;  // steps of a stretch
-    // Growth of the stretch if events crowd again right after it, and longest stretch [s].
+    // Growth of the stretch if events accumulate again right after it, and longest stretch [s].
     double growth = 2.0, longest = 1e-2;
     double window = 1e-4;  // window of the event count, and shortest stretch of time stepping [s]
 };
@@ -30,8 +30,8 @@ public:
     void count() { progress_.recent_event_times.push_back(progress_.t); }
     // Record the current time as an instant of mode changes.
     void remember();
-    // Bridge a stretch by time stepping if events crowd. `element`: friction element of the last event. Return true if
-    // a stretch was bridged. The caller must then select the modes.
+    // Bridge a stretch by time stepping if events accumulate. `element`: friction element of the last event. Return
+    // true if a stretch was bridged. The caller must then select the modes.
     bool bridge(int element, double t_end);
     // Check if an event without a known motion ends an accumulation of mode changes. A step cannot resolve the
     // remaining time until rest.

@@ -18,9 +18,8 @@ double EventCandidates::noise() const {
 }
 
 double EventCandidates::allowance(int e) const {
-    return w.state.lingers[e]
-               ? parameters.raised_rest_speed * (1.0 + system_.velocity(stepper_.y0).cwiseAbs().maxCoeff())
-               : 0.0;
+    if (!w.state.is_sticking_deferred[e]) return 0.0;
+    return parameters.raised_rest_speed * (1.0 + system_.velocity(stepper_.y0).cwiseAbs().maxCoeff());
 }
 
 // Check if a sticking element is beyond its limit at the step's end, or may have been between two stages.
@@ -68,7 +67,7 @@ bool EventCandidates::dips(int e) const {
         const double length = (looks[k + 1].part - looks[k].part) * stepper_.h;
         const double from = speed(k), to = speed(k + 1), leaves = length * system_.slip_rate(*looks[k].rate, e),
                      comes = length * system_.slip_rate(*looks[k + 1].rate, e);
-        if (lower_bound_inside(from, leaves, to, comes) < dip && least_inside(from, leaves, to, comes) < dip) return true;
+        if (lower_bound_inside(from, leaves, to, comes) < dip && min_inside(from, leaves, to, comes) < dip) return true;
     }
     return false;
 }
@@ -83,7 +82,7 @@ void EventCandidates::add_pulls(std::vector<Watch>& list) {
     std::vector<char> told = pulls_;
     for (int i = first; i < n; ++i) {
         if (told[i] || !may_pull(i)) continue;
-        const Press found = contact_press(p, w, i);
+        const PullMargin found = contact_pull_margin(p, w, i);
         if (found.must_pull && std::none_of(found.sharing.begin(), found.sharing.end(), [&](int j) { return told[j]; }))
             list.push_back({Watch::Kind::contact, i});
         for (int j : found.sharing) told[j] = 1;

@@ -47,8 +47,8 @@ public:
     EventCandidates(System& system, Stepper& stepper, const std::vector<char>& pulls, GapSearch& gaps)
         : system_(system), stepper_(stepper), p(system.p), w(system.w), pulls_(pulls), gaps_(gaps) {}
 
-    // Return the margins that are negative at the step's end, or may have crossed zero inside. The workspace must be
-    // evaluated at the step's end.
+    // Return the margins that are negative at the step's end, or may have crossed zero inside the step. The workspace
+    // must be evaluated at the step's end.
     std::vector<Watch> find();
     // Return the speed with which an element of deferred sticking may slip against its mode.
     double allowance(int element) const;

@@ -20,7 +20,7 @@ EventSearch::EventSearch(System& system, Stepper& stepper, const std::vector<cha
       candidates_(system, stepper, pulls, gaps_), probe_(VecX::Zero(system.ny)), probe_rate_(probe_) {}
 
 double EventSearch::margin(const Watch& watch, double t, const VecX& y) {
-    if (watch.kind == Watch::Kind::contact) return contact_press(p, w, watch.index).margin;
+    if (watch.kind == Watch::Kind::contact) return contact_pull_margin(p, w, watch.index).margin;
     if (watch.kind == Watch::Kind::load) return w.now.lam[p.blocks[p.gaps[watch.index].block].row];
     if (watch.kind == Watch::Kind::gap) {
         system_.read(y);
@@ -222,13 +222,13 @@ std::optional<Crossing> EventSearch::first() {
         list.emplace_back(cross(watch, from), from != Source::shares);
     }
     for (;;) {
-        auto& [earliest, sure] = *std::min_element(list.begin(), list.end(), [](const auto& one, const auto& other) {
+        auto& [earliest, is_confirmed] = *std::min_element(list.begin(), list.end(), [](const auto& one, const auto& other) {
             return one.first.part < other.first.part;
         });
         if (earliest.part == no_crossing) break;
-        if (sure) return earliest;
+        if (is_confirmed) return earliest;
         earliest = confirmed(earliest);
-        sure = true;
+        is_confirmed = true;
     }
     stepper_.end_directions();
     system_.read(stepper_.y1);

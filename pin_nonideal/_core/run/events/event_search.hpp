@@ -14,7 +14,7 @@ namespace pn {
 
 struct Crossing {
     Watch watch;
-    double part, slope;  // part of the step, and rate of the margin there per step
+    double part, slope;  // part of the step, and rate of the margin at this part per step
     bool leaps = false;  // the margin jumps below zero without a root
 };
 
@@ -46,10 +46,10 @@ public:
     // `pulls`: true for each contact in tension at the step's start.
     EventSearch(System& system, Stepper& stepper, const std::vector<char>& pulls, GapWatch& watch);
 
-    // Return the first crossing. The workspace must be evaluated at the step's end. If there is no crossing it is
-    // evaluated there again.
+    // Return the first crossing. The workspace must be evaluated at the step's end. If there is no crossing, the
+    // workspace is evaluated at the step's end again.
     std::optional<Crossing> first();
-    // Return the deepest penetrating gap at the end of a repeated step, other than the gap that touches there. This gap
+    // Return the deepest penetrating gap at the end of a repeated step, except the gap `touches`. This gap
     // closed before, because the motion differs slightly from the interpolant.
     std::optional<Crossing> deepest_penetration(const Watch& touches);
 

@@ -30,7 +30,7 @@ void resolve_together(System& system, double t, ModeQuestion& asked, bool strike
     std::vector<int>& resting = asked.at_rest;
     for (;;) {
         resolve_modes(p, w, t, system.q, system.v, asked);
-        if (!strikes) keep_moving(p, w, t, system.v);
+        if (!strikes) restore_motion(p, w, t, system.v);
         // Sticking elements get zero slip velocity, without rounding.
         project(p, w, t, system.q, system.v);
         begin_step(p, w, t, system.q, system.v);
@@ -72,10 +72,10 @@ void seek_directions(System& system, const std::vector<int>& resting, bool sough
 // moves.
 void linger(RunState& state, const std::vector<Mode>& before, const FoundEvent& event) {
     for (size_t e = 0; e < before.size(); ++e)
-        if (before[e] != state.mode[e]) state.lingers[e] = 0;
+        if (before[e] != state.mode[e]) state.is_sticking_deferred[e] = 0;
     const int e = event.index;
     if (event.kind == FoundEvent::Kind::rest_or_limit && slips(before[e]) && before[e] == state.mode[e])
-        state.lingers[e] = 1;
+        state.is_sticking_deferred[e] = 1;
 }
 
 }  // namespace
@@ -116,7 +116,7 @@ struct FrictionSwitch {
         if (known && event->kind == FoundEvent::Kind::released_together) asked.breaking = asked.at_rest;
         else if (held >= 0) asked.breaking = {held};
         if (together) together->answer(p, w, asked);
-        if (asked.answered || !known || !go_on(p, w, t, system.q, system.v, asked, event->index))
+        if (asked.is_solved_jointly || !known || !try_previous_modes(p, w, t, system.q, system.v, asked, event->index))
             resolve_together(system, t, asked, strikes);
     }
 
@@ -197,7 +197,8 @@ std::vector<Event> switch_modes(System& system, double t, VecX& y, VecX& dy, con
     FrictionSwitch friction{system, t, event, before, {}};
     if (p.gaps.empty()) friction.find(nullptr);
     else close_and_find(system, t, !event, friction);
-    if (let_go && event && (event->kind == FoundEvent::Kind::lift || event->in_vain)) *let_go = open_unloaded(system, t);
+    if (let_go && event && (event->kind == FoundEvent::Kind::lift || event->in_vain))
+        *let_go = open_unloaded_contacts(system, t);
     if (!p.frictions.empty() || !p.gaps.empty()) {
         seek_directions(system, friction.asked.at_rest, event.has_value());
         system.write(y);
@@ -246,14 +247,14 @@ Strike strike_contacts(System& system, double t, VecX& y, bool starts, bool boun
     return out;
 }
 
-void remember_directions(System& system, std::vector<double>& slip, int arrived) {
+void remember_directions(System& system, std::vector<double>& slip, int stopped_element) {
     Workspace& w = system.w;
     const auto velocity = [&](int e) { return slip_velocity(w.now, system.p.frictions[e]); };
-    const double least = arrived < 0 ? event_handling_parameters.directed_slip
-                                     : std::max(event_handling_parameters.directed_slip, velocity(arrived).norm());
+    const double least = stopped_element < 0 ? event_handling_parameters.directed_slip
+                                     : std::max(event_handling_parameters.directed_slip, velocity(stopped_element).norm());
     for (int e : w.now.loaded) {
         const Friction& f = system.p.frictions[e];
-        if (w.state.lingers[e] && !hardly_moves(system, e)) w.state.lingers[e] = 0;
+        if (w.state.is_sticking_deferred[e] && !hardly_moves(system, e)) w.state.is_sticking_deferred[e] = 0;
         if (!slips(w.state.mode[e]) || f.dim == 1) continue;
         const Vec3 u = velocity(e);
         slip[e] = u.norm();

@@ -19,8 +19,8 @@ struct EventHandlingParameters {
 inline constexpr EventHandlingParameters event_handling_parameters{};
 
 // Select new modes at (t, y), and project y onto the constraints. Without an event, as at the start of a run, every
-// element gets its mode from its velocity. The workspace ends evaluated there, with the rate in dy. Return the changes,
-// empty without an event.
+// element gets its mode from its velocity. On return the workspace is evaluated at (t, y), and dy holds the rate.
+// Return the changes, empty without an event.
 //
 // The contacts of two bodies open if none of them has a load at a lift, or at a touch in vain. `let_go` receives their
 // gaps.
@@ -51,7 +51,7 @@ bool turning(const System& system);
 Event::Kind kind_of_change(Mode before, Mode after);
 
 // Store the slip directions at a step's end for the next step, and the slip speeds in `slip`. The remaining slip of an
-// element that has `arrived` at rest is an error of the step. Slip up to this speed does not change a direction.
-void remember_directions(System& system, std::vector<double>& slip, int arrived = -1);
+// element that has `stopped_element` at rest is an error of the step. Slip up to this speed does not change a direction.
+void remember_directions(System& system, std::vector<double>& slip, int stopped_element = -1);
 
 }  // namespace pn

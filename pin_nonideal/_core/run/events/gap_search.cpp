@@ -31,7 +31,7 @@ void GapSearch::bound_rates() {
 // Return bounds of the second derivative of a gap between the step's ends. For a user's gap they are estimates:
 // multiples of the second derivatives of the cubic between the ends, and of the acceleration at the end.
 GapSearch::Bends GapSearch::bends(int gap, const Look& end) const {
-    if (Reach::knows(p, gap)) return {reach_.bound(w, gap), reach_.rise(w, gap)};
+    if (CurvatureBounds::knows(p, gap)) return {reach_.bound(w, gap), reach_.rise(w, gap)};
     const double h = stepper_.h, change = (end.width - start_.width[gap]) / h;
     const double r0 = start_.rate[gap], r1 = end.rate;
     const double most = parameters.between_stages * std::max({std::abs(6.0 * change - 4.0 * r0 - 2.0 * r1) / h,
@@ -151,7 +151,7 @@ GapSearch::Touch GapSearch::between(int gap, const Look& a, const Look& b) {
 std::optional<GapSearch::Touch> GapSearch::search(int gap, const Look& a, const Look& b, const Bends& bends) {
     const double bound = bends.below;
     // A touching gap that the solver left open stays on its plane. It touches again if it penetrates.
-    const bool rests = stepper_.t0 < start_.rests_until[gap];
+    const bool rests = stepper_.t0 < start_.retry_time[gap];
     if (rests && std::abs(a.width) <= rounding_ && std::abs(b.width) <= rounding_) return std::nullopt;
     if (stays_open(gap, a, b, bound)) return std::nullopt;
     const double length = (b.part - a.part) * stepper_.h;
@@ -159,7 +159,7 @@ std::optional<GapSearch::Touch> GapSearch::search(int gap, const Look& a, const 
     if (b.width < -rounding_ && a.rate + bends.above * length < 0.0) return between(gap, a, b);
     if (bends.above * length * length < rounding_ || looks_ > parameters.most_looks) {
         // Bodies can slide to the next contact point, as a corner from a face onto an edge. The gap of that point then
-        // comes down to zero and stays there. It does not touch before it becomes negative.
+        // falls to zero and stays zero. It does not touch before it becomes negative.
         const bool has_closed = looks_ > parameters.most_looks && !rests && !(a.separation && slides_on(gap));
         if (a.width > 0.0 && b.width < -rounding_) return between(gap, a, b);
         if (b.width < -rounding_ || has_closed) return Touch{b.part, b.rate * stepper_.h};
@@ -167,9 +167,9 @@ std::optional<GapSearch::Touch> GapSearch::search(int gap, const Look& a, const 
     }
     // A gap that leaves its plane is open for at least half of the time that the bound gives.
     if (a.width <= rounding_ && a.rate > 0.0 && !a.separation && !has_lowest_point(p, gap)) {
-        const double sure = a.part + a.rate / (bound * stepper_.h);
-        if (sure < 0.5 * (a.part + b.part) && sure > a.part) {
-            const Look up = look(gap, sure);
+        const double open_until = a.part + a.rate / (bound * stepper_.h);
+        if (open_until < 0.5 * (a.part + b.part) && open_until > a.part) {
+            const Look up = look(gap, open_until);
             if (up.width > 0.0) return search(gap, up, b, bends);
         }
     }

@@ -36,20 +36,20 @@ public:
     struct Bends { double below, above; };  // bounds of the second derivative: magnitude below zero, and largest value
     struct Candidate {
         int gap;
-        GapLook end;  // sample at the step's end
+        GapSample end;  // sample at the step's end
         Bends bends;  // bounds over the step
     };
     const std::vector<Candidate>& find_candidates();
     const std::vector<Candidate>& candidates() const { return candidates_; }  // candidates of the last search
-    // Part of the step at which a candidate closes, and rate of the gap there per step. The search leaves the workspace
-    // at another state.
+    // Part of the step at which a candidate closes, and rate of its gap at this instant per step. The search leaves the
+    // workspace at another state.
     struct Touch { double part, slope; };
     std::optional<Touch> first_touch(int gap);  // `gap`: a candidate
     // Return the zero level of the gap in this step. Rounding can leave a rising gap below its plane at the start.
     double plane(int gap) const { return start_.rate[gap] > 0.0 ? std::min(0.0, start_.width[gap]) : 0.0; }
 
 private:
-    using Look = GapLook;
+    using Look = GapSample;
     Look look(int gap, double part);
     Look look_at_start(int gap) const;
     // Measure a sample from a zero level: the plane, or for round bodies the lowest contact point of the same two
@@ -72,7 +72,7 @@ private:
     Workspace& w;
     GapWatch& watch_;
     GapState& start_;
-    Reach reach_;
+    CurvatureBounds reach_;
     std::vector<Candidate> candidates_;
     std::vector<int> closed_round_;  // closed gaps of round bodies, their next contact point is not lower
     VecX speed_, acceleration_, probe_;

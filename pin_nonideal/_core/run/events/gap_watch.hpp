@@ -12,12 +12,12 @@
 namespace pn {
 
 // Sample of a gap at one instant, with the separation of its round bodies.
-struct GapLook {
+struct GapSample {
     double part, width, rate;
     std::optional<Separation> separation;
 
     // Return the sample of a gap for which the workspace is evaluated.
-    static GapLook here(const Program& p, const Workspace& w, int gap, double part);
+    static GapSample here(const Program& p, const Workspace& w, int gap, double part);
 };
 
 // Gaps at a step's start, as sampled last. A gap is far if it is wide relative to the travel of its bodies in a step.
@@ -29,23 +29,23 @@ struct GapState {
     std::vector<char> near, far;           // near: sampled in each step, far: skipped, neither: closed or immovable
     // Travel of the bodies of far gaps at the last sample (contact/bounds/travel.hpp).
     std::vector<double> way, turn, apart;
-    Ways ways;
+    TravelState travel;
     double ask = 0.0;            // travel of the scene at which far gaps are rechecked
     bool current = false;        // the samples belong to the current state, or to the step that led to it
     std::vector<int> near_gaps;  // indices of near gaps, ascending
     // For a touching gap that the solver left open: time of the first attempt, and time before which it is not retried.
-    std::vector<double> vain_since, rests_until;
+    std::vector<double> blocked_since, retry_time;
 
     // `round`: true if a gap is between round bodies.
     explicit GapState(size_t gaps = 0, bool round = false)
         : width(gaps, 0.0), rate(gaps, 0.0), separation(round ? gaps : 0), near(gaps, 0), far(gaps, 0), way(gaps, 0.0),
-          turn(gaps, 0.0), apart(gaps, 0.0), vain_since(gaps, 0.0), rests_until(gaps, -HUGE_VAL) {}
-    void keep(int gap, const GapLook& look);
+          turn(gaps, 0.0), apart(gaps, 0.0), blocked_since(gaps, 0.0), retry_time(gaps, -HUGE_VAL) {}
+    void keep(int gap, const GapSample& look);
     void find_near();
-    void ask_in_vain(int gap, double t);
-    bool is_in_vain(int gap) const { return rests_until[gap] > -HUGE_VAL; }
+    void defer_retry(int gap, double t);
+    bool is_in_vain(int gap) const { return retry_time[gap] > -HUGE_VAL; }
     // Retry all blocked gaps, after a change of contacts.
-    void ask_anew() { std::fill(rests_until.begin(), rests_until.end(), -HUGE_VAL); }
+    void ask_anew() { std::fill(retry_time.begin(), retry_time.end(), -HUGE_VAL); }
 };
 
 struct GapWatchParameters {
@@ -67,11 +67,11 @@ public:
 
     GapWatch(System& system, GapState& gaps);
 
-    // Sample gaps at the state that the system has read and the workspace is evaluated at. `look_at_all` samples all
-    // gaps, at the start of a run or after a change other than a step. `go_on` samples the near gaps after a step that
-    // was followed to its end.
-    void look_at_all(double t);
-    void go_on(double t);
+    // Sample gaps at the state that the system has read and the workspace is evaluated at. `sample_all` samples all
+    // gaps, at the start of a run or after a change other than a step. `sample_near_gaps` samples the near gaps after a step
+    // that was followed to its end.
+    void sample_all(double t);
+    void sample_near_gaps(double t);
 
     // Follow a step just taken, of length h with the largest |v| of each dof. Far gaps that the travel of their bodies
     // may close by the step's end become near. Return the new near gaps that must be sampled at the step's start.
@@ -87,9 +87,9 @@ public:
     void begin_time_steps(double least);
 
     GapState& gaps;
-    const WayBound ways;
+    const TravelBound travel;
     // samples of the near gaps at the end of the current step, if it was followed
-    std::vector<GapLook> end;
+    std::vector<GapSample> end;
     bool followed = false;
 
 private:

@@ -1,6 +1,7 @@
 // Hand-over of a closed contact from one feature of a shape to the next, as a corner that slides from a face onto an
-// edge. The gap and its rate stay continuous there, but its second derivative jumps. A step across this instant would
-// hold the contact on the wrong feature. The step therefore ends at the instant, and the modes are selected again.
+// edge. The gap and its rate stay continuous at a hand-over, but the second derivative jumps. A step across this
+// instant would hold the contact on the wrong feature. The step therefore ends at the instant, and the modes are
+// selected again.
 #pragma once
 
 #include <optional>

@@ -69,8 +69,8 @@ void Landing::end_bouncing(double stop) {
 void Landing::remember_gaps(bool whole_step) {
     if (system_.ng == 0) return;
     system_.read(progress_.y);
-    if (whole_step) watch_.go_on(progress_.t);
-    else watch_.look_at_all(progress_.t);
+    if (whole_step) watch_.sample_near_gaps(progress_.t);
+    else watch_.sample_all(progress_.t);
 }
 
 }  // namespace pn

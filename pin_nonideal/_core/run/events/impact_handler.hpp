@@ -9,7 +9,8 @@ namespace pn {
 struct ImpactHandlerParameters {
     // Energy gain of an impact that counts as rounding, relative to its works.
     double gain_rounding = 1e-12;
-    // Maximum number of consecutive impacts at one instant. An impact can make other contacts approach again.
+    // Maximum number of consecutive impacts at one instant. An impact can reverse the separation of other
+    // contacts.
     int most_at_once = 100;
 };
 
@@ -20,8 +21,7 @@ public:
 
     Landing(System& system, Progress& progress, GapWatch& watch, const Options& options, Output& output, Recording& out);
 
-    // Apply impacts of contacts that touch and approach each other, until none does. Return true if there was an
-    // impact.
+    // Apply impacts until no touching contact approaches. Return true if there was an impact.
     bool strike(bool starts);
     // Advance to the end of bouncing after an impact, not beyond `stop` or the next sample. Without low bouncing the
     // state stays.

@@ -28,30 +28,30 @@ ModeChanges::ModeChanges(System& system, Progress& progress, const Options& opti
 
 void ModeChanges::change(FoundEvent event) {
     const RunState before = w.state;
-    bool struck = false;
+    bool has_impact = false;
     std::vector<int> let_go;
     event.in_vain = event.kind == FoundEvent::Kind::touch && event.index >= 0 && has_let_go(event.index);
     try {
         if (contacts_land(system_, progress_.t, progress_.y)) event = {FoundEvent::Kind::touch, -1, progress_.t};
-        struck = event.kind == FoundEvent::Kind::touch && landing_.strike(false);
+        has_impact = event.kind == FoundEvent::Kind::touch && landing_.strike(false);
         for (const Event& found : switch_modes(system_, progress_.t, progress_.y, progress_.rate, event, &let_go)) {
             out_.events.push_back(found);
-            if (!struck) clusters_.count();
+            if (!has_impact) clusters_.count();
         }
     } catch (const Failure& failure) {
-        keep_last(before, struck);
-        const bool of_hand_over = event.of_hand_over && !struck && of_closed_contacts(failure);
+        keep_last(before, has_impact);
+        const bool of_hand_over = event.of_hand_over && !has_impact && of_closed_contacts(failure);
         if (!(of_hand_over || leads_on(failure)) || !step_over(failure, of_hand_over)) throw;
         return;
     }
     clusters_.remember();
-    const bool in_vain = event.kind == FoundEvent::Kind::touch && event.index >= 0 && !struck;
+    const bool in_vain = event.kind == FoundEvent::Kind::touch && event.index >= 0 && !has_impact;
     const bool same_modes = std::equal(before.mode.begin(), before.mode.end(), w.state.mode.begin());
     if (!same_modes || before.closed != w.state.closed) progress_.gaps.ask_anew();
-    else if (in_vain && !w.state.closed[event.index]) progress_.gaps.ask_in_vain(event.index, progress_.t);
-    for (int gap : let_go) progress_.gaps.ask_in_vain(gap, progress_.t);
+    else if (in_vain && !w.state.closed[event.index]) progress_.gaps.defer_retry(event.index, progress_.t);
+    for (int gap : let_go) progress_.gaps.defer_retry(gap, progress_.t);
     landing_.remember_gaps();
-    if (struck) return end_bouncing();
+    if (has_impact) return end_bouncing();
     if (same_modes) clusters_.count();
     output_.configured_now();
     bridge(event.of_gap() ? 0 : event.index);
@@ -80,8 +80,9 @@ bool ModeChanges::leads_on(const Failure& failure) {
 }
 
 bool ModeChanges::may_end(const Failure& failure) const {
+    const double spacing = mode_switch_parameters.forced_switch_spacing * tiny_step_at(progress_.t);
     return of_modes(failure) && options_.method.adaptive() && system_.ng > 0 &&
-           progress_.t >= progress_.forced_switch_time + mode_switch_parameters.leaving_apart * tiny_step_at(progress_.t);
+           progress_.t >= progress_.forced_switch_time + spacing;
 }
 
 bool ModeChanges::leave() {
@@ -147,10 +148,10 @@ void ModeChanges::go_on_with_new_modes() {
 }
 
 // Restore the motion before the mode switch that failed, and record it.
-void ModeChanges::keep_last(const RunState& before, bool struck) {
+void ModeChanges::keep_last(const RunState& before, bool has_impact) {
     set_contacts(p, w, before.closed, before.mode);
     w.state = before;
-    if (struck) return;
+    if (has_impact) return;
     system_.read(progress_.y);
     try {
         begin_step(p, w, progress_.t, system_.q, system_.v);

@@ -10,7 +10,7 @@ namespace pn {
 
 struct ModeSwitchParameters {
     // Minimum time between two forced mode switches, in tiny steps.
-    double leaving_apart = 1e3;
+    double forced_switch_spacing = 1e3;
     // Maximum speed [m/s or rad/s] of slip that is about to rest or to begin, relative to 1 + the largest velocity.
     double creeping = 1e-8;
     // Length of a tiny step, relative to the time, in seconds below 1 s. In shorter steps the motion itself fails.
@@ -29,8 +29,8 @@ public:
     // Switch modes and state at an event that has been reached.
     void change(FoundEvent event);
     // Forced switch: if no step is short enough, the motion of the current modes may have ended. `may_end` is false if
-    // the last forced switch was less than `leaving_apart` tiny steps ago. `leave` selects modes one tiny step ahead.
-    // It returns false if it finds none.
+    // the last forced switch was less than `forced_switch_spacing` tiny steps ago. `leave` selects modes one tiny step
+    // ahead. It returns false if it finds none.
     bool may_end(const Failure& failure) const;
     bool leave();
     // Check if the failure only means that no motion or no step was found, which proves nothing.
@@ -40,13 +40,13 @@ public:
     bool step_over(const Failure& failure, bool of_hand_over = false);
     // Check if a step failed because closed contacts contradict each other or the accuracy.
     static bool of_closed_contacts(const Failure& failure);
-    // Bridge crowded events, and select modes at the new state.
+    // Bridge an accumulation of events, and select modes at the new state.
     void bridge(int element);
 
 private:
     void end_bouncing();
     bool has_let_go(int gap) const;
-    void keep_last(const RunState& before, bool struck);
+    void keep_last(const RunState& before, bool has_impact);
     static bool undecided(const Failure& failure);
     bool creeps() const;
     void go_on_with_new_modes();

@@ -51,7 +51,7 @@ struct Bouncing {
             if (!is_low && height <= lowest) out.leaves = std::max(out.leaves, landing(lowest - height, -rate, -fall));
         }
         for (int e = 0; e < system.ne; ++e) {
-            if (!slips(w.state.mode[e]) || w.state.lingers[e]) continue;
+            if (!slips(w.state.mode[e]) || w.state.is_sticking_deferred[e]) continue;
             const auto [slip, rate] = slip_toward_rest(p, w, e);
             if (!(rate < 0.0) || slip > -rate * out.rest) continue;
             out.rest = std::max(0.0, -slip / rate);
@@ -100,7 +100,7 @@ std::optional<Rest> bounce_to_rest(System& system, double t, double stop, VecX& 
         out.time += time;
         halves[2 * bounce >= rebound_parameters.most_bounces] += time;
         if (bounce + 1 == rebound_parameters.most_bounces)
-            dies_out = halves[1] < rebound_parameters.hardly_shorter * halves[0];
+            dies_out = halves[1] < rebound_parameters.max_time_ratio * halves[0];
         FoundEvent event{FoundEvent::Kind::touch, 0, out.time};
         if (next.rest < next.low && !contacts_land(system, out.time, y))
             event = {FoundEvent::Kind::rest_or_limit, next.element, out.time};

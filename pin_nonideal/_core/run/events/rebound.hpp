@@ -1,7 +1,7 @@
 // End of bouncing. Flights too low to be separated from rounding are not searched for touches. Gaps follow parabolas
-// under the current acceleration and strike again. This ends if no gap approaches or leaves, or if a higher gap lands.
-// The number of flights is finite: the last ones vanish in rounding. The instants add up to the limit of the
-// accumulation. Flights that do not die out (restitution 1) end as well, because their energy is only rounding.
+// under the current acceleration and strike again. The bouncing ends if no gap approaches or leaves, or if a higher gap
+// lands. The number of flights is finite: the last ones vanish in rounding. The instants add up to the limit of the
+// accumulation. Flights with restitution 1 also end, because their energy is only rounding.
 #pragma once
 
 #include "run/events/events.hpp"
@@ -14,7 +14,7 @@ struct ReboundParameters {
     int most_bounces = 10000;  // number of flights after which the bouncing is judged
     // Bouncing dies out if the second half of the flights takes less than this part of the time of the first half. With
     // a restitution of 1 it does not die out, and contacts that land later come to rest.
-    double hardly_shorter = 0.9;
+    double max_time_ratio = 0.9;
 };
 
 inline constexpr ReboundParameters rebound_parameters{};

@@ -67,10 +67,10 @@ bool is_unloaded(System& system, double t, int gap) {
            (largest <= unloaded_contacts_parameters.surely_pressing && moves_without(system, t, contacts));
 }
 
-std::vector<int> open_unloaded(System& system, double t) {
+std::vector<int> open_unloaded_contacts(System& system, double t) {
     const Program& p = system.p;
     Workspace& w = system.w;
-    std::vector<int> opened;
+    std::vector<int> opened_gaps;
     const std::vector<int> touching = w.now.touching;
     for (int gap : touching) {
         if (!w.state.closed[gap] || !is_unloaded(system, t, gap)) continue;
@@ -78,12 +78,12 @@ std::vector<int> open_unloaded(System& system, double t) {
         for (int i : touching) {
             if (!closed[i] || !same_bodies(p, i, gap)) continue;
             closed[i] = 0;
-            opened.push_back(i);
+            opened_gaps.push_back(i);
         }
         set_closed(p, w, closed);
         begin_step(p, w, t, system.q, system.v);
     }
-    return opened;
+    return opened_gaps;
 }
 
 }  // namespace pn

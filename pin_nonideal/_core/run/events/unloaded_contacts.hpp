@@ -1,4 +1,5 @@
-// Closed contacts without a load. Rounding alone decides if they hold their bodies, so they are better open.
+// Closed contacts without a load. Rounding alone would decide if such contacts hold their bodies, so the run opens
+// them.
 #pragma once
 
 #include <vector>
@@ -8,11 +9,11 @@
 namespace pn {
 
 struct UnloadedContactsParameters {
-    // Loads above this multiple of their rounding press surely. Contacts near each other amplify the rounding of their
-    // loads, by the ratio of the size of the body to their distance.
+    // Loads above this multiple of their rounding are compressive beyond doubt. Contacts near each other amplify the
+    // rounding of their loads, by the ratio of the size of the body to their distance.
     double surely_pressing = 1e6;
-    // Maximum difference of accelerations that are the same, relative to all accelerations. Bodies that pass an edge
-    // between two others have 1e-11 from rounding.
+    // Maximum difference of equal accelerations, relative to all accelerations. Bodies that pass an edge between
+    // two others have 1e-11 from rounding.
     double same_acceleration = 1e-9;
 };
 
@@ -22,6 +23,6 @@ inline constexpr UnloadedContactsParameters unloaded_contacts_parameters{};
 bool is_unloaded(System& system, double t, int gap);
 
 // Open the contacts of all pairs of bodies that move the same without them. Return these contacts.
-std::vector<int> open_unloaded(System& system, double t);
+std::vector<int> open_unloaded_contacts(System& system, double t);
 
 }  // namespace pn

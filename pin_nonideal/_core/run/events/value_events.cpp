@@ -24,7 +24,7 @@ std::vector<int> bounded_drives(const Program& p) {
 }  // namespace
 
 ValueEvents::ValueEvents(const std::vector<UserEvent>& asked, System& system, Stepper& stepper, Progress& progress)
-    : asked_(asked), system_(system), stepper_(stepper), drives_(bounded_drives(system.p)), side_(progress.event_signs),
+    : events_(asked), system_(system), stepper_(stepper), drives_(bounded_drives(system.p)), side_(progress.event_signs),
       count_(asked.size() + drives_.size(), 0), asked_y_(VecX::Zero(system.ns)), asked_torque_(VecX::Zero(system.nv)),
       probe_(VecX::Zero(system.ny)) {
     side_.assign(count_.size(), 0.0);
@@ -33,7 +33,7 @@ ValueEvents::ValueEvents(const std::vector<UserEvent>& asked, System& system, St
 double ValueEvents::value(int k, double t, const VecX& y) {
     if (k >= users()) return effort_left(drives_[k - users()], t, y);
     system_.read(y);
-    return asked_[k].function(t, system_.q, system_.v);
+    return events_[k].function(t, system_.q, system_.v);
 }
 
 // Return the effort left in a drive, negative if the demand exceeds it. The demands of all drives are computed at once.
@@ -118,7 +118,7 @@ void ValueEvents::count(int k) {
     side_[k] = after != 0 ? after : -side_[k];
     found_.push_back(k);
     ++count_[k];
-    ends_run_ |= k < users() && asked_[k].terminal > 0 && count_[k] >= asked_[k].terminal;
+    ends_run_ |= k < users() && events_[k].terminal > 0 && count_[k] >= events_[k].terminal;
 }
 
 // Count events that coincide with the event at the step's end, and store the signs of all other values.

@@ -35,7 +35,7 @@ public:
     // Store the signs at the start of a run.
     void start(double t, const VecX& y);
     // Search the step just taken, which may end at a friction event, and end it at the first value event. Return true
-    // if its end has changed. The workspace must be evaluated at the step's end, and is evaluated there again.
+    // if its end has changed. The workspace must be evaluated at the step's end, also on return.
     bool locate(bool ends_at_event);
     // Count the events at the end of a step of time stepping, whose end stays.
     void look_at_end(double t, const VecX& y);
@@ -46,12 +46,12 @@ public:
     bool ends_run() const { return ends_run_; }
 
 private:
-    int users() const { return static_cast<int>(asked_.size()); }
+    int users() const { return static_cast<int>(events_.size()); }
     int size() const { return static_cast<int>(count_.size()); }
     double value(int k, double t, const VecX& y);
     double effort_left(int dof, double t, const VecX& y);
     double value_inside(int k, double part);
-    int direction(int k) const { return k < users() ? asked_[k].direction : 0; }
+    int direction(int k) const { return k < users() ? events_[k].direction : 0; }
     bool counts(int k) const { return direction(k) == 0 || direction(k) == -side_[k]; }
     // Return the part of the step at which value k first crosses zero, `beyond` if it does not.
     double first_crossing(int k);
@@ -60,7 +60,7 @@ private:
     void take_signs();
     void count(int k);
 
-    const std::vector<UserEvent>& asked_;
+    const std::vector<UserEvent>& events_;
     System& system_;
     Stepper& stepper_;
     std::vector<int> drives_;     // dofs with bounded effort, their values follow the user's values

@@ -16,7 +16,7 @@ void Notices::tell_pulls(const std::optional<FoundEvent>& event) {
     const int n = static_cast<int>(p.contacts.size());
     std::vector<char> asked(n, 0), now(n, 0);
     const auto ask = [&](int i, bool located) {
-        const Press found = contact_press(p, w, i);
+        const PullMargin found = contact_pull_margin(p, w, i);
         for (int j : found.sharing) asked[j] = 1;
         if (!found.must_pull && !located) return;
         for (int j : found.sharing) now[j] = progress_.in_tension[j];
@@ -47,7 +47,7 @@ double Notices::last_unique() {
         const double mid = 0.5 * (low + high);
         stepper_.interpolate(mid, sample_);
         system_.read(sample_);
-        w.state.steps_since = never_decided;
+        w.state.steps_since = undecided_steps;
         evaluate(p, w, stepper_.t0 + mid * stepper_.h, system_.q, system_.v);
         (w.state.unique == Uniqueness::several ? high : low) = mid;
     }

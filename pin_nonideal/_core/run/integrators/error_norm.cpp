@@ -46,9 +46,9 @@ void ErrorNorm::set_tolerances(const VecX& y0, const VecX& y1, double h) {
         limited_ |= least > tolerance_[k];
         tolerance_[k] = std::max(tolerance_[k], least);
     }
-    resolves_shares_ = std::abs(h) >= parameters.shortest_resolved;
+    resolves_shares_ = std::abs(h) >= parameters.min_resolved_step;
     share_rounding_ = parameters.stuck_force_rounding * std::abs(h) * system_.w.now.F.cwiseAbs().maxCoeff();
-    share_tolerance_ = parameters.share_part * std::max(std::abs(h), parameters.shortest_resolved);
+    share_tolerance_ = parameters.share_part * std::max(std::abs(h), parameters.min_resolved_step);
 }
 
 void ErrorNorm::to_tangent(const VecX& dy, const VecX& y) {

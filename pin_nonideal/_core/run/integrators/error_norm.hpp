@@ -15,13 +15,14 @@ struct ErrorNormParameters {
     double stuck_force_rounding = 64 * std::numeric_limits<double>::epsilon();
     // Shortest step [s] that resolves a load. The error of a load that jumps does not decrease with the step, so
     // shorter steps skip it.
-    double shortest_resolved = 1e-9;
+    double min_resolved_step = 1e-9;
     // Rounding of a velocity, relative to the largest one. A joint that constraints drive slowly beside fast joints has
     // no digits below it at any step size.
     double velocity_rounding = 64 * std::numeric_limits<double>::epsilon();
     // Residuals below this multiple of the rounding of a projection are no error of a step.
     double residual_spacings = 8.0;
-    // Rounding of the time in a step's stages, in floating-point spacings. It moves prescribed motions.
+    // Rounding of the time in a step's stages, in floating-point spacings. This rounding shifts prescribed
+    // motions.
     double time_spacings = 4.0;
     // First step [Hairer, Norsett, Wanner, sec. II.4]. The move of Euler's rule is bounded relative to the size of the
     // state. The error of the method, estimated from the derivatives, is bounded relative to the tolerance.
@@ -40,7 +41,7 @@ public:
     // layout and is the floor of the tolerances.
     ErrorNorm(System& system, double rtol, const VecX& atol, const VecX& rounding);
 
-    // Set the errors that a step of size h between these states may have.
+    // Set the tolerances of a step of size h between these states.
     void set_tolerances(const VecX& y0, const VecX& y1, double h);
     // Check if rounding exceeds the tolerances.
     bool is_limited() const { return limited_; }

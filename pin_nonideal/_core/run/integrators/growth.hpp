@@ -22,10 +22,11 @@ struct GrowthGuardParameters {
     // Each of its decades takes longer than the one before, on average less than this many times as long. Under a
     // constant force a decade takes ten times as long, and near a singular position it is shorter.
     double longer = 5.0;
-    // Maximum growth in one fixed step that counts. Faster growth comes from the method: the step is too long, and the
-    // motion overflows.
+    // Maximum growth in one fixed step that is attributed to the motion. Faster growth comes from the method: the step
+    // is too long, and the motion overflows.
     double growth_in_step = 0.1;
-    // Speed [rad/s or m/s] that no mechanism has. A run of fixed steps ends there, before its motion overflows.
+    // Speed [rad/s or m/s] that no mechanism has. A run of fixed steps ends at this speed, before its motion
+    // overflows.
     double impossible_speed = 1e12;
 };
 

@@ -3,7 +3,7 @@
 // dop853: method of order 8 of Dormand and Prince, with embedded orders 5 and 3 and dense output of order 7. [Hairer,
 // Norsett, Wanner, "Solving Ordinary Differential Equations I", 2nd ed.]
 // dopri5: Dormand and Prince (1980), with Shampine's dense output of order 4.
-// Rows of A are stored below the diagonal, one after the other.
+// Rows of A are stored below the diagonal, in sequence.
 #include "run/integrators/method.hpp"
 
 #include <cstddef>

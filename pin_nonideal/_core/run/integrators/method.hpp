@@ -1,4 +1,4 @@
-// Integration methods as data. A new explicit Runge-Kutta pair is one table in method.cpp, and its name there. The core
+// Integration methods as data. A new explicit Runge-Kutta pair needs one table and one name in method.cpp. The core
 // follows the steps of methods outside the core.
 #pragma once
 
@@ -16,7 +16,7 @@ struct Method {
     const char* name = nullptr;
     Scheme scheme = Scheme::runge_kutta;
     int order = 1, stages = 1;
-    const double *A = nullptr, *B = nullptr, *C = nullptr;  // rows of A below the diagonal, one after the other
+    const double *A = nullptr, *B = nullptr, *C = nullptr;  // rows of A below the diagonal, in sequence
 
     // Weights of the error estimate over the stages. They include the rate at the step's end if it is the first stage
     // of the next step (first same as last). A second, coarser estimate guards against zeros of the first.

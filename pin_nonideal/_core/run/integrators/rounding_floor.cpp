@@ -25,7 +25,7 @@ RoundingFloor::RoundingFloor(System& system, Stepper& stepper, ErrorNorm& norm, 
     if (!method.E) return;
     double sum = 0.0;
     for (int i = 0; i < method.stages + method.first_same_as_last; ++i) sum += method.E[i] * method.E[i];
-    raised_ = parameters.sample_factor * std::sqrt(sum) / StepControl::aim(method);
+    tolerance_factor_ = parameters.sample_factor * std::sqrt(sum) / StepControl::aim(method);
 }
 
 // Measure the rounding of the rates by changes of the last digits of the state, which alter every rounding on the way.
@@ -55,7 +55,7 @@ void RoundingFloor::measure() {
             noise_ += rate_;
         }
         noise_ /= second_difference;
-        norm_.raise(progress_.rounding, raised_ * noise_, stepper_.y1);
+        norm_.raise(progress_.rounding, tolerance_factor_ * noise_, stepper_.y1);
         if (size > 0.0)
             out_.rounding = std::max(out_.rounding, system_.velocity(noise_).cwiseAbs().maxCoeff() / size);
     }
@@ -66,9 +66,8 @@ void RoundingFloor::measure() {
 }
 
 void RoundingFloor::look() {
-    if (raised_ == 0.0 || stepper_.collocates() ||
-        out_.steps < std::max(parameters.min_measured_steps, progress_.next_look))
-        return;
+    if (tolerance_factor_ == 0.0 || stepper_.collocates()) return;
+    if (out_.steps < std::max(parameters.min_measured_steps, progress_.next_look)) return;
     progress_.next_look = out_.steps + parameters.steps_between_measurements;
     measure();
 }

@@ -8,8 +8,8 @@ namespace pn {
 
 struct RoundingFloorParameters {
     // Number of steps from which rounding is measured, and steps between two measurements (seven evaluations each).
-    // Noise that demands ever shorter steps causes such runs. The measured value is a bound that most runs stay far
-    // below, so shorter runs ignore it.
+    // Noise that requires ever shorter steps causes runs of so many steps. In most shorter runs rounding is far below
+    // the tolerances, so they do without the measurement.
     long min_measured_steps = 20000, steps_between_measurements = 64;
     // Safety factor on a measurement, which is only a sample. Part of the previous value that bounds the next one from
     // below.
@@ -38,7 +38,7 @@ private:
     ErrorNorm& norm_;
     Progress& progress_;
     Recording& out_;
-    double raised_ = 0.0;  // factor from the rounding of a rate to the raised tolerance, per step
+    double tolerance_factor_ = 0.0;  // factor from the rounding of a rate to the raised tolerance, per step
     VecX change_, probe_, rate_, noise_;
 };
 

@@ -28,7 +28,7 @@ public:
     RungeKutta(const RungeKutta&) = delete;  // its sums point into the step's rates
     RungeKutta& operator=(const RungeKutta&) = delete;
 
-    // Compute y1 from y0 and the rate there.
+    // Compute y1 from y0 and the rate at y0.
     template <class System>
     void advance(System& system) {
         for (int i = 1; i < method_.stages; ++i) {

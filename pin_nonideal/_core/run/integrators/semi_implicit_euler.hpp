@@ -13,7 +13,7 @@ class SemiImplicitEuler {
 public:
     explicit SemiImplicitEuler(Step& step) : step_(step), delta_(step.y0) {}
 
-    // Compute y1 from y0 and the rate there. The workspace must be evaluated at y0.
+    // Compute y1 from y0 and the rate at y0. The workspace must be evaluated at y0.
     void advance(System& system);
     // Store the multipliers that the projection of the step's end has shown, for the next step.
     void learn(System& system) const;

@@ -40,7 +40,7 @@ void Stepper::take(double t, double size) {
     if (collocates_) {
         collocation_.advance();
         if (collocation_.is_solved() || method.adaptive()) return;
-        RunState& state = system_.w.state;  // a fixed step has no shorter trial
+        RunState& state = system_.w.state;  // a fixed step cannot be shortened
         collocates_ = state.seeks_directions = false;
         state.last_direction = state.slip_direction;
     }

@@ -18,7 +18,7 @@ public:
 
     // Compute y1 by one step of size h from (t0, y0). The rate at the start must be set. If collocation fails, y1 = y0.
     void take(double t, double size);
-    // Move the end by a time so short that the rate there stays constant. The rate at the end must be set. The
+    // Move the step's end by a time in which its rate stays constant. The rate at the end must be set. The
     // interpolant is discarded.
     void move_end(double dt);
     // Repeat the step with another length. Throw a Failure if it is not solved.

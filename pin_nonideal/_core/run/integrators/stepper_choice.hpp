@@ -10,7 +10,7 @@ namespace pn {
 
 struct StepperChoiceParameters {
     // Relaxation rate of slip directions, times the step, from which stability limits explicit methods (at 3 to 6).
-    double stiff = 2.5;
+    double stiff_rate = 2.5;
     int stiff_in_a_row = 6;  // number of such steps after which collocation begins
     int patience = 20;       // steps after the end of collocation before the count begins again
 };
@@ -26,7 +26,7 @@ public:
     void look();
     // Select the stepper of the next step.
     void choose();
-    void forget() { turns_stiffly_ = false; }
+    void forget() { is_stiff_ = false; }
 
 private:
     Workspace& w;
@@ -34,7 +34,7 @@ private:
     Stepper& stepper_;
     Progress& progress_;
     const Options& options_;
-    bool turns_stiffly_ = false;  // stability limited the step just taken
+    bool is_stiff_ = false;  // stability limited the step just taken
 };
 
 }  // namespace pn

@@ -15,7 +15,7 @@ StiffnessGuard::StiffnessGuard(System& system, Stepper& stepper, Progress& progr
 }
 
 void StiffnessGuard::forget() {
-    begun_ = Clock::now();
+    start_time_ = Clock::now();
     steps_ = 0;
     next_look_ahead_ = options_.hint && options_.max_steps == 0 ? parameters.first_look_ahead : parameters.no_look_ahead;
 }
@@ -113,7 +113,7 @@ void StiffnessGuard::look_for_border() {
 void StiffnessGuard::look_ahead() {
     next_look_ahead_ = 2 * steps_;
     const double size = stepper_.h, at = stepper_.t0 + size, left = options_.end() - at;
-    const double so_far = std::chrono::duration<double>(Clock::now() - begun_).count();
+    const double so_far = std::chrono::duration<double>(Clock::now() - start_time_).count();
     if (so_far / static_cast<double>(steps_) * (left / size) < parameters.long_time) return;
     const Counters kept = system_.w.counters;  // the instant depends on the clock, so the evaluations are not counted
     const FastestMode mode = mode_here();

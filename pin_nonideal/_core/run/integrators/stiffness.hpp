@@ -14,7 +14,8 @@ struct StiffnessGuardParameters {
     // Steps near the limit of stability until stiffness is checked. `quiet_steps` steps in a row away from the limit
     // reset the count. [Hairer, Wanner, Solving ODEs II, IV.2, checks after 15]
     long suspicious_steps = 1000, quiet_steps = 6;
-    // Fraction of the stability limit beyond which a step counts. Error control keeps a stiff run there on average.
+    // Fraction of the stability limit beyond which a step counts. On average, error control keeps the steps of a stiff
+    // run at this fraction.
     double near_border = 0.5;
     // Stability limit of Euler's rule, which time stepping applies to decaying motions.
     double euler_border = 2.0;
@@ -60,7 +61,7 @@ private:
 
     void look_for_border();
     void look_ahead();
-    // Return the fastest mode at the step's end. The workspace is there before and after.
+    // Return the fastest mode at the step's end. The workspace is evaluated at the step's end before and after.
     FastestMode mode_here();
     double stage_rate() const;
     VecX difference(double relative, const VecX& direction, VecX& force);
@@ -71,7 +72,7 @@ private:
     Progress& progress_;
     const Options& options_;
     const double most_steps_;
-    Clock::time_point begun_;
+    Clock::time_point start_time_;
     long steps_, next_look_ahead_;
     VecX probe_, probe_rate_;
 };

@@ -90,7 +90,7 @@ void System::watch_loads(VecX& dy) {
     for (int i : w.now.touching) {
         if (p.blocks[p.gaps[i].block].kept.empty()) continue;
         if (!w.now.rows.redundant) loads[i] = w.now.lam[p.blocks[p.gaps[i].block].row];
-        else loads[i] = reactions(p, w).presses ? 1.0 : -1.0;
+        else loads[i] = reactions(p, w).loads_are_feasible ? 1.0 : -1.0;
     }
 }
 
@@ -118,9 +118,9 @@ void System::project_and_evaluate(double t, VecX& y, VecX& dy) {
         kinetic_energy(p.mechanism, w.now.terms, v) + potential_energy(p.mechanism, w.now.terms) - before;
 }
 
-// Act at the end of a time step whose modes may allow no motion. If they do not, and the run `goes_through`, the motion
-// is that of the step's friction. In other runs it is so if the solver found no motion of contacts, which proves nothing.
-// Return false if the motion is that of the step's friction.
+// Call `act` at the end of a time step whose modes may allow no motion. If they allow none and the run `goes_through`,
+// the friction of the step determines the motion. In other runs it does so only if the solver found no motion of
+// contacts, which proves nothing. Return false if the friction of the step determines the motion.
 template <class Act>
 bool System::go_through(double t, bool goes_through, const Act& act) {
     try {

@@ -29,7 +29,7 @@ struct System {
     double numerical_energy = 0.0;  // energy change by the last projection of a step's end [J], if the ledger is kept
     const int nq, nv, nz, nw, ne, ng, ns, ny;  // sizes of q, v, z, work, elements, gaps, y without watch, y
     VecX q, v;                         // state read last
-    TouchingKnown touching;            // touching contacts of the last state
+    TouchingCache touching;            // touching contacts of the last state
 
     System(const Program& program, Workspace& workspace, bool with_energy);
 
@@ -60,7 +60,7 @@ struct System {
     void derivative(double t, const VecX& y, VecX& dy);
     // Compute dy from the evaluation in the workspace.
     void rate_of_evaluation(double t, const VecX& y, VecX& dy);
-    // Project a step's end onto the constraints, and evaluate there as the next step begins.
+    // Project a step's end onto the constraints, and evaluate the projected state for the next step.
     void project_and_evaluate(double t, VecX& y, VecX& dy);
     // Project the end of a step of time stepping, whose modes have just been set. Evaluate only if `evaluates`.
     // `goes_through`: the run locates no events, and if these modes have no motion, slipping elements keep the friction of
@@ -73,7 +73,8 @@ struct System {
     void normalize(VecX& y) const;
 
 private:
-    // Write dy at q and v from the evaluation there, with the quantities whose roots are events if `locates_events`.
+    // Write dy at q and v from the evaluation in the workspace, with the quantities whose roots are events if
+    // `locates_events`.
     void write_rate(double t, VecX& dy, bool locates_events = true);
     void watch(double t, VecX& dy);
     void watch_loads(VecX& dy);

@@ -21,26 +21,26 @@ void fields(Archive& a, Modes& x) {
 }
 
 static void fields(Archive& a, RunState& x) {
-    auto& [mode, closed, slip_direction, last_direction, lingers, seeks_directions, indeterminate,
-           rank_tolerance, z, held_torque, has_held, unknown, warm, percussion, third_order_lam, ideal_decided, unique,
-           growth, steps_since] = x;
-    a(mode, closed, slip_direction, last_direction, lingers, seeks_directions, indeterminate,
-      rank_tolerance, z, held_torque, has_held, unknown, warm, percussion, third_order_lam, ideal_decided, unique,
+    auto& [mode, closed, slip_direction, last_direction, is_sticking_deferred, seeks_directions, indeterminate,
+           rank_tolerance, z, held_torque, has_held, unknown, warm, percussion, third_order_lam, has_ideal_row_choice,
+           unique, growth, steps_since] = x;
+    a(mode, closed, slip_direction, last_direction, is_sticking_deferred, seeks_directions, indeterminate,
+      rank_tolerance, z, held_torque, has_held, unknown, warm, percussion, third_order_lam, has_ideal_row_choice, unique,
       growth, steps_since);
 }
 
-static void fields(Archive& a, Ways& x) {
+static void fields(Archive& a, TravelState& x) {
     auto& [body, joint, turn, scene, lever, slid_until, placed, slid, turned, body_step, joint_step, turn_step, slid_step,
-           turned_step, scene_step, most, most_step, summed] = x;
+           turned_step, scene_step, max_total, max_step, summed] = x;
     a(body, joint, turn, scene, lever, slid_until, placed, slid, turned, body_step, joint_step, turn_step, slid_step,
-      turned_step, scene_step, most, most_step, summed);
+      turned_step, scene_step, max_total, max_step, summed);
 }
 
 static void fields(Archive& a, GapState& x) {
-    auto& [width, rate, separation, near, far, way, turn, apart, ways, ask, current, near_gaps, vain_since,
-           rests_until] = x;
-    a(width, rate, separation, near, far, way, turn, apart, ask, current, vain_since, rests_until);
-    fields(a, ways);
+    auto& [width, rate, separation, near, far, way, turn, apart, travel, ask, current, near_gaps, blocked_since,
+           retry_time] = x;
+    a(width, rate, separation, near, far, way, turn, apart, ask, current, blocked_since, retry_time);
+    fields(a, travel);
     x.find_near();
 }
 
@@ -90,8 +90,8 @@ static void fields(Archive& a, Recording& x) {
     a(steps, rejected, limited, rounding);
 }
 
-// The choice of independent rows outlives an evaluation, with the data that judges it. It is made at the start of a
-// step and kept until it proves wrong.
+// The choice of independent rows, and the data that tests this choice, are kept from step to step until the choice
+// proves wrong.
 static void archive(Archive& a, Workspace& w, Progress& progress, Recording& out) {
     RowSystem& rows = w.now.rows;
     a(w.state, w.counters, rows.active, rows.longest, rows.longest_chosen, rows.chosen_pivot, progress, out);
@@ -117,7 +117,7 @@ static void evaluate_anew(System& system, const Progress& progress) {
     w.now.rows.redundant = choice.active != w.now.rows.required;
     system.read(progress.y);
     configure(p, w, progress.t, system.q, system.v);
-    if (state.ideal_decided) {
+    if (state.has_ideal_row_choice) {
         const IdealMotion decided(p, w);
     }
     system.read(progress.configured_y);

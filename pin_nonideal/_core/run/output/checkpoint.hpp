@@ -36,7 +36,7 @@ struct Progress {
     // Decades of the largest speed: time, value and number of steps when it was reached.
     std::vector<double> growth_times, growth_speeds;
     std::vector<long> growth_steps;
-    // Time stepping: the last step left the state unchanged; the accelerations and forces are those at its end.
+    // Time stepping: the last step left the state unchanged; accelerations and forces belong to its end.
     bool is_stationary = false, has_forces = false;
     int turning_steps = 0;  // consecutive stiff steps with turning slip, negative: not counted yet
     bool may_hand_over = false;  // a closed contact may pass to the next feature in the next step

@@ -9,8 +9,8 @@
 
 namespace pn {
 
-// Maximum number of samples for which memory is reserved. Longer runs may stop before they fill it.
-constexpr double most_reserved = 1e5;
+// Maximum number of samples for which memory is reserved. Longer runs may stop before they need more.
+constexpr double max_reserved_samples = 1e5;
 
 Output::Output(System& system, Stepper& stepper, Progress& progress, const Options& options, Recording& out)
     : p(system.p), w(system.w), system_(system), stepper_(stepper), progress_(progress), options_(options), out_(out),
@@ -22,7 +22,7 @@ void Output::begin() {
     progress_.samples = 1;
     // The step count of adaptive methods is unknown in advance.
     const double apart = options_.output_dt > 0.0 ? options_.output_dt : options_.dt;
-    if (apart > 0.0) recorder_.reserve(static_cast<size_t>(std::min(options_.duration / apart + 2.0, most_reserved)));
+    if (apart > 0.0) recorder_.reserve(static_cast<size_t>(std::min(options_.duration / apart + 2.0, max_reserved_samples)));
 }
 
 void Output::emit(double at, const VecX& state, bool evaluated) {

@@ -34,10 +34,10 @@ public:
 
 private:
     void emit(double at, const VecX& state, bool evaluated);
-    // Record a sample inside the step just taken, from its interpolant. Leaves the workspace there.
+    // Record a sample inside the step just taken, from its interpolant. Leaves the workspace at the sample.
     void emit_between(double at);
     void choose_as_before(double at);
-    // Call `look`, which may leave the workspace anywhere inside the step just taken. Restore the workspace at the
+    // Call `look`, which may leave the workspace at any state of the step just taken, then restore the workspace at the
     // step's end.
     template <class Look>
     void look_inside(const Look& look);

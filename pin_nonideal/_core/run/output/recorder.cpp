@@ -65,7 +65,7 @@ void Recorder::record_reactions() {
 }
 
 void Recorder::sample(double t, const VecX& y, const Jumps& jumps, bool evaluated,
-                      const std::vector<char>* sure) {
+                      const std::vector<char>* open_gaps) {
     system.read(y);
     if (!evaluated && options.evaluates()) {
         system.read_law_states(y);
@@ -74,7 +74,7 @@ void Recorder::sample(double t, const VecX& y, const Jumps& jumps, bool evaluate
         update_kinematics(p, w, t, system.q, system.v);
     }
     double position, velocity;
-    violations(p, w, t, system.v, position, velocity, sure);
+    violations(p, w, t, system.v, position, velocity, open_gaps);
     out.t.push_back(t);
     append(out.q, system.q);
     append(out.v, system.v);

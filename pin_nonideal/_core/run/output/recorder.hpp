@@ -87,9 +87,9 @@ public:
     void reserve(size_t samples);
     // Energy changes so far that are not integrated as work [J].
     struct Jumps { double impacts, projection; };
-    // Record the state at t. `evaluated`: the workspace is evaluated there. Otherwise it is evaluated there if the
-    // options need it. `sure`: gaps that are known to be open, which are not measured.
-    void sample(double t, const VecX& y, const Jumps& jumps, bool evaluated, const std::vector<char>* sure = nullptr);
+    // Record the state at t. `evaluated`: the workspace is evaluated at t. Otherwise it is evaluated if the options
+    // need it. `open_gaps`: gaps that are known to be open, which are not measured.
+    void sample(double t, const VecX& y, const Jumps& jumps, bool evaluated, const std::vector<char>* open_gaps = nullptr);
 
 private:
     void record_laws(double t);

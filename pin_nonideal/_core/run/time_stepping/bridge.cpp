@@ -35,8 +35,8 @@ TimeStepping::TimeStepping(System& system, Progress& progress, GapWatch& watch, 
       moreau_contacts_(system, watch), is_autonomous_(!may_differ(system.p, options)),
       always_evaluated_(asks_always(system.p, options)) {}
 
-// End of a step of this size: at a stop, a jump of the actuation or a due sample before it. Times that differ by rounding
-// are one end, the last of them.
+// End of a step of this size: at a stop, a jump of the actuation or a due sample before it. Times that differ only by
+// rounding are one end, the latest of them.
 double TimeStepping::end_of_step(double size, double stop, double t_end) const {
     double end = progress_.t + size;
     bool met = false;
@@ -48,7 +48,7 @@ double TimeStepping::end_of_step(double size, double stop, double t_end) const {
     const double jump = torques_.next_stop(progress_.t + rounding_, t_end);
     meet(jump);
     meet(torques_.next_stop(jump, t_end));
-    // A sample that differs by rounding is taken at the end of the step, which it does not change.
+    // A sample whose time differs only by rounding is taken at the step's end, which does not move.
     if (options_.output_dt > 0.0 && output_.next() < end - rounding_) meet(output_.next());
     if (stop < end + rounding_) end = stop;
     return end;
@@ -110,16 +110,16 @@ void TimeStepping::take(double end, double t_end) {
     if (system_.ng > 0) return take_with_contacts(end, t_end);
     double& t = progress_.t;
     VecX &y = progress_.y, &y_from = y_from_;
-    const bool rested = rests();
+    const bool was_at_rest = rests();
     Modes& before = before_step_;
-    if (rested) {
+    if (was_at_rest) {
         y_from = y;
         before = w.state.mode;
     }
     const double energy_before = progress_.numerical_energy;
     moreau_.step(t, end - t, y, progress_.numerical_energy);
     t = end;
-    const bool held = rested && std::equal(before.begin(), before.end(), w.state.mode.begin());
+    const bool held = was_at_rest && std::equal(before.begin(), before.end(), w.state.mode.begin());
     if (!held) {
         const bool bridges = options_.method.scheme != Method::Scheme::moreau;
         system_.settle(t, y, progress_.rate, asks_for_motion(end, t_end), bridges);
@@ -138,7 +138,8 @@ void TimeStepping::take(double end, double t_end) {
     progress_.is_stationary = y == y_from;
 }
 
-// Elements at rest have the modes of the end of a first step. It solves its laws at far less cost than accelerations.
+// Elements at rest take their modes from the end of a first step, which costs far less than a solution for
+// accelerations.
 void TimeStepping::begin(double size) {
     system_.read(progress_.y);
     std::vector<char> closed = system_.touching.at(p, w, progress_.t, system_.q, system_.v, true).rest;

@@ -78,8 +78,8 @@ bool ContactProjection::is_open(const Program& p, const Workspace& w) const {
                        [&](int i) { return !is_bare(p, i) && std::abs(gap_width(p, w, i)) > allowed; });
 }
 
-// Open closed contacts whose gap other contacts keep open. Return true if there are any.
-bool ContactProjection::open_held_apart(const Program& p, Workspace& w) {
+// Open closed contacts whose gap other contacts keep open. Return true if a contact opens.
+bool ContactProjection::open_blocked_contacts(const Program& p, Workspace& w) {
     const double allowed = max_projected_gap * scene_size(p, w);
     const auto is_apart = [&](int i) { return !is_bare(p, i) && gap_width(p, w, i) > allowed; };
     if (std::none_of(w.now.touching.begin(), w.now.touching.end(), is_apart)) return false;
@@ -133,9 +133,9 @@ bool ContactProjection::project(const Program& p, Workspace& w, double t, VecX& 
     const double before = energy ? total() : 0.0;
     bool moves = close_gaps(p, w, t, q, v), posed = true;
     for (int k = 0; k < parameters.max_choices && is_open(p, w); ++k) {
-        if (k > 0 && !open_held_apart(p, w)) break;
+        if (k > 0 && !open_blocked_contacts(p, w)) break;
         posed = false;
-        if (!pose(p, w, false)) break;  // sticking elements slide by as little as the gaps ask for
+        if (!pose(p, w, false)) break;  // sticking elements slide only as far as the gaps require
         moves |= close_gaps(p, w, t, q, v);
     }
     if (moves) place_rows(p, w, t, v);

@@ -12,7 +12,7 @@ struct ContactProjectionParameters {
     // or rows that contradict each other.
     double stall_ratio = 0.5;
     int sure_moves = 1, max_moves = 12;  // first moves, which `stall_ratio` does not judge, and maximum number of moves
-    // Maximum choices of contacts that stay closed.
+    // Maximum number of choices of closed contacts.
     int max_choices = 4;
 };
 
@@ -24,9 +24,8 @@ public:
     explicit ContactProjection(const Program& p);
 
     // Project q and v onto the closed contacts and sticking elements of the workspace: gaps close, and v satisfies
-    // their rows. Contacts that cannot close because other ones hold their bodies apart become open. A tree that the
-    // rows hold, with a velocity of rounding, comes to rest. Return false, with q and v unchanged, if the trees cannot be
-    // projected one by one.
+    // their rows. Contacts open if other contacts hold their bodies apart. A tree that the rows hold, with a velocity
+    // of rounding, comes to rest. Return false, with q and v unchanged, if the trees cannot be projected one by one.
     bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
     double numerical_energy() const { return moved_energy_; }  // energy that the last projection added, if `energy`
 
@@ -36,7 +35,7 @@ private:
     bool pose(const Program& p, Workspace& w, bool sticks);
     bool close_gaps(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
     bool is_open(const Program& p, const Workspace& w) const;
-    bool open_held_apart(const Program& p, Workspace& w);
+    bool open_blocked_contacts(const Program& p, Workspace& w);
     void meet_rates(const Program& p, Workspace& w, VecX& v);
     void rest(const Program& p, Workspace& w, VecX& v);
     void add(int block, int rows, bool joined);

@@ -13,7 +13,7 @@ namespace pn {
 
 struct FreeFlightParameters {
     int max_newton = 20;           // Newton steps for the angular velocity
-    double turn_rounding = 1e-15;  // change of the angular velocity that counts as rounding, relative to it
+    double turn_rounding = 1e-15;  // change that counts as rounding, relative to the angular velocity
 };
 
 class FreeFlight {
@@ -26,7 +26,7 @@ public:
     // Mark a body as not free in this step: a force of a contact or of dry friction acts on it.
     void begin();
     void touch(const Block& block);
-    // Correct the velocity v1 of the free bodies at the end of a step of length h from (q0, v0). The forces are those of
+    // Correct the velocity v1 of the free bodies at the end of a step of length h from (q0, v0). The forces come from
     // the evaluation in the workspace, at the velocity `mean`.
     void move(const Program& p, const Workspace& w, double h, const double* q0, const VecX& v0, const VecX& mean,
               VecX& v1);

@@ -23,7 +23,7 @@ JointDrives::JointDrives(const Program& p) {
         if (law.block < 0) damping_.segment(law.dof, law.count).array() += law.coefficient;
     });
     for (int dof = 0; dof < m.nv; ++dof) {
-        // Forces that drive motion stay explicit, and those in deep trees, of which M has no entries.
+        // Forces that drive motion stay explicit, and so do forces in deep trees, for which M has no entries.
         for (VecX* x : {&stiffness_, &damping_, &kp_, &kd_})
             if (m.is_deep[dof] || !((*x)[dof] > 0.0)) (*x)[dof] = 0.0;
     }

@@ -35,7 +35,7 @@ void MeanVelocity::measure() {
         const Eigen::Vector3d v = value_.segment<3>(flyer.dof), omega = value_.segment<3>(flyer.dof + 3);
         turning_.segment<3>(flyer.dof) = omega.cross(v + omega.cross(flyer.com));
     }
-    back_ = start_ - value_ + 0.5 * h_ * turning_;
+    start_difference_ = start_ - value_ + 0.5 * h_ * turning_;
 }
 
 void MeanVelocity::end(const VecX& a, VecX& v1) {
@@ -60,7 +60,7 @@ void MeanVelocity::start_rates(const Program& p, Workspace& w, int i) const {
     const Block& block = p.blocks[i];
     const RowValues& values = w.now.values[i];
     const bool differs = moves_ > 0 || !flyers_.empty();
-    if (differs) multiply(block, w.now.A, back_, w.scratch.r);
+    if (differs) multiply(block, w.now.A, start_difference_, w.scratch.r);
     for (size_t k = 0; k < block.kept.size(); ++k) {
         double& rate = w.scratch.r[block.row + k];
         rate = values.rate[block.kept[k]] + (differs ? rate : 0.0);

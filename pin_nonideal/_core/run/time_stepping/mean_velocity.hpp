@@ -10,8 +10,8 @@ namespace pn {
 struct MeanVelocityParameters {
     // Change of the configuration in a step [rad or m] that counts as rounding.
     double configuration_rounding = 1e-13;
-    // Change by a further sweep that is not worth it. The second sweep makes the step second order, and fast motion
-    // takes more of them, which keep its energy.
+    // Change by a further sweep below which no sweep follows. The second sweep makes the step second order. Fast motion
+    // needs more sweeps to conserve its energy.
     double configuration_tolerance = 1e-9;
     int max_sweeps = 4;  // maximum number of sweeps of a step
 };
@@ -41,7 +41,7 @@ public:
     void begin(double h, const VecX& v0);
     // Compute the velocity at the step's end for the acceleration a.
     void end(const VecX& a, VecX& v1);
-    // Move the mean to that of the step's start and end for another sweep. Return false if none is needed.
+    // Move the mean to that of the step's start and end for another sweep. Return false if no further sweep is needed.
     bool move();
 
     const VecX& value() const { return value_; }  // velocity at which the forces are taken
@@ -53,7 +53,7 @@ public:
     // Slip speed of a friction element at the velocity of the start.
     double start_speed(const Program& p, Workspace& w, const Friction& friction) const;
     // Set the right-hand sides b that satisfy the constraints at the end of the step. The rows are evaluated at the
-    // middle of the step, so half of their own change is still to come.
+    // middle of the step, so half of their change over the step remains.
     void meet_at_end(const Program& p, Workspace& w, VecX& b) const;
 
 private:
@@ -63,7 +63,7 @@ private:
     double h_ = 0.0;
     VecX value_, start_, end_, next_;
     VecX turning_;  // rates of the linear velocities by turning axes
-    VecX back_;     // velocity of the start minus mean, plus h/2 of these rates
+    VecX start_difference_;     // velocity of the start minus mean, plus h/2 of these rates
     int moves_ = 0;  // sweeps after the first one
 };
 

@@ -183,8 +183,8 @@ void Moreau::end_velocity() {
     }
 }
 
-// Add the work over the step, by the mean velocity. If a slip reverses inside the step, the friction that opposes its
-// end can do positive work on its mean velocity. This work is due to the scheme, not to friction.
+// Add the work over the step, by the mean velocity. If a slip reverses inside the step, friction opposes the slip at
+// the step's end and can do positive work on the mean velocity. This work is due to the scheme, not to friction.
 void Moreau::book_work(VecX& y, double& numerical_energy) {
     w.now.lam = lam_free_;
     w.now.lam.noalias() += problem_.multipliers * force_;

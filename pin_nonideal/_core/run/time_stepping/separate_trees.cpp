@@ -61,8 +61,8 @@ void SeparateTrees::move(const VecX& f, VecX& a, VecX& w) {
     w.head(n) = solver_.w();
 }
 
-// Compute the largest of the accelerations that cancel in each tree: that without forces, and the responses to the forces
-// of its elements.
+// Compute the largest of the terms that cancel in the acceleration of each tree: the acceleration without forces, and
+// the responses to the forces of its elements.
 void SeparateTrees::measure_balance() {
     const BlockProblem& problem = solver_.problem;
     balanced_.clear();

@@ -11,7 +11,7 @@ public:
     explicit SeparateTrees(const Program& p);
 
     // Set up the problem in a configured workspace, for the accelerations without forces and the offsets of the rows.
-    // `rows` are those of the elements, one after the other. Returns false if it does not apply.
+    // `rows`: rows of the elements, in sequence. Returns false if it does not apply.
     bool pose(const Program& p, const Workspace& w, const std::vector<StepRow>& rows,
               const std::vector<ConeElement>& cones, const VecX& a_free, const VecX& offset);
     // Set other accelerations and offsets for the same rows.
@@ -25,7 +25,7 @@ public:
     void keep_rest(double h, const VecX& v0, VecX& v1);
     // Check if the accelerations a of the trees under the forces of the last motion are rounding.
     bool rests(const VecX& a);
-    // Element that misses the laws most, and the velocity by which it misses them.
+    // Element with the largest error of the laws, and this error as a velocity.
     const BlockSolver::Miss& miss() const { return solver_.miss(); }
     // Errors of the laws for the forces f.
     ConeResiduals residuals(const VecX& middle, const VecX& f);

@@ -1,7 +1,7 @@
 // Contacts and dry friction that take part in a time step, as elements of a cone problem.
 //
-// A contact has the row of its normal and those of its sliding, in Coulomb's cone. Other dry friction has a box or a disk
-// whose limits may follow loads. The rows of the elements come one after the other.
+// A contact has one row along its normal and the rows of its sliding, in Coulomb's cone. Other dry friction has a box
+// or a disk whose limits may follow loads. The rows of the elements lie in sequence.
 #pragma once
 
 #include <vector>
@@ -46,8 +46,8 @@ public:
                 const VecX& v0);
     // Update the coefficients of contacts to the velocity of the workspace.
     void move(const Program& p, const Workspace& w);
-    // Check if a limit of dry friction follows a load. The loads must then be those of minimum norm among all that share
-    // them alike: other ones need not settle.
+    // Check if a limit of dry friction follows a load. The loads must then have minimum norm, because limits of other
+    // loads may not converge.
     bool limits_follow_loads(const Program& p) const;
     // Begin passes of limits_settle.
     void begin_passes() { last_change_ = HUGE_VAL; }

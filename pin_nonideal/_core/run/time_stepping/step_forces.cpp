@@ -81,12 +81,12 @@ bool StepForces::solve(double h, const VecX& q0, const VecX& v0) {
     f.head(n) -= middle_.head(n);
     end_rows.head(n) = free_rows_.head(n);
     end_rows.head(n).noalias() += W * middle_.head(n);
-    solver_.search_briefly(error <= parameters.most_relaxed);
+    solver_.search_briefly(error <= parameters.max_relaxed_error);
     if (!solved)
         solved = solver_.solve(W, end_rows.head(n), elements_.cones, true, f.head(n), true) == ConeStatus::solved;
     if (starts) solved = keep_rest(solved, q0) || solved;
     f.head(n) += middle_.head(n);
-    if (!solved && error <= parameters.most_relaxed) {
+    if (!solved && error <= parameters.max_relaxed_error) {
         f.head(n) = best_f_;
         relax(h);
         return true;
@@ -94,7 +94,7 @@ bool StepForces::solve(double h, const VecX& q0, const VecX& v0) {
     return solved;
 }
 
-// Accept the best forces found, although they miss the laws of contact by the error of one element.
+// Accept the best forces found, which violate the laws of contact by the error of one element.
 void StepForces::relax(double h) {
     const BlockSolver::Miss& miss = trees_.miss();
     const StepElements::Part& part = elements_.parts[miss.element];
@@ -116,7 +116,8 @@ bool StepForces::moves() {
            parameters.cone_force_rounding * free_rows_.head(n).cwiseAbs().maxCoeff();
 }
 
-// Check if forces within all cones hold a rest, and set f to them then. The rows without forces are in end_rows.
+// Check if forces within all cones hold the bodies at rest, and set f to such forces. The rows without forces are in
+// end_rows.
 bool StepForces::keep_rest(bool solved, const VecX& q0) {
     const int n = static_cast<int>(elements_.rows.size());
     const auto W = responses_.matrix(n);
@@ -124,7 +125,7 @@ bool StepForces::keep_rest(bool solved, const VecX& q0) {
                        parameters.cone_force_rounding * end_rows.head(n).cwiseAbs().maxCoeff();
     if (solved && !moves) return false;
     const bool holds = solver_.hold(W, end_rows.head(n), elements_.cones, f.head(n));
-    if (!holds) q_without_rest_ = q0;  // the next sweeps and the step after the start need not ask again
+    if (!holds) q_without_rest_ = q0;  // the next sweeps and the step after the start skip this check
     return holds;
 }
 

@@ -12,9 +12,9 @@
 namespace pn {
 
 struct StepForcesParameters {
-    // Largest error of the laws that a step may have, relative to an element's forces, if no forces meet them. An event
+    // Accepted error of the laws, relative to an element's forces, in a step without an exact solution. An event
     // reports it.
-    double most_relaxed = 1e-2;
+    double max_relaxed_error = 1e-2;
     // Distance of a force at its limit, relative to the limit.
     double cone_force_rounding = 1e-9;
     // Accepted residual relative to the velocities. A step of a turning body can have no exact solution if corners
@@ -32,7 +32,7 @@ public:
 
     StepForces(const Program& p, Workspace& w, const StepElements& elements);
 
-    // Forget the rest of earlier steps.
+    // Discard the configuration that no forces held at rest in earlier steps.
     void forget() { q_without_rest_.resize(0); }
     // Set up the problem of the elements for the acceleration `a_free` without the forces, over a step of length h. The
     // forces of the last step are the guess. `anew`: the rows have changed.
@@ -44,7 +44,8 @@ public:
     // Errors of the laws for the forces.
     ConeResiduals residuals();
 
-    // Add the acceleration by the forces to a, which is the one without them, and the multipliers of the constraints.
+    // Add the acceleration due to the forces, and the multipliers of the constraints, to the motion without these
+    // forces.
     void add_motion(VecX& a);
     void add_multipliers(VecX& lam) const;
     // Set the velocity v1 of trees that rest over the step to zero.
@@ -54,7 +55,7 @@ public:
     // Check if the trees are solved one by one.
     bool is_separate() const { return separate_; }
 
-    // Contact whose laws the last step missed, as a block or -1, and the velocity by which it missed them [m/s].
+    // Contact whose laws the last step violated, as a block or -1, and the violation as a velocity [m/s].
     struct LawMiss {
         int block = -1;
         double miss = 0.0;

@@ -1,7 +1,7 @@
 // Forces as arrows, moments as arcs, each with its number.
 
 const ARC = { steps: 22, sweep: (300 * Math.PI) / 180 };
-const MOST_LABELS = 40;
+const MAX_LABELS = 40;
 
 class Arrows {
   constructor(THREE, run, world, kinematics, labels) {
@@ -22,7 +22,7 @@ class Arrows {
       for (let k = item.first; k < next; k++) this.shafts.color(k, color);
       return item;
     });
-    this.spans = this.items.slice(0, MOST_LABELS).map(() => labels.appendChild(document.createElement("span")));
+    this.spans = this.items.slice(0, MAX_LABELS).map(() => labels.appendChild(document.createElement("span")));
     this.measure();
   }
 

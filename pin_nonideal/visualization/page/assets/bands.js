@@ -2,7 +2,7 @@
 
 const OPEN = 2; // mode of an open contact
 const BAND = 13; // height of a band with its gap [pixels]
-// Where the bar of a mode begins below the top of its band, and how tall it is: slip + is above, slip - below, stick between them.
+// Offset of the bar of a mode from the top of its band, and height of the bar: slip + is above, slip - below, stick between them.
 const SHAPES = { 1: [0, 0.5], [-1]: [0.5, 0.5], 0: [0.3, 0.4], 2: [0.45, 0.1], 3: [0, 1] };
 
 /** Text without its middle, if it is wider than the room [pixels]. */

@@ -1,6 +1,6 @@
 // Other runs: ghosts over the first run, or beside it, on one time axis.
 
-const MANY = 4; // a larger number of ghosts is fainter
+const MAX_SOLID_GHOSTS = 4; // a larger number of ghosts is fainter
 
 class Ghosts {
   constructor(THREE, run, world) {
@@ -8,7 +8,7 @@ class Ghosts {
     this.items = run.others.map((other, i) => {
       const root = new THREE.Group(), color = new THREE.Color(run.looks.curves[(i + 1) % run.looks.curves.length]);
       world.add(root);
-      const tint = [color.r, color.g, color.b, run.others.length > MANY ? 0.18 : 0.45];
+      const tint = [color.r, color.g, color.b, run.others.length > MAX_SOLID_GHOSTS ? 0.18 : 0.45];
       return { name: other.name, root, tint, shown: true, run: other, kinematics: new Kinematics(THREE, other, root) };
     });
   }

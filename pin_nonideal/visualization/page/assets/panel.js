@@ -151,7 +151,7 @@ class Panel {
     });
   }
 
-  /** Brings a plot into what is seen of all. */
+  /** Scrolls a plot into view. */
   show(plot) {
     element("plots").classList.remove("off");
     element("plots-toggle").hidden = false;

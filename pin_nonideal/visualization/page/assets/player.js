@@ -2,8 +2,8 @@
 
 const ICONS = { play: "M7 4.5v15l13-7.5z", pause: "M6 5h4v14H6zM14 5h4v14h-4z" };
 const SPEEDS = Array.from({ length: 27 }, (_, i) => Number(`${[1, 2, 5][i % 3]}e${Math.floor(i / 3) - 4}`)).slice(0, 25);
-const LEAST_CURVE = 100; // minimum height of a curve [pixels]
-const PLAYED = [5, 15]; // shortest and longest duration of playback at the default speed [s]
+const MIN_CURVE_HEIGHT = 100; // minimum height of a curve [pixels]
+const PLAY_SECONDS = [5, 15]; // shortest and longest duration of playback at the default speed [s]
 const element = (id) => document.getElementById(id);
 
 class Player {
@@ -35,8 +35,8 @@ class Player {
 
   /** Speed at which the run takes 5 to 15 s; 1 if its duration is in this range. */
   usualSpeed() {
-    const length = this.end - this.start, fits = (speed) => length / speed >= PLAYED[0] && length / speed <= PLAYED[1];
-    return !(length > 0) || fits(1) ? 1 : SPEEDS.find(fits) || (length / SPEEDS[0] < PLAYED[0] ? SPEEDS[0] : SPEEDS[SPEEDS.length - 1]);
+    const length = this.end - this.start, fits = (speed) => length / speed >= PLAY_SECONDS[0] && length / speed <= PLAY_SECONDS[1];
+    return !(length > 0) || fits(1) ? 1 : SPEEDS.find(fits) || (length / SPEEDS[0] < PLAY_SECONDS[0] ? SPEEDS[0] : SPEEDS[SPEEDS.length - 1]);
   }
 
   writeTexts() {
@@ -271,20 +271,20 @@ class Player {
     });
   }
 
-  /** The height of curves: of the style, or what a dock by hand leaves for a single row of plots. */
+  /** Sets the height of curves: the style's height, or the space for a single row of plots in a resized dock. */
   fitPlots() {
     const plots = element("plots"), last = this.plots[this.plots.length - 1];
     plots.style.removeProperty("--tall");
     if (!this.dock || !last || last.box.offsetTop !== this.plots[0].box.offsetTop) return;
     const more = plots.clientHeight - last.box.offsetTop + plots.offsetTop - last.box.offsetHeight;
-    plots.style.setProperty("--tall", `${Math.max(LEAST_CURVE, last.canvas.clientHeight + more)}px`);
+    plots.style.setProperty("--tall", `${Math.max(MIN_CURVE_HEIGHT, last.canvas.clientHeight + more)}px`);
   }
 
   resize() {
     const box = element("forces"), { clientWidth: width, clientHeight: height } = element("stage"), narrow = width < 640, folded = box.classList.contains("off");
     // The view is framed between the heading and the buttons that cover it, and beside the table of forces if there is space.
     const taken = (card, side, room) => (card[side] ? card[side] + room : 0);
-    // The panel begins below the heading and ends above the buttons where they are under it.
+    // The panel begins below the heading, and ends above the buttons if they lie under it.
     const heading = element("heading"), beside = narrow || box.hidden ? 0 : box.offsetWidth;
     heading.style.maxWidth = beside ? `min(60%, ${Math.max(width - beside - 36, 200)}px)` : "";
     const tools = element("tools"), panel = element("panel"), under = tools.offsetLeft < panel.offsetLeft + panel.offsetWidth;

@@ -86,7 +86,7 @@ class Plot {
     this.legend.append(item);
   }
 
-  /** Takes a curve in, in a look of its own. */
+  /** Adds a curve with a color and dashes that no other curve has. */
   add(curve) {
     Object.assign(curve, freeLook(this.curves, this.colors), { base: null, shown: true, plain: curve.values });
     this.curves.push(curve);
@@ -164,7 +164,7 @@ class Plot {
     const { t, values } = curve, { start, end } = this.axis.span;
     const first = Math.max(lastBelow(t, start) - 1, 0), last = Math.min(lastBelow(t, end) + 2, t.length - 1);
     c.strokeStyle = onPaper(curve.color); c.setLineDash(curve.dash || []);
-    c.globalAlpha = this.crowded(values, first, last) ? 0.55 : 1; // a crowded curve is transparent
+    c.globalAlpha = this.crowded(values, first, last) ? 0.55 : 1; // a dense curve is transparent
     c.beginPath();
     for (let i = first; i <= last; i++) if (Number.isFinite(values[i])) c.lineTo(this.axis.x(t[i]), this.y(values[i]));
     c.stroke(); c.setLineDash([]); c.globalAlpha = 1;

@@ -1,4 +1,4 @@
-// Plots of one quantity over another: a ball is where the run is, and small dots are what the law allows.
+// Plots of one quantity over another: a ball marks the state of the run, and small dots mark the limits of the law.
 
 class Relation extends Plot {
   constructor(relation, parent, colors, seek) {
@@ -31,7 +31,7 @@ class Relation extends Plot {
     if (this.curves.length === 1) this.legend.hidden = true;
   }
 
-  showDifferences() {} // of the first run alone
+  showDifferences() {} // only the first run has relations
 
   across(value) { return this.axis.left + ((value - this.from) / (this.to - this.from)) * (this.axis.right - this.axis.left); }
 
@@ -80,7 +80,7 @@ class Relation extends Plot {
     c.setLineDash([]); c.globalAlpha = 1;
   }
 
-  /** The first points of a curve; numbers that are none break it. */
+  /** Draws the first points of a curve; NaN separates its parts. */
   path(c, { x, y }, count) {
     let open = false;
     c.beginPath();
@@ -92,7 +92,7 @@ class Relation extends Plot {
     c.stroke();
   }
 
-  /** A ball where the run is at the shown time. */
+  /** Draws a ball at the state of the shown time. */
   draw(time, hover) {
     this.drawn = [time, hover];
     const { context: c } = this, read = hover === null ? time : hover;

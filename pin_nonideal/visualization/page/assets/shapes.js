@@ -1,6 +1,6 @@
 // Geometry: shapes of links, arrows, springs and the ground.
 
-const CREASE = Math.cos((35 * Math.PI) / 180);
+const CREASE_COSINE = Math.cos((35 * Math.PI) / 180);
 
 /** Mesh with sharp edges between faces at more than 35 degrees, and smooth edges elsewhere. */
 function creasedMesh(THREE, vertices, triangles) {
@@ -23,7 +23,7 @@ function creasedMesh(THREE, vertices, triangles) {
     let x = 0, y = 0, z = 0;
     for (let j = first[v]; j < first[v + 1]; j++) {
       const g = 3 * around[j];
-      if (face[own] * face[g] + face[own + 1] * face[g + 1] + face[own + 2] * face[g + 2] < CREASE) continue;
+      if (face[own] * face[g] + face[own + 1] * face[g + 1] + face[own + 2] * face[g + 2] < CREASE_COSINE) continue;
       x += face[g]; y += face[g + 1]; z += face[g + 2];
     }
     const size = Math.hypot(x, y, z) || 1;

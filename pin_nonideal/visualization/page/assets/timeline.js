@@ -1,6 +1,6 @@
-// Time axis of the run: a slider, marks of events, and the density of crowded events.
+// Time axis of the run: a slider, marks of events, and the density of frequent events.
 
-const APART = 6; // minimum distance of separate marks [pixels]
+const MIN_MARK_DISTANCE = 6; // minimum distance of separate marks [pixels]
 
 class Timeline {
   constructor(run, span, canvas, tip, seek, hover) {
@@ -20,7 +20,7 @@ class Timeline {
   /** Text of the events close to a time. */
   textAt(time) {
     const { times, kind, element, kinds, elements, impulse, taken } = this.run.events, near = [];
-    const reach = (APART * (this.span.end - this.span.start)) / Math.max(this.axis.right - this.axis.left, 1);
+    const reach = (MIN_MARK_DISTANCE * (this.span.end - this.span.start)) / Math.max(this.axis.right - this.axis.left, 1);
     for (let k = 0; k < times.length; k++) if (Math.abs(times[k] - time) < reach) near.push(k);
     const struck = (k) => (impulse[k] > 0 ? `  ${readable(impulse[k])} N s, ${readable(taken[k])} J` : "");
     const lines = near.slice(0, 6).map((k) => `${times[k].toFixed(this.digits)} s  ${kinds[kind[k]]}  ${elements[element[k]]}${struck(k)}`);
@@ -66,7 +66,7 @@ class Timeline {
     const { times, kind, kinds } = this.run.events, { axis, track } = this, columns = new Map();
     for (let k = 0; k < times.length; k++) {
       if (times[k] < this.span.start || times[k] > this.span.end) continue;
-      const column = Math.round(axis.x(times[k]) / APART);
+      const column = Math.round(axis.x(times[k]) / MIN_MARK_DISTANCE);
       if (!columns.has(column)) columns.set(column, []);
       columns.get(column).push(k);
     }
@@ -76,13 +76,13 @@ class Timeline {
         for (const k of own) { const x = axis.x(times[k]); c.fillStyle = this.color(kinds[kind[k]]); c.beginPath(); c.moveTo(x, track - 5); c.lineTo(x - 3.5, track - 12); c.lineTo(x + 3.5, track - 12); c.fill(); }
         continue;
       }
-      // Crowded events are a column with a height by their number, divided by kind.
+      // Frequent events are a column with a height by their number, divided by kind.
       const tall = 4 + 10 * (Math.log(own.length) / Math.log(Math.max(most, 3))), counts = new Map();
       for (const k of own) counts.set(kind[k], (counts.get(kind[k]) || 0) + 1);
       let y = track - 5;
       for (const [which, count] of [...counts].sort()) {
         const part = (count / own.length) * tall;
-        c.fillStyle = this.color(kinds[which]); c.fillRect((column - 0.5) * APART, y - part, APART, part);
+        c.fillStyle = this.color(kinds[which]); c.fillRect((column - 0.5) * MIN_MARK_DISTANCE, y - part, MIN_MARK_DISTANCE, part);
         y -= part;
       }
     }
