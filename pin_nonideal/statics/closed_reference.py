@@ -170,7 +170,8 @@ class ClosedReference:
         return InputError(
             f'{self._who}: {what} opens "{name}" by {gap:.2g} {unit}, and the constraints change '
             f'"{coordinate(self._scene.model, worst)}" by {abs(away[worst]):.2g}; give samples that satisfy '
-            f"the constraints, or only as many joints by name as these leave free, {np.sum(~self._free)} here"
+            "the constraints, or only as many joints by name as the constraints leave free, "
+            f"{np.sum(~self._free)} here"
         )
 
     def _independent_mask(self, basis: Array, groups: list[Mask]) -> Mask:

@@ -90,7 +90,7 @@ def test_a_phase_plane_is_velocity_over_position() -> None:
 
 
 def limit_dots(figure: Any) -> Any:
-    """Positions and values of the dots that mark what the law allows."""
+    """Return the positions and values of the dots that mark the limit of the law."""
     return next(line for line in figure.axes[0].lines if line.get_marker() == ".").get_data()
 
 
