@@ -4,7 +4,8 @@ The state is y = (q, v, states of laws, work of the ledger's columns), with q in
 Quaternions and (cos, sin) pairs are plain numbers. The right-hand side is also smooth for other lengths.
 The core monitors the steps: modes of dry friction are fixed within a step, events are located by the method's
 interpolant, and the integrator restarts after each event. Radau is a one-step method and continues from the
-projected state after each step. BDF and LSODA use earlier steps, so only their samples are projected.
+projected state after each step. BDF and LSODA use earlier steps: their samples are projected, and they
+restart from the projected state when their own state is several tolerances away from it.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from pin_nonideal.core_loader import core
 from pin_nonideal.description.drive_kinds import switching_drives
 from pin_nonideal.errors import InputError, RunError, StepSizeError
 from pin_nonideal.scene.scene import Scene, compiled_scene
-from pin_nonideal.types import Array
+from pin_nonideal.types import Array, Table
 
 from .events import Watched
 from .methods import ONE_STEP
@@ -29,6 +30,9 @@ Tick = Callable[[float], None]  # function of the time [s]
 
 # Smallest relative tolerance that SciPy's methods accept and reach.
 MIN_RTOL = 1e-13
+# Distance of a state of BDF or LSODA to its projection at which the method restarts, in tolerances.
+# Velocities off the rows of wheels displace them for good.
+MAX_DRIFT = 10.0
 # Absolute tolerance of work: excludes work from step size control.
 WORK_ATOL = 1e100
 
@@ -82,8 +86,17 @@ class _Run:
                 return
             if self.core.follow(solver.t, solver.dense_output()):
                 return
-            if self.options.method in ONE_STEP and not np.array_equal(solver.y, self.core.y):
+            if self.options.method not in ONE_STEP:
+                if self._drift(solver.y, tolerance) > MAX_DRIFT:
+                    return
+            elif not np.array_equal(solver.y, self.core.y):
                 solver.y, solver.f = self.core.y, self.core.rate
+
+    def _drift(self, y: Array, tolerance: Table) -> float:
+        """Return the distance of a state to its projection, in tolerances."""
+        size = self.model.nq + self.model.nv
+        distance = np.abs(y - self.core.y)[:size]
+        return float((distance / (tolerance["atol"] + tolerance["rtol"] * np.abs(y))[:size]).max(initial=0.0))
 
     def _require_regular_start(self) -> None:
         """Check for a singular slip onset, whose direction relaxes faster than any step of these methods.
