@@ -238,7 +238,9 @@ def checked_gain(what: str, value: object) -> float | Array | dict[str, Array]:
     """
     table = by_name(value)
     if table is not None:
-        return {name: np.asarray(checked_gain(f'{what} of "{name}"', x)) for name, x in table.items()}
+        return {
+            name: np.asarray(checked_gain(f'{what} of "{name}"', np.asarray(x))) for name, x in table.items()
+        }
     checked = array(what, value, () if np.asarray(value, dtype=object).ndim == 0 else (None,))
     if (checked < 0.0).any():
         raise InputError(f"{what} must not be negative; got {float(checked.min()):g}")

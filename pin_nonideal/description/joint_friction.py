@@ -11,6 +11,7 @@ from pin_nonideal.description.constraints import is_mimic
 from pin_nonideal.errors import InputError, UnknownNameError, nearest, short_repr
 from pin_nonideal.types import Model
 from pin_nonideal.validation import (
+    by_name,
     choice,
     label,
     nonnegative,
@@ -132,7 +133,8 @@ class JointFriction:
 
         Args:
             scene: a Scene or a pinocchio.Model.
-            joints: by joint name the dry friction `coulomb` or a table of coefficients, or names alone; None
+            joints: by joint name the dry friction `coulomb` or a table of coefficients (a dict, or a pandas
+                Series or DataFrame with a column for each joint), or names alone; None
                 for all joints of one degree of freedom. Mimic joints of a Scene are then left out.
             **coefficients: coefficients of all joints; a table replaces them for its joint.
 
@@ -152,16 +154,18 @@ class JointFriction:
             mimics = {c.joint1 for c in getattr(scene, "constraints", ()) if is_mimic(c)}
             single = [name for name, j in zip(known, list(model.joints)[1:], strict=True) if j.nv == 1]
             joints = [name for name in single if name not in mimics]
-        table = joints if isinstance(joints, Mapping) else {n: {} for n in sequence(f"{who}: joints", joints)}
+        given = by_name(joints)
+        table = {n: {} for n in sequence(f"{who}: joints", joints)} if given is None else given
         laws, fields_of_law = [], [entry.name for entry in dataclass_fields(cls) if entry.name != "joint"]
         for joint, fields in table.items():
             if joint not in known:
                 raise UnknownNameError(f'{who}: no joint "{joint}"{nearest(str(joint), known)}')
-            own = fields if isinstance(fields, Mapping) else {"coulomb": fields}
+            named = by_name(fields)
+            own = {"coulomb": fields} if named is None else named
             for key in [*coefficients, *own]:
                 if key not in fields_of_law:
                     raise UnknownNameError(f'{who}: no coefficient "{key}"{nearest(str(key), fields_of_law)}')
-            laws.append(cls(joint, **{"name": f"{joint} friction", **coefficients, **own}))  # type: ignore[arg-type]
+            laws.append(cls(joint, **{"name": f"{joint} friction", **coefficients, **own}))
         return laws
 
     @property

@@ -11,9 +11,9 @@ from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.compilation.delay import DelayedTorque
 from pin_nonideal.core_loader import core
 from pin_nonideal.errors import InputError
-from pin_nonideal.states.parsing import named_joint_values
+from pin_nonideal.states.parsing import named_configuration, named_joint_values, named_velocity
 from pin_nonideal.types import Array, State
-from pin_nonideal.validation import array, choice, nonnegative, number, positive, relative_tolerance
+from pin_nonideal.validation import choice, nonnegative, number, positive, relative_tolerance
 
 from .evaluation import Evaluator
 from .state import SceneStates
@@ -90,12 +90,13 @@ class Stepper:
         self._guarded(self._run.advance, tau)
         return self._run.state()
 
-    def reset(self, q: Array, v: Array, t: float = 0.0, tau: ArrayLike | None = None) -> None:
+    def reset(self, q: State, v: State, t: float = 0.0, tau: ArrayLike | None = None) -> None:
         """Restart the run at a state and discard all previous data.
 
         Args:
-            q: configuration on the constraints, (nq,), as from `Scene.project`.
-            v: velocity on the constraints, (nv,).
+            q: configuration on the constraints, (nq,), as from `Scene.project`, or by joint name; joints
+                without an entry take `q0`.
+            v: velocity on the constraints, (nv,), or by joint name; joints without an entry rest.
             t: time [s].
             tau: joint torques that replace the scene's actuation, (nv,), or None.
 
@@ -104,7 +105,8 @@ class Stepper:
             RunError: no motion exists from this state.
         """
         model = self._compiled.model
-        at, speed = array("Stepper: q", q, (model.nq,)), array("Stepper: v", v, (model.nv,))
+        at = named_configuration(model, q, self._compiled.q0, "Stepper: q")
+        speed = named_velocity(model, v, np.zeros(model.nv), "Stepper: v")
         time = number("Stepper: t", t)
         self._compiled.check_functions(at, speed, time)
         if self._delayed is not None:

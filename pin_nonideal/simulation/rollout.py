@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,8 +15,8 @@ from pin_nonideal.core_loader import core
 from pin_nonideal.errors import InputError, PinNonidealError, RunError, RunInterrupted, short_repr
 from pin_nonideal.scene.scene import Scene, compiled_scene, require_scene, scene_states
 from pin_nonideal.states.joint_layout import require_resolved
-from pin_nonideal.types import Array
-from pin_nonideal.validation import array, choice, count
+from pin_nonideal.types import Array, State
+from pin_nonideal.validation import array, by_name, choice, count
 
 from .decoupled import decoupled_components, rollout_decoupled
 from .methods import SCIPY
@@ -66,8 +66,10 @@ def rollout(
 
     Args:
         scene: scene to simulate.
-        q: initial configurations, (n, nq); None for the scene's initial configuration in every run.
-        v: initial velocities, (n, nv); None for the scene's initial velocity in every run.
+        q: initial configurations, (n, nq), columns by joint name (a table or a pandas DataFrame), or a list
+            of configurations by joint name; None for the scene's initial configuration in every run.
+        v: initial velocities, (n, nv), or by joint name as q; None for the scene's initial velocity in every
+            run.
         duration: duration [s].
         parameters: numbers of each run, by name and field, (n,) or (n, ...); see above.
         t0: initial time [s].
@@ -132,8 +134,9 @@ def _starts(scene: Scene, q: object, v: object, parameters: object) -> tuple[Arr
     """Return the initial states of all runs; a missing state is the scene's initial state."""
     if parameters is not None and not isinstance(parameters, Mapping):
         raise InputError(f"rollout: parameters must be values by name; got {short_repr(parameters)}")
-    starts_q = None if q is None else array("rollout: q", q, (None, scene.model.nq), copy=False)
-    starts_v = None if v is None else array("rollout: v", v, (None, scene.model.nv), copy=False)
+    states, model = scene_states(scene), scene.model
+    starts_q = None if q is None else _states_of_runs(q, model.nq, states.configuration, "rollout: q")
+    starts_v = None if v is None else _states_of_runs(v, model.nv, states.velocity, "rollout: v")
     by_run: list[Any] = [each for each in (starts_q, starts_v) if each is not None]
     for values in (parameters or {}).values():
         by_run += [*values.values()] if isinstance(values, Mapping) else [values]
@@ -147,6 +150,30 @@ def _starts(scene: Scene, q: object, v: object, parameters: object) -> tuple[Arr
     if len(starts_q) != len(starts_v):
         raise InputError(f"rollout: q and v must have as many rows; got {len(starts_q)} and {len(starts_v)}")
     return starts_q, starts_v
+
+
+def _states_of_runs(values: object, size: int, one: Callable[[State, str], Array], what: str) -> Array:
+    """Return configurations or velocities of all runs.
+
+    Args:
+        values: array (n, size), a table of columns (n,) or (n, k) by joint name, or a list of n tables.
+        size: nq or nv.
+        one: function that returns one state from a table by joint name.
+        what: words for messages.
+
+    Raises:
+        InputError: a shape does not fit, or a number is not finite.
+    """
+    columns = by_name(values)
+    if columns is not None:
+        table = {name: np.asarray(column) for name, column in columns.items()}
+        lengths = {len(column) if column.ndim else 0 for column in table.values()}
+        if len(lengths) != 1 or 0 in lengths:
+            raise InputError(f"{what} by joint name must have columns of one length; got {sorted(lengths)}")
+        values = [{name: column[k] for name, column in table.items()} for k in range(lengths.pop())]
+    if isinstance(values, (list, tuple)) and len(values) and by_name(values[0]) is not None:
+        return np.array([one(entry, f"{what}[{k}]") for k, entry in enumerate(values)])
+    return array(what, values, (None, size), copy=False)
 
 
 def _arrays(

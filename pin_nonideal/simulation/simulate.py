@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 
 from numpy.typing import ArrayLike
 
@@ -15,7 +15,7 @@ from pin_nonideal.errors import InputError
 from pin_nonideal.scene.scene import Scene, compiled_scene, require_scene, scene_states
 from pin_nonideal.trajectory.trajectory import Trajectory
 from pin_nonideal.types import State
-from pin_nonideal.validation import choice, nonnegative
+from pin_nonideal.validation import by_name, choice, nonnegative
 
 from .decoupled import decoupled_components, run_decoupled, run_together
 from .events import RunRequests, parse_callback, parse_events
@@ -133,7 +133,7 @@ def simulate(
     followed = states.start_notes() if own else states.velocity_notes(v, v0)
     notes = moved + followed
     for start, notes_of_start in ((q, moved), (v, followed)):
-        if notes_of_start and start is not None and not isinstance(start, Mapping):
+        if notes_of_start and start is not None and by_name(start) is None:
             warnings.warn(f"simulate: {notes_of_start[0]}", RuntimeWarning, stacklevel=2)
     program, delayed = compiled_scene(scene).program_of_runs(options.t0)
     saver = None

@@ -6,11 +6,11 @@ One parser serves Scene, simulate, project, solve, load, the command line and ro
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
 from pin_nonideal.types import Array, Model, State
@@ -85,11 +85,12 @@ def named_configuration(
         if state not in known:
             raise UnknownNameError(f'{what}: no reference configuration "{state}"{nearest(state, known)}')
         return np.array(model.referenceConfigurations[state])
-    if not isinstance(state, Mapping):
+    table = by_name(state)
+    if table is None:
         describe_order(model, state, what, "nqs")
-        return configuration(model, state, what, parts)
+        return configuration(model, cast("ArrayLike", state), what, parts)
     q = np.array(base)
-    for name, value in state.items():
+    for name, value in table.items():
         j = find_joint(model, name, what)
         first, size = model.idx_qs[j], model.nqs[j]
         q[first : first + size] = _values(model, j, 0, value, q[first : first + size], f'{what} of "{name}"')
@@ -113,11 +114,12 @@ def named_velocity(model: Model, state: State, base: Array, what: str) -> Array:
         InputError: wrong shape, or not finite.
         UnknownNameError: there is no such joint or piece.
     """
-    if not isinstance(state, Mapping):
+    table = by_name(state)
+    if table is None:
         describe_order(model, state, what, "nvs")
         return np.array(array(what, state, (model.nv,)))
     v = np.array(base)
-    for name, value in state.items():
+    for name, value in table.items():
         j = find_joint(model, name, what)
         first, size = model.idx_vs[j], model.nvs[j]
         v[first : first + size] = _values(model, j, 1, value, v[first : first + size], f'{what} of "{name}"')
@@ -228,7 +230,7 @@ def named_entries(model: Model, state: State | None) -> NDArray[np.bool_] | None
         model: pinocchio.Model.
         state: a velocity as in `named_velocity`.
     """
-    if not isinstance(state, Mapping):
+    if state is None or by_name(state) is None:
         return None
     return ~np.isnan(named_velocity(model, state, np.full(model.nv, np.nan), "v"))
 
@@ -240,10 +242,11 @@ def named_coordinates(model: Model, state: State | None) -> NDArray[np.bool_] | 
         model: pinocchio.Model.
         state: a configuration as in `named_configuration`.
     """
-    if not isinstance(state, Mapping):
+    table = by_name(state)
+    if table is None:
         return None
     named = np.zeros(model.nv, dtype=bool)
-    for name, value in state.items():
+    for name, value in table.items():
         j = find_joint(model, name, "q")
         own = named[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]]
         if not isinstance(value, Mapping):

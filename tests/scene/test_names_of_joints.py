@@ -6,6 +6,7 @@ import sys
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pinocchio as pin
 import pytest
 
@@ -116,24 +117,63 @@ def test_bounds_of_inverse_dynamics():
 
 
 def test_a_series_and_a_frame_of_pandas_are_tables():
-    """pandas is not needed: a stand-in of its module has the same items."""
-
-    class Series:
-        def __init__(self, entries):
-            self.entries = entries
-
-        def items(self):
-            return self.entries.items()
-
-    Series.__module__ = "pandas.core.series"
     scene = pn.load("loaded_joint")
     joint = str(scene.model.names[1])
-    q, v = scene.initial_state()
+    q, v = pd.Series({joint: 0.4}), pd.Series({joint: -0.2})
     np.testing.assert_array_equal(
-        scene.solve(q, v, tau=Series({joint: 0.3})).a, scene.solve(q, v, tau=[0.3]).a
+        scene.solve(q, v, tau=pd.Series({joint: 0.3})).a, scene.solve([0.4], [-0.2], tau=[0.3]).a
     )
-    table = pn.Table([0.0, 1.0], Series({joint: [0.0, 1.0]}))
+    table = pn.Table([0.0, 1.0], pd.DataFrame({joint: [0.0, 1.0]}))
     np.testing.assert_array_equal(table.values[joint], [0.0, 1.0])
+    limits = pn.EffortLimits(
+        pn.HoldPosition(q=q, kp=pd.Series({joint: 1.0}), kd=0.1), effort=pd.DataFrame({joint: [2.0]})
+    )
+    scene = scene.replace(actuation=limits, q0=q)
+    assert scene.q0[0] == 0.4
+    for state in (q, pd.DataFrame({joint: [0.4]}).iloc[0]):
+        run = pn.simulate(scene, 0.1, state, v, progress=False)
+        np.testing.assert_array_equal([run.q[0, 0], run.v[0, 0]], [0.4, -0.2])
+    assert pn.inverse_dynamics(scene, q, v, v).tau == pn.inverse_dynamics(scene, [0.4], [-0.2], [-0.2]).tau
+
+
+def test_friction_of_joints_in_a_table_of_pandas():
+    scene = pn.load("four_bar")
+    names = [str(name) for name in scene.model.names][1:3]
+    coulomb = pn.JointFriction.for_joints(scene, pd.Series([0.1, 0.2], index=names))
+    assert [(law.joint, law.coulomb) for law in coulomb] == [(names[0], 0.1), (names[1], 0.2)]
+    table = pd.DataFrame({name: {"coulomb": 0.1, "viscous": 0.01 * k} for k, name in enumerate(names, 1)})
+    laws = pn.JointFriction.for_joints(scene, table)
+    assert [(law.joint, law.coulomb, law.viscous) for law in laws] == [
+        (names[0], 0.1, 0.01),
+        (names[1], 0.1, 0.02),
+    ]
+
+
+@pytest.mark.parametrize("form", ["frame", "columns", "list"])
+def test_states_of_a_rollout_by_joint_name(form):
+    scene = pn.load("loaded_joint")
+    joint, angles = str(scene.model.names[1]), [0.1, 0.2, 0.3]
+    q = {
+        "frame": pd.DataFrame({joint: angles}),
+        "columns": {joint: np.array(angles)},
+        "list": [{joint: angle} for angle in angles],
+    }[form]
+    named = pn.rollout(scene, q, None, 0.05)
+    plain = pn.rollout(scene, np.array(angles)[:, None], None, 0.05)
+    for one, other in zip(named, plain, strict=True):
+        np.testing.assert_array_equal(one.q, other.q)
+    with pytest.raises(pn.InputError, match="columns of one length; got"):
+        pn.rollout(scene, {joint: 0.1}, None, 0.05)
+
+
+def test_a_stepper_starts_again_by_joint_name():
+    scene = pn.load("loaded_joint")
+    joint = str(scene.model.names[1])
+    stepper = scene.stepper(1e-3)
+    stepper.reset({joint: 0.3}, {joint: -0.1})
+    assert (stepper.q[0], stepper.v[0]) == (0.3, -0.1)
+    with pytest.raises(pn.UnknownNameError, match="Stepper: q: no joint"):
+        stepper.reset({joint + "x": 0.3}, [0.0])
 
 
 @pytest.mark.parametrize(
