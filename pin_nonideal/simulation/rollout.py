@@ -15,6 +15,7 @@ from pin_nonideal.core_loader import core
 from pin_nonideal.errors import InputError, PinNonidealError, RunError, RunInterrupted, short_repr
 from pin_nonideal.scene.scene import Scene, compiled_scene, require_scene, scene_states
 from pin_nonideal.states.joint_layout import require_resolved
+from pin_nonideal.trajectory.run_list import RunList
 from pin_nonideal.types import Array, State
 from pin_nonideal.validation import array, by_name, choice, count
 
@@ -116,7 +117,7 @@ def rollout(
         if isinstance(error, RunError):
             error.results = results
         raise error
-    return results
+    return RunList(results)
 
 
 def _threads(jobs: int) -> int:

@@ -27,6 +27,7 @@ from pin_nonideal.scene.scene import Scene
 from pin_nonideal.simulation.options import check_values
 from pin_nonideal.simulation.simulate import simulate
 from pin_nonideal.trajectory.file import to_bytes
+from pin_nonideal.trajectory.run_list import RunList
 from pin_nonideal.trajectory.trajectory import Trajectory
 from pin_nonideal.types import Table
 from pin_nonideal.validation import choice, count, function, number, positive, sequence
@@ -79,8 +80,8 @@ def sweep(
         options: options of `simulate`.
 
     Returns:
-        Without a store, one Trajectory for each run, in order and without scenes, which `make` can build
-        again. With a store, a `Sweep`, which reads the runs on access.
+        Without a store, a list of one Trajectory for each run, in order and without scenes, which `make` can
+        build again; notebooks show a table. With a store, a `Sweep`, which reads the runs on access.
 
     Raises:
         InputError: `make` cannot be called or sent to a process, `parameters` holds no mappings, `jobs` is
@@ -113,7 +114,7 @@ def sweep(
     if folder is not None:
         numbers = open_store(folder, digest_of(make, table, length, options), len(table))
     work = _Work(make, length, options, folder, keep, measure)
-    results: list[Any] = [None] * (len(table) if folder is None else 0)
+    results = RunList([None] * (len(table) if folder is None else 0))
     for part in _results(work, [(k, dict(table[k])) for k in numbers], jobs, progress):
         for k, result in part:
             if isinstance(result, PinNonidealError) and not (keep and folder is None):

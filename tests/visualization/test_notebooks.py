@@ -88,6 +88,16 @@ def test_a_long_sweep_shows_its_first_runs(tmp_path):
     assert "10 more" in text
 
 
+def test_runs_of_a_rollout_are_a_table():
+    scene = pn.load("loaded_joint")
+    runs = pn.rollout(scene, [[0.1], [0.2]], None, 0.1)
+    assert isinstance(runs, list)
+    text = runs._repr_html_()
+    assert "2 runs" in text
+    assert text.count("<tr>") == 3
+    assert f">{len(runs[1].t)}<" in text
+
+
 def test_a_figure_is_a_picture(run):
     figure = pn.plot(run, what="q")
     assert figure._repr_png_().startswith(b"\x89PNG")
