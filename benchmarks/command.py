@@ -50,7 +50,7 @@ def parser() -> argparse.ArgumentParser:
         "--peers", metavar="NAMES", help="peers to run, separated by commas; none: just us (default: all)"
     )
     made.add_argument(
-        "--output", type=Path, default=DEFAULT_OUTPUT, metavar="FOLDER", help="where results are written"
+        "--output", type=Path, default=DEFAULT_OUTPUT, metavar="FOLDER", help="folder of the results"
     )
     return made
 

@@ -55,7 +55,7 @@ def main(arguments: list[str]) -> int:
     """Print or write the table."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.models", description=__doc__.splitlines()[0])
     parser.add_argument("folders", nargs="+", metavar="FOLDER")
-    parser.add_argument("--write", type=Path, metavar="FILE", help="where the page goes (default: printed)")
+    parser.add_argument("--write", type=Path, metavar="FILE", help="file of the page (default: printed)")
     options = parser.parse_args(arguments)
     rows, details = [], []
     for folder in options.folders:

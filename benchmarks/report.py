@@ -67,8 +67,8 @@ BATCHES = """## Batches
 Semi-implicit Euler at 2 ms from many states: `pn.rollout` against `mujoco.rollout` with its default
 constraints, without its search for islands and without warm start, which make it slower here. Both record
 every step, and a batch has as many states as last 0.2 s in one thread, which makes the start of the second
-(here up to a millisecond) small. Two threads over one are wall times, to be read beside what two processes,
-which share nothing, gain with half of the batch each: where processors share a core, that is less than two.
+(here up to a millisecond) small. Two threads over one are wall times, beside the gain of two processes,
+which share nothing, with half of the batch each. On processors that share a core, this gain is less than two.
 Steps a second of one thread are by processor time and of two by wall time, both of the best round; the gain
 is the median over the rounds of wall times, and so not the quotient of the two.
 """

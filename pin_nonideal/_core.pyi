@@ -13,7 +13,7 @@ pinocchio_version: str
 state_layout: str
 
 class Solutions(enum.Enum):
-    """What is shown of the motions under friction that a paradox leaves."""
+    """Proven number of motions under friction at a paradox."""
 
     not_told = 0
 
@@ -22,7 +22,7 @@ class Solutions(enum.Enum):
     several = 2
 
 class FailureKind(enum.Enum):
-    """Why an evaluation or a run could not go on."""
+    """Cause of the failure of an evaluation or a run."""
 
     singular_mass = 0
     """elements: the degree of freedom"""
@@ -52,7 +52,7 @@ class FailureKind(enum.Enum):
 
     growing = 12
     """
-    elements: the degree of freedom, and what feeds it: 0 the actuation, 1 given forces, 2 laws; value: rate
+    elements: the degree of freedom, and its cause: 0 the actuation, 1 given forces, 2 laws; value: rate
     """
 
     steps = 8
@@ -81,14 +81,14 @@ class ReactionView:
     def of_block(self, block: int) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
 
 class Provider(enum.Enum):
-    """Who computes kinematics, M and the bias forces."""
+    """Provider of kinematics, M and bias forces."""
 
     core = 0
 
     pinocchio = 1
 
 class Load(enum.Enum):
-    """What loads the bearing that rubs."""
+    """Load on which the friction limit of a bearing depends."""
 
     none = 0
 
@@ -105,7 +105,7 @@ class Load(enum.Enum):
     user = 6
 
 class Mode(enum.IntEnum):
-    """How a frictional element moves: slip one way or the other, or rest."""
+    """Mode of a friction element: slip in either direction, or stick."""
 
     slip_minus = -1
 
@@ -114,9 +114,7 @@ class Mode(enum.IntEnum):
     slip_plus = 1
 
     unloaded = 2
-    """
-    carries no friction: its contact is open, or what asks does so without it
-    """
+    """no friction: the contact is open, or the caller removes the friction"""
 
 class DisplayKind(enum.Enum):
     """Display of a constraint in a replay."""
@@ -138,16 +136,16 @@ class DisplayKind(enum.Enum):
     gear = 7
 
 class ImpactLaw(enum.Enum):
-    """What restitution means in an impact."""
+    """Definition of restitution in an impact."""
 
     newton = 0
-    """rate at which a gap opens over that at which it closed"""
+    """opening rate of a gap over its closing rate"""
 
     poisson = 1
-    """impulse of expansion over that of compression"""
+    """impulse of expansion over impulse of compression"""
 
 class Reaction(enum.Enum):
-    """Of which motion a law reads the reactions."""
+    """Motion whose reactions a law reads."""
 
     none = 0
 
@@ -158,13 +156,13 @@ class Reaction(enum.Enum):
 class Builder:
     def __init__(self, model: object, terms: Provider = Provider.core) -> None: ...
 
-    def keep_rows(self, block: int, rows: Sequence[int]) -> None: ...
+    def select_rows(self, block: int, rows: Sequence[int]) -> None: ...
 
     def add_copy(self, row: int, first: int, factor: float) -> None: ...
 
     def add_breaks(self, times: Sequence[float]) -> None: ...
 
-    def let_open(self, restitution: float) -> None: ...
+    def set_unilateral(self, restitution: float) -> None: ...
 
     def set_impact(self, law: ImpactLaw) -> None: ...
 
@@ -393,16 +391,16 @@ class Method:
 def methods() -> list[Method]: ...
 
 class EventKind(enum.Enum):
-    """What happened between two smooth stretches of a run."""
+    """Kind of an event between two smooth parts of a run."""
 
     stick = 0
     """an element comes to rest"""
 
     slip = 1
-    """what stuck gives way"""
+    """a sticking element begins to slip"""
 
     reverse = 2
-    """slip turns round"""
+    """the slip velocity reverses"""
 
     pull = 3
     """the normal force of a contact turns negative"""
@@ -420,10 +418,10 @@ class EventKind(enum.Enum):
     """a function of the user crosses zero"""
 
     saturate = 8
-    """a drive reaches the effort that it has"""
+    """the torque of a drive reaches its effort limit"""
 
     desaturate = 9
-    """a drive gives again what is asked of it"""
+    """the torque of a drive falls below its effort limit"""
 
     jump = 10
     """the rate of a prescribed motion jumps, with an impulse"""
@@ -600,7 +598,7 @@ def with_numbers(program: Program, names: Sequence[tuple[str, int, str]], values
 
 def rollout_arrays(program: Program, q: NDArray[numpy.float64], v: NDArray[numpy.float64], options: pin_nonideal.simulation.options.RunOptions, threads: int, names: Sequence[tuple[str, int, str]], values: NDArray[numpy.float64]) -> tuple[NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.float64], NDArray[numpy.float64], list[tuple[int, BaseException]]]: ...
 
-class FollowedRun:
+class ExternalRun:
     def __init__(self, program: Program, options: pin_nonideal.simulation.options.RunOptions, tick: Callable[[float], None] | None = None, events: Sequence[tuple[Callable[[float, Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))]], float], int, int]] = []) -> None: ...
 
     def start(self, q: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], v: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> None: ...
@@ -697,7 +695,7 @@ class Program:
     def runner(self) -> Runner: ...
 
 class ConeStatus(enum.Enum):
-    """What came of a problem of contacts and friction."""
+    """Result of a problem of contacts and friction."""
 
     solved = 0
 

@@ -15,7 +15,7 @@ from typing import IO
 
 from .errors import InputError, OutputError, short_repr
 
-NAME_BYTES_MAX = 255  # of a file or folder, on the file systems in use
+NAME_BYTES_MAX = 255  # longest name of a file or folder on the file systems in use
 PART = ".part"  # end of the name of a file that is still being written
 
 

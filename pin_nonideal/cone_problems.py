@@ -100,7 +100,7 @@ def cone_complementarity(
 
     Returns:
         The `ConeSolution`. The solver is Newton's method on the modes after Alart and Curnier. If it does not
-        converge, an interior-point method on second-order cones provides a start, with de Saxce's correction
+        converge, an interior-point method on second-order cones provides a start, with De Saxcé's correction
         mu |w_t| inside Newton's equations or fixed alternately. Contacts are scaled by their response; a
         response below 1e-14 of the largest counts as zero.
 

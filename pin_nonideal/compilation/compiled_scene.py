@@ -101,7 +101,7 @@ class CompiledScene:
             idle = {(name, row) for name, row, _ in self.dropped}
             for block, c in enumerate(self.program.constraints):
                 acting_rows = [row for row in range(c.count) if (c.name, row) not in idle]
-                builder.keep_rows(block, acting_rows)
+                builder.select_rows(block, acting_rows)
             for row, first, factor in duplicate_rows:
                 builder.add_copy(row, first, factor)
             self.program = builder.finish()

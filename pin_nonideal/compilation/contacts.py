@@ -88,7 +88,7 @@ def lower_gaps(c: Contact, name: str, out: core.Builder, resolver: Resolver) -> 
         who = words(c, name)
         rows, gap = user_rows(c, 1, who, resolver), checked_function(c.gap, f"{who}: gap", (1,))
         block = out.add_user_gap(name, rows=rows, gap=gap, rate=user_rate(c, 1, who, rows, gap))
-        out.let_open(restitution=c.restitution)
+        out.set_unilateral(restitution=c.restitution)
         return [block]
     who = words(c, name)
     if isinstance(c, EllipsoidContact):
@@ -107,7 +107,7 @@ def lower_gaps(c: Contact, name: str, out: core.Builder, resolver: Resolver) -> 
         block = out.add_rim(name, f1, f2, solid=hull, rim=c.rim, radius=c.radius2)
     else:
         block = _round_gap(c, name, out, resolver)
-    out.let_open(restitution=c.restitution)
+    out.set_unilateral(restitution=c.restitution)
     return [block]
 
 
@@ -131,7 +131,7 @@ def _on_plane(c: PointContact, name: str, out: core.Builder, resolver: Resolver)
     f1, f2, (_, _, normal) = resolver.contact(c, words(c, name))
     block = out.add_contact(name, f1, f2, normal=normal, radius=c.radius)
     if c.unilateral:
-        out.let_open(restitution=c.restitution)
+        out.set_unilateral(restitution=c.restitution)
     return block
 
 
@@ -143,7 +143,7 @@ def _stops(c: JointLimit, name: str, out: core.Builder, resolver: Resolver) -> l
             blocks.append(
                 out.add_limit(f"{name} {which}", resolver.joint(c.joint, name), bound=bound, sign=sign)
             )
-            out.let_open(restitution=c.restitution)
+            out.set_unilateral(restitution=c.restitution)
     return blocks
 
 

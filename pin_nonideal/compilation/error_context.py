@@ -267,8 +267,9 @@ def _paradox(names: Sequence[str], failure: core.CoreFailure) -> RunError:
 
 def _modes_error(names: Sequence[str], t: float) -> RunError:
     return FrictionConvergenceError(
-        f"it was not found at t = {t:.4g} s whether {_list_names(names)} sticks or slips, although a motion "
-        'may exist; change an initial value a little, tighten rtol, use method="moreau", or give modes to '
+        f"the modes (stick or slip) of {_list_names(names)} were not found at t = {t:.4g} s, although a "
+        "motion may exist; change an initial value a little, "
+        'tighten rtol, use method="moreau", or give modes to '
         "solve",
         element=", ".join(names),
         time=t,
@@ -297,7 +298,7 @@ def _inconsistent(
     if residual == 0.0:  # the failure of an impact has no residual
         bodies = _contact_bodies(model, names, pairs)
         return InconsistentConstraintsError(
-            f"no impulses part the bodies at {quoted}{bodies} as their restitution asks at t = {t:.2f} s: "
+            f"the bodies at {quoted}{bodies} cannot separate with their restitution at t = {t:.2f} s: "
             "other constraints keep them from moving apart; lower restitution, or use "
             'Scene(..., impact="poisson")',
             time=t,

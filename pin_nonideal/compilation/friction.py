@@ -125,7 +125,7 @@ def _in_joint(law: JointFriction, who: str, context: LoweringContext) -> list[Fr
     joint = friction_joint(law.joint, who, context, freedoms=(1, 2, 3, 6))
     kind = model.joints[joint].shortname()
     dof, count = model.joints[joint].idx_v, model.joints[joint].nv
-    _refuse(law, who, TEETH, f'of a JointCoupling, and joint "{law.joint}" is {kind}')
+    _refuse(law, who, TEETH, f'a parameter of a JointCoupling, and joint "{law.joint}" is {kind}')
     if kind == "JointModelUniversal":
         _check_radius(law, who, core.Load.revolute)
         axes = [(f"axis {k + 1}", dof + k) for k in range(2)]
@@ -169,7 +169,7 @@ def _in_constraint(
     who, anchor, resolver = words(law, name), context.reactions.blocks[law.joint], context.resolver
     if isinstance(c, JointCoupling):
         return [_in_coupling(law, who, name, c, anchor, out, resolver)]
-    _refuse(law, who, TEETH, f'of a JointCoupling, and "{law.joint}" is a {type(c).__name__}')
+    _refuse(law, who, TEETH, f'a parameter of a JointCoupling, and "{law.joint}" is a {type(c).__name__}')
     if isinstance(c, HingeAnchor):
         _check_radius(law, who, core.Load.revolute)
         f1, f2 = resolver.pair(c, who)
@@ -202,7 +202,7 @@ def _in_coupling(
 
     Fractions a and b of the tooth force act as friction on the two joints.
     """
-    _refuse(law, who, BEARING, f'of a bearing, and "{law.joint}" is a JointCoupling')
+    _refuse(law, who, BEARING, f'a parameter of a bearing, and "{law.joint}" is a JointCoupling')
     if law.mu and law.lead_angle is None:
         raise InputError(
             f"{who}: mu needs the lead_angle of the thread on a JointCoupling; give it, or an efficiency"

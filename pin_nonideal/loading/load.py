@@ -150,11 +150,11 @@ def _add_limits(arguments: Table, used: bool, ranges: Sequence[UserContact]) -> 
         stops = [JointLimit(name) for name in bounded]
         arguments["contacts"] = (*arguments.get("contacts", ()), *stops, *ranges)
         return
-    unused = [f"of the positions of {len(bounded)} joints"] if bounded else []
+    unused = [f"the positions of {len(bounded)} joints"] if bounded else []
     if ranges:
-        unused.append(f"of ball joints and tendons ({quote_names([str(one.name) for one in ranges])})")
+        unused.append(f"ball joints and tendons ({quote_names([str(one.name) for one in ranges])})")
     if unused:
-        note = f"bounds {' and '.join(unused)} are not used; limits=True makes them stops"
+        note = f"bounds of {' and of '.join(unused)} are not used; limits=True makes them stops"
         arguments["notes"] = (*arguments.get("notes", ()), note)
 
 

@@ -63,7 +63,7 @@ def _note_folder(loaded: LoadedRobot, path: Path) -> LoadedRobot:
     """Add a note to a robot found by its name, if a file or folder of that name exists too."""
     if path.exists():
         loaded.robot.notes.append(
-            f'"{path}" of the working directory is not what was loaded, for it is the name of a robot; '
+            f'"{path}" of the working directory is not loaded, since it is the name of a robot; '
             f'write "./{path}" for the folder'
         )
     return loaded

@@ -137,8 +137,8 @@ class SceneBase:
     def __setattr__(self, key: str, value: object) -> None:
         if key in FROZEN_FIELDS and "_compiled" in self.__dict__:
             raise InputError(
-                f'{key} of scene "{self.name}" is what the scene was made of and cannot be exchanged; make a '
-                f"new Scene with another {key}"
+                f'{key} of scene "{self.name}" is fixed at construction and cannot be exchanged; '
+                f"make a new Scene with another {key}"
             )
         super().__setattr__(key, value)
 

@@ -118,7 +118,7 @@ def _pack_object(value: object, what: str, scene: str) -> object:
         advice += ", or pip install cloudpickle"
     except Exception as error:
         reason = f"{reason}; {type(error).__name__}: {error}"
-        advice += ", and leave out of them what cannot travel"
+        advice += ", without objects that cannot be pickled"
     raise InputError(f'scene "{scene}" cannot be pickled: {what} cannot ({reason}); {advice}')
 
 

@@ -55,7 +55,7 @@ class SceneShapes:
         geometry = shapes()
         if not isinstance(geometry, pin.GeometryModel):
             raise InputError(
-                "Scene: what makes a geometry must return a pinocchio.GeometryModel; "
+                "Scene: a function for a geometry must return a pinocchio.GeometryModel; "
                 f"got {type(geometry).__name__}"
             )
         self._notes += [note for note in getattr(shapes, "notes", ()) if note not in self._notes]

@@ -44,7 +44,7 @@ class _Run:
         self, scene: Scene, options: RunOptions, tick: Tick | None, events: Sequence[Watched]
     ) -> None:
         self.model, self.options = scene.model, options
-        self.core = core.FollowedRun(compiled_scene(scene).program, options, tick, list(events))
+        self.core = core.ExternalRun(compiled_scene(scene).program, options, tick, list(events))
         self.failure: core.CoreFailure | None = None
 
     def rate(self, t: float, y: Array) -> Array:

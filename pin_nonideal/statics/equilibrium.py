@@ -177,9 +177,7 @@ class _Search:
 
     def reason(self) -> str:
         """Return the reason of a failed search: a drive that exceeds all resistance, or unbalanced forces."""
-        rubs = "; dry friction counts for nothing here: `rest` tells whether it holds" * bool(
-            self.rest.scene.element_names
-        )
+        rubs = "; dry friction is ignored here, and `rest` includes it" * bool(self.rest.scene.element_names)
         now = self.rest.balance(self.nearest)
         way = now.free @ now.left
         way /= np.linalg.norm(way) or 1.0
@@ -188,17 +186,17 @@ class _Search:
         along, held = float(power.sum()), float(power.sum() - now.F @ way)
         if along <= max(held, 0.0):
             return (
-                f"along motions that the constraints allow, forces of {self.least:.2g} (N or N m) are left; "
-                f"start nearer, or hold what falls freely{rubs}"
+                f"along motions that the constraints allow, forces of {self.least:.2g} (N or N m) remain; "
+                f"start nearer, or hold the bodies that fall freely{rubs}"
             )
         dof = int(power.argmax())
         ends = [i + n for i, n in zip(self.model.idx_vs, self.model.nvs, strict=True)]
         joint = self.model.names[int(np.searchsorted(ends[1:], dof, side="right")) + 1]
         others = f"all else holds {held:.2g} of it" if held > 0.0 else "nothing else holds against it"
         return (
-            f'the drive of joint "{joint}", {drive[dof]:.4g} (N or N m), exceeds what holds it: where the '
-            f"least is left, the drives push with {along:.2g} along a motion that the constraints allow, "
-            f"and {others}; drive less, or hold more{rubs}"
+            f'the drive of joint "{joint}", {drive[dof]:.4g} (N or N m), exceeds all resistance: at the '
+            f"smallest unbalanced force the drives push with {along:.2g} along a motion that the constraints "
+            f"allow, and {others}; drive less, or hold more{rubs}"
         )
 
     def in_play(self, now: Balance, inertia: Array) -> Array:

@@ -177,8 +177,8 @@ def _pickling_message(work: _Work, runs: list[Any]) -> str:
         try:
             cloudpickle.dumps(value)
         except Exception as error:  # any error of the object's own methods
-            return f"{name} must be such that another process can have it; {type(error).__name__}: {error}"
-    return "what a run leaves must be such that another process can have it; give it a store"
+            return f"{name} must be picklable for another process; {type(error).__name__}: {error}"
+    return "the result of a run must be picklable for another process; give a store"
 
 
 class _Work:

@@ -99,7 +99,10 @@ def frame_reaction(run: RunFields, name: str, index: int) -> Array:
 
 
 def _balance(run: RunFields, k: int, motions: BodyMotions, part: Part) -> tuple[pin.Force, float]:
-    """Return the wrench that a part receives, in the joint frame, and the sum of the sizes of its terms."""
+    """Return the wrench on a part from its neighbor, in the joint frame, and its scale for rounding.
+
+    The scale is the sum of the largest components of all terms.
+    """
     velocity, acceleration = motions.velocity(part.joint), motions.acceleration(part.joint)
     terms = [part.inertia * acceleration, velocity.cross(part.inertia * velocity)]
     to_body = motions.placement(part.joint)

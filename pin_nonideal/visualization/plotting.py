@@ -84,7 +84,7 @@ def plot(
         raise InputError(f"plot: ax must be axes of matplotlib; got {short_repr(ax)}")
     drawn = _requested_plots(runs, default_plots(runs) if what is None else what)
     if ax is not None and len(drawn) != 1:
-        raise InputError(f"plot: ax takes one plot; what asks for {len(drawn)}")
+        raise InputError(f"plot: ax takes one plot; got {len(drawn)} plots")
     settings: Any = look.settings
     with mpl.rc_context(settings):
         figure = _figure(runs, labels, drawn, look, ax)

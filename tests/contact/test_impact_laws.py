@@ -180,8 +180,8 @@ def between_plates(law):
 
 def test_no_rebound_where_another_contact_is_in_the_way():
     message = (
-        'no impulses part the bodies at "floor" and "ceiling" (the body of joint "z" on the world) as their '
-        "restitution asks at t = 0.00 s: other constraints keep them from moving apart; lower restitution, "
+        'the bodies at "floor" and "ceiling" (the body of joint "z" on the world) cannot separate with their '
+        "restitution at t = 0.00 s: other constraints keep them from moving apart; lower restitution, "
         'or use Scene(..., impact="poisson")'
     )
     with pytest.raises(pn.InconsistentConstraintsError, match=re.escape(message)):

@@ -165,7 +165,9 @@ def test_a_model_that_is_changed_after_the_scene_was_made_is_refused(tmp_path):
 @pytest.mark.parametrize("key", FROZEN_FIELDS)
 def test_what_a_scene_was_made_of_cannot_be_exchanged(tmp_path, key):
     scene = pn.load(folder(tmp_path))
-    with refuses(f'{key} of scene "{scene.name}" is what the scene was made of', InputError):
+    with refuses(
+        f'{key} of scene "{scene.name}" is fixed at construction and cannot be exchanged', InputError
+    ):
         setattr(scene, key, getattr(scene, key))
     scene.name = "another"
 

@@ -38,7 +38,10 @@ def test_a_folder_does_not_shadow_a_name_without_a_word(tmp_path, monkeypatch):
         (tmp_path / name).mkdir()
         folder(tmp_path / name)
         scene = pn.load(name)
-        assert any(f'"{name}" of the working directory is not what was loaded' in n for n in scene.notes)
+        assert any(
+            f'"{name}" of the working directory is not loaded, since it is the name of a robot' in n
+            for n in scene.notes
+        )
         assert list(scene.model.names) != list(pn.load(f"./{name}").model.names)
 
 

@@ -94,7 +94,7 @@ def test_loops_that_depend_on_each_other_beyond_the_tolerance_are_told(tmp_path)
     text = file.read_text().replace('name="tip2" pos="0.1 0.0 1"', 'name="tip2" pos="0.10003 0 1"')
     file.write_text(text.replace('name="hole2" pos="2 0 0"', 'name="hole2" pos="2.00003 0 0"'))
     (note,) = [note for note in pn.load(file).notes if "beyond the tolerance of the assembly" in note]
-    assert "they may lock what should move; load(..., assembly_tolerance=0.0001)" in note
+    assert "they may lock intended motion; load(..., assembly_tolerance=0.0001)" in note
     scene = pn.load(file, assembly_tolerance=1e-4)
     assert scene.solve(*scene.initial_state()).rank == 3
 

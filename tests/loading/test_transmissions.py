@@ -252,9 +252,12 @@ REFUSED = [
     ({"mu": 0.1}, "mu needs the lead_angle of the thread on a JointCoupling"),
     (
         {"efficiency": 0.9, "radius": 0.1},
-        'radius is of a bearing, and "mesh" is a JointCoupling; leave it out',
+        'radius is a parameter of a bearing, and "mesh" is a JointCoupling; leave it out',
     ),
-    ({"efficiency": 0.9, "span": 0.1}, 'span is of a bearing, and "mesh" is a JointCoupling; leave it out'),
+    (
+        {"efficiency": 0.9, "span": 0.1},
+        'span is a parameter of a bearing, and "mesh" is a JointCoupling; leave it out',
+    ),
 ]
 
 
@@ -286,6 +289,7 @@ def test_refused_everywhere(arguments, message):
 
 def test_teeth_are_no_part_of_a_joint():
     with refuses(
-        'efficiency is of a JointCoupling, and joint "one" is JointModelRY; leave it out', pn.InputError
+        'efficiency is a parameter of a JointCoupling, and joint "one" is JointModelRY; leave it out',
+        pn.InputError,
     ):
         gears(pn.JointFriction("one", efficiency=0.9))

@@ -133,7 +133,7 @@ UNREAD = {
     ),
     "two origins": (
         joint("j", "base", "x", inside='<origin xyz="1 2 3"/>'),
-        'of repeated elements the first counts: <origin> in joint "j"',
+        'elements are ignored after the first of their kind: <origin> in joint "j"',
     ),
 }
 
@@ -218,7 +218,7 @@ def test_materials_that_are_defined_twice_and_colors_that_are_none_are_told(tmp_
         robot(red, red, *ARM, link("x", inside=shape.format('<material name="m"/>')), joint("j", "base", "x"))
     )
     scene = pn.load(file)
-    assert 'of materials defined twice the first counts: "m"' in scene.notes
+    assert 'materials defined twice keep their first definition: "m"' in scene.notes
     assert scene.visual_model.ngeoms == 1
     file.write_text(robot(*ARM, link("x", inside=shape.format(loud)), joint("j", "base", "x")))
     scene = pn.load(file)

@@ -108,17 +108,20 @@ def test_what_falls_has_no_rest():
 
 def test_a_drive_stronger_than_the_weight_is_named():
     """A bar of 1 kg and 1 m turns under 20 N m, and its weight holds 4.905 of them at most."""
-    drives = 'the drive of joint "swing", 20 (N or N m), exceeds what holds it: where the least is left, '
-    held = "the drives push with 20 along a motion that the constraints allow, and all else holds 4.9 of it"
+    drives = 'the drive of joint "swing", 20 (N or N m), exceeds all resistance: at the smallest '
+    held = (
+        "unbalanced force the drives push with 20 along a motion that the constraints allow, and all else "
+        "holds 4.9 of it"
+    )
     with refuses(drives + held + "; drive less, or hold more", pn.EquilibriumError):
         pn.equilibrium(pendulum(), tau=[20.0], starts=FEW)
     driven = pn.Scene(pendulum().model, actuation=[20.0], laws=[pn.JointFriction("swing", coulomb=30.0)])
-    with refuses("dry friction counts for nothing here: `rest` tells whether it holds", pn.EquilibriumError):
+    with refuses("dry friction is ignored here, and `rest` includes it", pn.EquilibriumError):
         pn.equilibrium(driven, starts=FEW)
     assert pn.rest(driven).rests
     weightless = pendulum().model
     weightless.gravity = pin.Motion.Zero()
-    with refuses('joint "swing", 1e-06 (N or N m), exceeds what holds it', pn.EquilibriumError):
+    with refuses('joint "swing", 1e-06 (N or N m), exceeds all resistance', pn.EquilibriumError):
         pn.equilibrium(pn.Scene(weightless), tau=[1e-6], starts=FEW)
 
 

@@ -17,8 +17,14 @@ OPENERS = ("what", "where", "of", "those")
 WORD = re.compile(r"[A-Za-z][A-Za-z'’-]*")
 CODE_SPAN = re.compile(r"``[^`]*``|`[^`]*`")
 SENTENCE_END = re.compile(r"(?<=[.!?])\s+(?=[`\"'(]*[A-Za-z])")
+ITEM_END = re.compile(r"(?<=[.!?])[*]*\s+(?=[`\"'(*\[]*[A-Z0-9])")
 FIELD = re.compile(r"^\s*[*]{0,2}[\w., *`=\[\]|]+(\(.*?\))?: ")  # "q: configuration (nq,)" of a docstring
-SUFFIXES = {".py", ".hpp", ".cpp", ".js", ".css", ".md"}
+ARGUMENT = re.compile(r"^\w+: \w+ must ")  # "plot: what must be ..." of a message names an argument
+C_STRING = r'"(?:[^"\\\n]|\\.)*"'
+C_STRINGS = re.compile(rf"{C_STRING}(?:\s*{C_STRING})*")
+JS_STRING = re.compile(r"\"(?:[^\"\\\n]|\\.)*\"|'(?:[^'\\\n]|\\.)*'|`(?:[^`\\]|\\.)*`")
+C_COMMENT = re.compile(r"(?:^|(?<=[\s;{}(),]))//[^\n]*|/\*.*?\*/", re.DOTALL)
+SUFFIXES = {".py", ".pyi", ".hpp", ".cpp", ".js", ".css", ".html", ".md"}
 
 
 @dataclass(frozen=True)
@@ -36,13 +42,14 @@ class Sentence:
 
     @property
     def has_what(self) -> bool:
-        """Check if the sentence has the word `what`."""
-        return "what" in self.words
+        """Check if the sentence has the word `what`, and is no question."""
+        return "what" in self.words and not self.text.endswith("?")
 
     @property
     def has_opener(self) -> bool:
         """Check if the sentence opens with a word that stands for a noun."""
-        return self.text.lstrip("`\"'(*_ ").split(" ", 1)[0].lower() in OPENERS
+        first = self.text.lstrip("`\"'(*_ ").split(" ", 1)[0].lower()
+        return first in OPENERS and not self.text.endswith("?")
 
 
 @dataclass(frozen=True)
@@ -65,14 +72,42 @@ class Counts:
 
 
 def sentences_of(path: Path) -> list[Sentence]:
-    """Return the sentences of the comments and docstrings of a source, or of the text of a page."""
+    """Return the sentences of the comments, docstrings and literals of a source, or of the text of a page."""
     text = path.read_text()
-    if path.suffix == ".py":
-        blocks = [*_docstrings(text), *_python_comments(text)]
+    if path.suffix in {".py", ".pyi"}:
+        blocks = [*_docstrings(text), *_python_comments(text), *_python_literals(text)]
     elif path.suffix == ".md":
         blocks = list(_paragraphs(text))
+    elif path.suffix == ".html":
+        blocks = list(_html_texts(text))
     else:
-        blocks = list(_c_comments(text))
+        blocks = [*_c_comments(text), *_c_literals(text, path.suffix)]
+    return _long_sentences(path, blocks)
+
+
+def literal_sentences_of(path: Path) -> list[Sentence]:
+    """Return the sentences of the string literals of a source: messages, help texts, texts of replays."""
+    text = path.read_text()
+    if path.suffix in {".py", ".pyi"}:
+        return _long_sentences(path, list(_python_literals(text)))
+    return _long_sentences(path, list(_c_literals(text, path.suffix)))
+
+
+def bullets_of(path: Path) -> Iterator[tuple[int, list[str]]]:
+    """Yield the line and the sentences of each item of the lists of a Markdown page."""
+    items: list[tuple[int, list[str]]] = []
+    is_item = False
+    for number, line in enumerate(path.read_text().splitlines(), 1):
+        if line.startswith("- "):
+            items.append((number, []))
+        is_item = line.startswith("- ") or (is_item and line.startswith("  "))
+        if is_item:
+            items[-1][1].append(line.strip().removeprefix("- "))
+    for number, lines in items:
+        yield number, ITEM_END.split(" ".join(lines))
+
+
+def _long_sentences(path: Path, blocks: list[tuple[int, str]]) -> list[Sentence]:
     found = [
         Sentence(path, line, piece)
         for line, block in blocks
@@ -106,6 +141,34 @@ def _docstrings(text: str) -> Iterator[tuple[int, str]]:
                 yield first + offset, block
 
 
+def _python_literals(text: str) -> Iterator[tuple[int, str]]:
+    """Yield paragraphs of the string literals that are no docstrings, with code spans for fields."""
+    tree = ast.parse(text)
+    documented = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+    read = {id(node.body[0].value) for node in ast.walk(tree)
+            if isinstance(node, documented) and ast.get_docstring(node) is not None}  # fmt: skip
+    for node in ast.walk(tree):
+        if isinstance(node, ast.JoinedStr):
+            read |= {id(part) for part in node.values}
+            string = "".join(str(p.value) if isinstance(p, ast.Constant) else "`x`" for p in node.values)
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in read:
+            string = node.value
+        else:
+            continue
+        for block in re.split(r"\n\s*\n", string):
+            yield node.lineno, ARGUMENT.sub("", " ".join(block.split()))
+
+
+def _c_literals(text: str, suffix: str) -> Iterator[tuple[int, str]]:
+    code = C_COMMENT.sub(lambda comment: "\n" * comment.group().count("\n"), text)
+    for match in (JS_STRING if suffix == ".js" else C_STRINGS).finditer(code):
+        string = match.group() if suffix == ".js" else "".join(re.findall(rf"{C_STRING}", match.group()))
+        yield (
+            code.count("\n", 0, match.start()) + 1,
+            re.sub(r"\$\{[^}]*\}", "`x`", string.replace('"', "")).strip("'`"),
+        )
+
+
 def _python_comments(text: str) -> Iterator[tuple[int, str]]:
     lines: dict[int, str] = {}
     alone = set()
@@ -132,6 +195,12 @@ def _c_comments(text: str) -> Iterator[tuple[int, str]]:
         block = [re.sub(r"^\s*\*+", "", line) for line in match.group(1).splitlines()]
         for offset, piece in _blocks(block):
             yield first + offset, piece
+
+
+def _html_texts(text: str) -> Iterator[tuple[int, str]]:
+    """Yield the texts and titles between the tags of a page."""
+    for match in re.finditer(r'>([^<>]+)<|(?:title|aria-label)="([^"]*)"', text):
+        yield text.count("\n", 0, match.start()) + 1, match.group(1) or match.group(2)
 
 
 def _joined(lines: dict[int, str], alone: set[int]) -> Iterator[tuple[int, str]]:

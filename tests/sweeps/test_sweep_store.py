@@ -285,7 +285,7 @@ class Stubborn:
 
 def test_what_cannot_be_sent_is_named():
     lock = threading.Lock()
-    reason = "must be such that another process can have it; TypeError: cannot pickle"
+    reason = "must be picklable for another process; TypeError: cannot pickle"
     with refuses(f"sweep: parameters[1] {reason}", pn.InputError):
         pn.sweep(pendulum, [{"mass": 1.0}, {"mass": Stubborn()}], 0.1, jobs=2)
     with refuses(f"sweep: make {reason}", pn.InputError):

@@ -68,7 +68,7 @@ def test_one_plot_goes_into_given_axes() -> None:
     assert len(left.lines) == 0
     assert len(right.lines) == 3
     assert right.get_title() == "Angles"
-    with pytest.raises(InputError, match=r"^plot: ax takes one plot; what asks for 2$"):
+    with pytest.raises(InputError, match=r"^plot: ax takes one plot; got 2 plots$"):
         plot(four_bar(), what=["q", "v"], ax=left)
 
 

@@ -145,7 +145,7 @@ def test_what_cannot_be_drawn_is_refused() -> None:
 @pytest.mark.parametrize("run", [None, pn.load("four_bar")])
 def test_what_is_no_run_is_refused(run: Any) -> None:
     for draw, what in ((plot, "a figure"), (pn.replay, "a replay")):
-        message = f"{what} shows a Trajectory, what `simulate` returns; got {type(run).__name__}"
+        message = f"{what} shows a Trajectory, the result of `simulate`; got {type(run).__name__}"
         with pytest.raises(InputError, match=f"^{re.escape(message)}$"):
             draw(run)
 

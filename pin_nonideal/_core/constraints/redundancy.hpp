@@ -7,11 +7,11 @@
 namespace pn {
 
 struct RedundancyParameters {
-    // Weights of rows are solved from products of rows, which square the condition number. A second pass therefore
-    // solves for the rest of the dependent row, unless this rest is rounding. [Bjorck: Stability analysis of the method
-    // of seminormal equations, 1987.]
-    double rounding = 1e-14;  // rest of a row that is rounding, relative to the row
-    int most_passes = 2;      // passes, of which the second solves for the rest
+    // A dependent row is a weighted sum of independent rows. Normal equations give its weights, and their products of
+    // rows square the condition number. A second pass therefore repeats the solution for the remainder of the row.
+    // [Bjorck: Stability analysis of the method of seminormal equations, 1987.]
+    double rounding = 1e-14;  // remainder that counts as rounding, relative to the row
+    int most_passes = 2;      // maximum passes
 };
 
 inline constexpr RedundancyParameters redundancy_parameters{};

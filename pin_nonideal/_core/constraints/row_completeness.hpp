@@ -43,7 +43,7 @@ constexpr bool is_complete() {
     static_assert(answers<K>([](const auto& k) -> RoleOf<decltype(k)> { return {}; }),
                   "a kind needs `static constexpr Role role`: a constraint, a contact or a direction of friction");
     static_assert(answers<K>([](const auto& k) -> decltype(k.data(), void()) {}),
-                  "a kind needs `static constexpr auto data()`: what it is made of, by name");
+                  "a kind needs `static constexpr auto data()`: its fields, by name");
     static_assert(answers<K>([](const auto& k) -> decltype(int(k.size())) { return 0; }),
                   "a kind needs `int size() const`: its number of rows");
     static_assert(answers<K>([](const auto& k) -> decltype(bool(k.is_holonomic(0))) { return true; }),
@@ -60,7 +60,7 @@ constexpr bool is_complete() {
     static_assert(answers<K>([](const auto& k) -> ComparableRows<decltype(k)> { return {}; }),
                   "a kind needs `static constexpr bool comparable_rows`: components of one vector");
     static_assert(answers<K>([](const auto& k) -> ShownAs<decltype(k)> { return {}; }),
-                  "a kind needs `static constexpr DisplayKind shown`: what a replay shows of it");
+                  "a kind needs `static constexpr DisplayKind shown`: its display in a replay");
     static_assert(answers<K>([](const auto& k) -> decltype(k.residual(given<At>(), given<RowValues&>())) {}),
                   "a kind needs `residual`: phi(q, t) of each row, with phi_t and phi_tt where it moves");
     static_assert(places<K, At> || answers<K>([](const auto& k) -> decltype(k.rows(given<At>(), given<RowValues&>())) {}),

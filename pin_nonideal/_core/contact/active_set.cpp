@@ -20,7 +20,7 @@ using Choice = std::vector<char>;  // closed flag by gap
 
 }  // namespace
 
-bool goes_its_way(const Program& p, Workspace& w, const VecX& v) {
+bool slip_opposes_friction(const Program& p, Workspace& w, const VecX& v) {
     const double least =
         active_set_parameters.min_direction_acceleration * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
     for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
@@ -62,13 +62,13 @@ struct Search {
         tried.push_back(choice);
         set_closed(p, w, choice);
         try {
-            find_modes(together && (together->is_near || together->closed == choice) ? together : nullptr);
+            find_modes(together && (together->is_initial_guess || together->closed == choice) ? together : nullptr);
         } catch (const Failure& thrown) {
             if (thrown.kind == Failure::Kind::interrupted || thrown.kind == Failure::Kind::not_finite) throw;
             if (!failure) failure = thrown;
             return std::nullopt;
         }
-        if (needs_opposed_friction && !goes_its_way(p, w, v)) return std::nullopt;
+        if (needs_opposed_friction && !slip_opposes_friction(p, w, v)) return std::nullopt;
         if (together && together->slides() && all_stay()) return std::nullopt;
         Choice next = choice;
         int change = pulling_contact(p, w);
@@ -228,11 +228,11 @@ void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, con
     // Load shares of slipping contacts follow friction, unlike those of the cone problem. If friction of unloaded
     // contacts spoils the shares, the loaded contacts alone determine the motion.
     const auto decides_alone = [&](RestingMotion near) {
-        near.is_near = true;
+        near.is_initial_guess = true;
         if (seek(near.closed, &near, true)) return true;
         restart();
         if (near.loaded == near.closed) return false;
-        near.is_near = false;
+        near.is_initial_guess = false;
         near.closed = near.loaded;
         if (seek(near.closed, &near, true)) return true;
         restart();

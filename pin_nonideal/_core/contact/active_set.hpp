@@ -54,7 +54,7 @@ private:
 
 // Check if all slip that begins from rest opposes its friction. If one contact would need tension, other contacts may
 // hide it with friction that violates their own law.
-bool goes_its_way(const Program& p, Workspace& w, const VecX& v);
+bool slip_opposes_friction(const Program& p, Workspace& w, const VecX& v);
 
 // Select the closed contacts among those at rest at (t, q, v). `find_modes` computes the stick-slip modes for closed
 // contacts, or takes them from the joint motion of all contacts if given. On return the workspace holds the motion at

@@ -37,7 +37,7 @@ double longest_single_move(const Program& p, const Workspace& w) {
     return longest;
 }
 
-bool strays_from_planes(const Program& p, Workspace& w, double longest_single) {
+bool left_planes(const Program& p, Workspace& w, double longest_single) {
     const double allowed = max_projected_gap * scene_size(p, w);
     double widest = 0.0;
     for (int i : w.now.touching) {

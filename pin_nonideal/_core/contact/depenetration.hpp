@@ -18,7 +18,7 @@ inline constexpr DepenetrationParameters depenetration_parameters{};
 double longest_single_move(const Program& p, const Workspace& w);
 // Check if projection left closed contacts off their planes, or moved much farther than `longest_single` because planes
 // are nearly parallel.
-bool strays_from_planes(const Program& p, Workspace& w, double longest_single);
+bool left_planes(const Program& p, Workspace& w, double longest_single);
 
 // Move q by the least move in the metric of M to a position that satisfies the constraints. At this position gaps are
 // nonnegative and complementary to compressive multipliers. Contacts that do not touch at this position open. If no

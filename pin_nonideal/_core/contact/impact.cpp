@@ -28,7 +28,7 @@ VecX percussions(const ContactRows& rows, double t, const MatX& W, const VecX& w
                  const std::vector<ConeElement>& elements) {
     VecX P = VecX::Zero(w0.size());
     ConeComplementarity solver;
-    solver.share_alike(rows.gaps.size() > 1);  // a landing face distributes its impulse over all corners
+    solver.use_uniform_compliance(rows.gaps.size() > 1);  // a landing face distributes its impulse over all corners
     const ConeStatus status = solver.solve(W, w0, elements, false, P);
     if (status != ConeStatus::solved) refuse(rows.p, t, rows.gaps, status);
     return P;
@@ -91,7 +91,7 @@ void clean(const ContactRows& rows, double speed, VecX& w0) {
 
 double rest_rate(const VecX& v) { return rest_speed * (1.0 + v.cwiseAbs().maxCoeff()); }
 
-Impact strike(const Program& p, Workspace& w, double t, const VecX& q, VecX& v, const std::vector<char>& touching,
+Impact resolve_impact(const Program& p, Workspace& w, double t, const VecX& q, VecX& v, const std::vector<char>& touching,
               bool bounces) {
     Impact out;
     for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i)

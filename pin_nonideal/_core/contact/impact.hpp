@@ -31,7 +31,7 @@ double rest_rate(const VecX& v);
 // Compute the impact of contacts `touching` (by gap) at (t, q, v). v becomes the velocity after it. Joint friction has
 // a finite limit and gives no impulse. The contacts end closed, their modes undecided. Without `bounces` restitution is
 // ignored, for rebounds that cannot be distinguished from rest.
-Impact strike(const Program& p, Workspace& w, double t, const VecX& q, VecX& v, const std::vector<char>& touching,
+Impact resolve_impact(const Program& p, Workspace& w, double t, const VecX& q, VecX& v, const std::vector<char>& touching,
               bool bounces = true);
 
 }  // namespace pn

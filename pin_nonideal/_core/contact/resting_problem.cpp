@@ -27,7 +27,7 @@ bool RestingMotion::slides() const {
 }
 
 void RestingMotion::answer(const Program& p, Workspace& w, ModeQuestion& question) const {
-    if (is_near) {
+    if (is_initial_guess) {
         question.near = friction;
         return;
     }
@@ -150,7 +150,7 @@ bool RestingProblem::solve(bool& shared) {
     const MatX coupled = W;
     const VecX found = f;
     W = plain;
-    if (take_turns(free)) return true;
+    if (alternate(free)) return true;
     W = coupled;
     w0 = free;
     f = found;
@@ -195,7 +195,7 @@ bool RestingProblem::solve_cones(bool warm, bool& shared) {
 
 // Distribute loads as if friction was given, and iterate with the friction that they cause. Return false without
 // convergence.
-bool RestingProblem::take_turns(const VecX& free) {
+bool RestingProblem::alternate(const VecX& free) {
     bool shared = false;
     for (int turn = 0; turn < parameters.max_load_iterations; ++turn) {
         const VecX before = f;

@@ -19,7 +19,7 @@ struct RestingMotion {
     std::vector<Vec3> friction;   // friction of each element, along its directions
     bool several = false;         // rest is admissible, and a motion from rest as well
     bool shared = false;          // contacts are hyperstatic
-    bool is_near = false;         // only an initial guess for the search of the motion
+    bool is_initial_guess = false;  // true if this is only an initial guess for the search of the motion
 
     bool slides() const;  // some contact slips or begins to slip
     // Set the modes of elements at rest and their slip directions at onset. An initial guess sets its friction only.
@@ -87,7 +87,7 @@ private:
     bool moves() const;
     bool release();
     bool solve_cones(bool warm, bool& shared);
-    bool take_turns(const VecX& free);
+    bool alternate(const VecX& free);
 
     const Program& p;
     Workspace& w;

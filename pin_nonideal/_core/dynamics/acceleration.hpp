@@ -21,7 +21,8 @@ double solve_scaled(const Program& p, Workspace& w, VecX& x, const Force* body, 
 // Light bodies trigger iterative refinement. `body` adds forces on the bodies of deep trees.
 void solve_acceleration(const Program& p, Workspace& w, const VecX& force, const VecX& b, VecX& a, VecX& lam,
                         const std::vector<Force>* body = nullptr);
-// Solve the current motion for F, plus C if `with_laws`: w.now.a and w.now.lam for w.now.b, or the given b, a and lam.
+// Compute acceleration and multipliers of the current motion under the force F, or F + C if `with_laws`. The short form
+// reads the right-hand side w.now.b, and writes w.now.a and w.now.lam.
 void solve_motion(const Program& p, Workspace& w, bool with_laws);
 void solve_motion(const Program& p, Workspace& w, bool with_laws, const VecX& b, VecX& a, VecX& lam);
 

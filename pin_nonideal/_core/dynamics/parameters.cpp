@@ -81,7 +81,7 @@ NumberLocation find_number(Program& p, const NumberName& name) {
         if (name.argument == "com") return vector(joint.com);
         return vector(joint.inertia.c[name.argument == "inertia x" ? 0 : name.argument == "inertia y" ? 1 : 2]);
     }
-    if (name.call == "let_open") return member(p.gaps.at(name.index), name, {{"restitution", &Gap::restitution}});
+    if (name.call == "set_unilateral") return member(p.gaps.at(name.index), name, {{"restitution", &Gap::restitution}});
     for (const char* law : {"add_friction", "add_viscous", "add_drag", "add_sigmoid", "add_lugre"})
         if (name.call == law) return of_law(p, name);
     return of_force(p, name);

@@ -19,8 +19,9 @@ namespace pn {
 // converges well.
 constexpr int projection_limit = 12;
 
-// Rank tolerance while elements stick. A direction held by a smaller part of their forces counts as free. It is the
-// square root of response_rank_threshold (complementarity/box_lcp.hpp), because a response is a square of rows.
+// Rank tolerance of the rows while elements stick. A motion is free if sticking elements would hold it with less than
+// this part of their forces. The value is the square root of response_rank_threshold (complementarity/box_lcp.hpp), since
+// a response is quadratic in the rows.
 constexpr double rank_tolerance_sticking = 3e-7;
 
 struct Counters {
@@ -40,13 +41,13 @@ struct RunState {
     std::vector<Vec3> slip_direction, last_direction;
     std::vector<char> is_sticking_deferred;  // keeps its slip mode at rest: only rounding decides the direction
     bool seeks_directions = false;  // steps solve for last_direction: slip is too slow to define it
-    bool indeterminate = false;   // sticking elements are hyperstatic: their multipliers are not unique
+    bool is_hyperstatic = false;   // multipliers of sticking elements are not unique
     double rank_tolerance = rank_tolerance_sticking;  // tolerance of the rows while elements stick, in these modes
     VecX z;                       // states of laws, at the last evaluated stage
     VecX held_torque;             // torque of sampled control
     bool has_held = false;
     VecX unknown;                 // last solution of the implicit reaction equation, by element and law (warm start)
-    bool warm = false;
+    bool warm = false;             // true if `unknown` is an initial guess for the next solution
     VecX percussion;  // impulses of contacts and friction in the last time step, by row and divided by its length
     VecX third_order_lam;         // third-order multipliers of the step, divided by its cubed length
     bool has_ideal_row_choice = false;   // rows that are independent without sticking elements are chosen for this step
@@ -59,8 +60,8 @@ struct RunState {
 
 // Loads of joints, anchors and contacts in the current motion (dynamics/reactions.hpp).
 struct Reactions {
-    bool current = false;  // computed for the current motion
-    bool swept = false;    // joint reactions are computed too
+    bool current = false;  // true if the loads are those of the current motion
+    bool swept = false;    // true if joint reactions are computed too
     bool loads_are_feasible = true;   // all unilateral contacts with redundant loads can be in compression
     // Unilateral contacts with zero load, chosen so that no contact that shares their load has tension. While this set
     // is frozen, loads are linear in the motion, and tension is possible.
@@ -75,7 +76,7 @@ struct Reactions {
 // Results of one evaluation at (t, q, v).
 struct Evaluation {
     Terms terms;
-    bool frozen = false;  // functions of time are constant: rows have zero right-hand sides b
+    bool frozen = false;  // true if functions of time are constant: rows have zero right-hand sides b
     // Time interval in which rows are evaluated. At its ends, where functions of time break, use the limits from
     // inside.
     double not_before = -HUGE_VAL, not_after = HUGE_VAL;
@@ -103,7 +104,7 @@ struct Evaluation {
     Reactions reactions;
     VecX holding;                     // M a - F - C - A^T lam: forces that hold the locked dofs
     bool has_holding = false;
-    bool ideal = false;               // the motion is due to the ideal constraints alone
+    bool ideal = false;               // true if the motion is due to the ideal constraints alone
     std::vector<SlipLimits> load;     // limits at rest before the static ratio
     std::vector<double> limit;        // kinetic limit of each element
     std::vector<Vec3> slip_force;     // force of each slipping element, along its directions
@@ -111,8 +112,8 @@ struct Evaluation {
     VecX dz;
     VecX v;                           // velocity, if laws act
     double speed = 0.0;               // largest component of v
-    bool several = false;             // some element at rest may either slip or stick
-    bool no_motion = false;           // no motion exists for the modes at the end of a time step
+    bool several = false;             // true if some element at rest may either slip or stick
+    bool no_motion = false;           // true if no motion exists for the modes at the end of a time step
     int several_element = 0;          // element whose friction differs most between several motions, or that allows none
     double determinant = 1.0;         // det(I - dg/dy) of the implicit reaction equation
     std::vector<Force> body_force;    // given forces on bodies

@@ -25,7 +25,7 @@ struct EachChoice {
     const VecX &q, &v;
     const ModeQuestion& question;
     std::vector<std::vector<Mode>> motions;  // modes whose motions satisfy the conditions of these modes
-    bool shown = true;                       // no motion exists for the other modes, as proven
+    bool shown = true;                       // true if all other modes are proven to have no motion
     double determinant = 0.0;                // smallest determinant of the modes without a motion
 
     // Decode `number` into modes: each element sticks or slips in either direction. Return false if an element at its

@@ -127,7 +127,7 @@ struct Search {
     }
 
     // Alternate between forces and load-dependent limits. Return false if the iteration does not converge.
-    bool take_turns(std::vector<Mode>& modes) {
+    bool alternate(std::vector<Mode>& modes) {
         FrictionProblem problem(p, w, list);
         problem.clean(p, w);
         problem.alpha0 = problem.slip_accelerations(p, w);
@@ -184,7 +184,7 @@ struct Search {
         bool found = false;
         try {
             unload(false);
-            found = take_turns(modes);
+            found = alternate(modes);
             loads_are_feasible = !found || reactions(p, w).loads_are_feasible;
         } catch (const Failure& failure) {  // elements at rest do not have their final forces here
             if (failure.kind != Failure::Kind::paradox) throw;

@@ -12,8 +12,8 @@ namespace pn {
 
 struct StickSlipParameters {
     double limit_tolerance = 1e-12;  // relative change of the limits at convergence
-    // Change of a limit that counts as rounding, relative to the largest given force. Far from the loads of a long
-    // chain limits are as small as that.
+    // Change of a limit that counts as rounding, relative to the largest given force. A limit in a part of a
+    // long chain without large loads may be as small as this rounding.
     double limit_force_rounding = 64 * std::numeric_limits<double>::epsilon();
     int max_limit_iterations = 100;  // maximum iterations of forces and limits
 };

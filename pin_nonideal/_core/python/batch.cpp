@@ -105,7 +105,7 @@ std::vector<RunSamples> run_all(const Program& p, const Array2& q, const Array2&
         if (stopped) throw Failure(Failure::Kind::interrupted, t);
     };
     const auto q_all = map(q), v_all = map(v);
-    share_out(parts, threads, stopped, [&](size_t part, int k) {
+    parallel_for(parts, threads, stopped, [&](size_t part, int k) {
         RunSamples mine;
         for (size_t i = part * count / parts; i < (part + 1) * count / parts && !stopped; ++i) {
             const Program& program = programs.of(i, k);
@@ -135,7 +135,7 @@ nb::tuple rollout_arrays(const Program& p, const Array2& q, const Array2& v, con
                                   {&RunSamples::q, nq, runs, max_samples},
                                   {&RunSamples::v, nv, runs, max_samples}};
     std::atomic<bool> interrupted{false};
-    share_out(all.size(), threads, interrupted, [&](size_t part, int) {
+    parallel_for(all.size(), threads, interrupted, [&](size_t part, int) {
         for (const PaddedArray& each : padded) {
             each.copy(all[part], first[part]);
             (all[part].*each.field) = {};

@@ -31,7 +31,7 @@ int Builder::add(const std::string& name, Kind kind, Role role) {
     return index;
 }
 
-void Builder::let_open(double restitution) {
+void Builder::set_unilateral(double restitution) {
     p->contacts.pop_back();
     p->gaps.push_back({p->constraints - 1, restitution, {}, -1});
     p->first_gap = p->gaps.front().block;
@@ -177,11 +177,11 @@ void bind_actuation(nb::class_<Builder>& builder) {
 }
 
 void bind_enums(nb::module_& m) {
-    nb::enum_<Provider>(m, "Provider", "Who computes kinematics, M and the bias forces.")
+    nb::enum_<Provider>(m, "Provider", "Provider of kinematics, M and bias forces.")
         .value("core", Provider::core)
         .value("pinocchio", Provider::pinocchio);
     using Load = Friction::Load;
-    nb::enum_<Load>(m, "Load", "What loads the bearing that rubs.")
+    nb::enum_<Load>(m, "Load", "Load on which the friction limit of a bearing depends.")
         .value("none", Load::none)
         .value("revolute", Load::revolute)
         .value("prismatic", Load::prismatic)
@@ -189,11 +189,11 @@ void bind_enums(nb::module_& m) {
         .value("planar", Load::planar)
         .value("multiplier", Load::multiplier)
         .value("user", Load::user);
-    nb::enum_<Mode>(m, "Mode", nb::is_arithmetic(), "How a frictional element moves: slip one way or the other, or rest.")
+    nb::enum_<Mode>(m, "Mode", nb::is_arithmetic(), "Mode of a friction element: slip in either direction, or stick.")
         .value("slip_minus", slip_minus)
         .value("sticking", sticking)
         .value("slip_plus", slip_plus)
-        .value("unloaded", unloaded, "carries no friction: its contact is open, or what asks does so without it");
+        .value("unloaded", unloaded, "no friction: the contact is open, or the caller removes the friction");
     nb::enum_<DisplayKind>(m, "DisplayKind", "Display of a constraint in a replay.")
         .value("nothing", DisplayKind::nothing)
         .value("anchor", DisplayKind::anchor)
@@ -203,10 +203,10 @@ void bind_enums(nb::module_& m) {
         .value("edge", DisplayKind::edge)
         .value("drive", DisplayKind::drive)
         .value("gear", DisplayKind::gear);
-    nb::enum_<ImpactLaw>(m, "ImpactLaw", "What restitution means in an impact.")
-        .value("newton", ImpactLaw::newton, "rate at which a gap opens over that at which it closed")
-        .value("poisson", ImpactLaw::poisson, "impulse of expansion over that of compression");
-    nb::enum_<Reaction>(m, "Reaction", "Of which motion a law reads the reactions.")
+    nb::enum_<ImpactLaw>(m, "ImpactLaw", "Definition of restitution in an impact.")
+        .value("newton", ImpactLaw::newton, "opening rate of a gap over its closing rate")
+        .value("poisson", ImpactLaw::poisson, "impulse of expansion over impulse of compression");
+    nb::enum_<Reaction>(m, "Reaction", "Motion whose reactions a law reads.")
         .value("none", Reaction::none)
         .value("ideal", Reaction::ideal)
         .value("total", Reaction::total);
@@ -218,7 +218,7 @@ nb::class_<Builder> bind_builder(nb::module_& m) {
     bind_enums(m);
     nb::class_<Builder> builder(m, "Builder");
     builder.def(nb::init<nb::object, Provider>(), "model"_a, "terms"_a = Provider::core)
-        .def("keep_rows", [](Builder& b, int block, std::vector<int> rows) {
+        .def("select_rows", [](Builder& b, int block, std::vector<int> rows) {
             b.p->blocks[block].kept = std::move(rows);
         }, "block"_a, "rows"_a)
         .def("add_copy", [](Builder& b, int row, int first, double factor) {
@@ -227,7 +227,7 @@ nb::class_<Builder> bind_builder(nb::module_& m) {
         .def("add_breaks", [](Builder& b, const std::vector<double>& times) {
             b.p->breaks.insert(b.p->breaks.end(), times.begin(), times.end());
         }, "times"_a)
-        .def("let_open", &Builder::let_open, "restitution"_a)
+        .def("set_unilateral", &Builder::set_unilateral, "restitution"_a)
         .def("set_impact", [](Builder& b, ImpactLaw law) { b.p->impact_law = law; }, "law"_a)
         .def("order_contacts", &Builder::order_contacts, "blocks"_a)
         .def("finish", &Builder::finish);

@@ -18,7 +18,7 @@ struct Builder {
     int add(const std::string& name, Kind kind, Role role);
     int add_law(const std::string& name);
     // Make the contact that was added last unilateral. Unilateral contacts follow all bilateral contacts.
-    void let_open(double restitution);
+    void set_unilateral(double restitution);
     // Order the rows of contacts like these blocks.
     void order_contacts(const std::vector<int>& blocks);
     // Return an independent program, which later additions do not change.

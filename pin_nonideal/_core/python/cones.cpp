@@ -37,7 +37,7 @@ struct ConeSolver {
 
 void bind_cones(nb::module_& m) {
     constexpr auto own = nb::rv_policy::automatic;
-    nb::enum_<ConeStatus>(m, "ConeStatus", "What came of a problem of contacts and friction.")
+    nb::enum_<ConeStatus>(m, "ConeStatus", "Result of a problem of contacts and friction.")
         .value("solved", ConeStatus::solved)
         .value("infeasible", ConeStatus::infeasible)
         .value("jammed", ConeStatus::jammed)

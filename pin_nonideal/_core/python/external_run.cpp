@@ -32,7 +32,7 @@ struct ExternalRunOwner {
     Options options;
     Workspace w;
     Recording out;
-    FollowedRun run;
+    ExternalRun run;
 
     ExternalRunOwner(std::shared_ptr<const Program> program, const Options& asked, const Tick& tick,
              const std::vector<UserEventTuple>& events)
@@ -64,7 +64,7 @@ struct ExternalRunOwner {
 
 void bind_followed(nb::module_& m) {
     constexpr auto own = nb::rv_policy::automatic;
-    nb::class_<ExternalRunOwner>(m, "FollowedRun")
+    nb::class_<ExternalRunOwner>(m, "ExternalRun")
         .def(nb::init<std::shared_ptr<const Program>, const Options&, const Tick&, const std::vector<UserEventTuple>&>(),
              "program"_a, "options"_a, "tick"_a = nb::none(), "events"_a = std::vector<UserEventTuple>())
         .def("start", [](ExternalRunOwner& f, const Array& q, const Array& v) { f.run.start(map(q), map(v)); }, "q"_a, "v"_a)

@@ -29,11 +29,11 @@ nb::object failure_object(const Failure& failure) {
 void bind_failures(nb::module_& m) {
     using Kind = Failure::Kind;
     using Solutions = Failure::Solutions;
-    nb::enum_<Solutions>(m, "Solutions", "What is shown of the motions under friction that a paradox leaves.")
+    nb::enum_<Solutions>(m, "Solutions", "Proven number of motions under friction at a paradox.")
         .value("not_told", Solutions::not_told)
         .value("none", Solutions::none)
         .value("several", Solutions::several);
-    nb::enum_<Kind>(m, "FailureKind", "Why an evaluation or a run could not go on.")
+    nb::enum_<Kind>(m, "FailureKind", "Cause of the failure of an evaluation or a run.")
         .value("singular_mass", Kind::singular_mass, "elements: the degree of freedom")
         .value("inconsistent", Kind::inconsistent, "elements: blocks of rows; value: residual")
         .value("not_finite", Kind::not_finite)
@@ -44,7 +44,7 @@ void bind_failures(nb::module_& m) {
         .value("step_size", Kind::step_size, "value: number of steps so far, when it would never end")
         .value("stiff", Kind::stiff, "elements: the degree of freedom; value: rate")
         .value("growing", Kind::growing,
-               "elements: the degree of freedom, and what feeds it: 0 the actuation, 1 given forces, 2 laws; value: rate")
+               "elements: the degree of freedom, and its cause: 0 the actuation, 1 given forces, 2 laws; value: rate")
         .value("steps", Kind::steps, "value: number of steps, which is all that the run may take")
         .value("wall", Kind::wall, "value: wall time, which is all that the run may take")
         .value("interrupted", Kind::interrupted);

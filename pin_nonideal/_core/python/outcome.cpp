@@ -47,7 +47,7 @@ auto dense(nb::handle_t<Outcome> run) {
 
 void bind_outcome(nb::module_& m) {
     using R = Recording;
-    nb::enum_<Event::Kind> kinds(m, "EventKind", "What happened between two smooth stretches of a run.");
+    nb::enum_<Event::Kind> kinds(m, "EventKind", "Kind of an event between two smooth parts of a run.");
     for (const EventKind& each : event_kinds) kinds.value(each.name, each.kind, each.meaning);
     nb::class_<Event>(m, "Event")
         .def_ro("time", &Event::time)

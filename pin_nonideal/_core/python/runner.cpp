@@ -60,7 +60,7 @@ void Runner::choose_contacts(double t, const std::optional<std::vector<Mode>>& m
         update_kinematics(*p, *w, t, q, v);
         choose_friction(t, modes, together);
     });
-    if (!modes && !goes_its_way(*p, *w, v)) throw Failure(Failure::Kind::not_converged, t, w->now.slipping);
+    if (!modes && !slip_opposes_friction(*p, *w, v)) throw Failure(Failure::Kind::not_converged, t, w->now.slipping);
 }
 
 void Runner::choose_friction(double t, const std::optional<std::vector<Mode>>& modes, const RestingMotion* together) {

@@ -135,7 +135,7 @@ static std::tuple<Numbers, Numbers, Numbers, Numbers> nearest_states(const Progr
     RunPrograms programs(p, names, values, useful);
     std::vector<std::unique_ptr<Workspace>> spaces(useful);
     std::atomic<bool> stopped{false};
-    share_out(q.rows(), threads, stopped, [&](size_t i, int k) {
+    parallel_for(q.rows(), threads, stopped, [&](size_t i, int k) {
         const Program& mine = programs.of(i, k);
         // A workspace caches terms of its configuration, which other parameters change.
         if (!spaces[k] || !names.empty()) spaces[k] = std::make_unique<Workspace>(mine);
@@ -194,7 +194,7 @@ static nb::typed<nb::list, std::optional<Outcome>> rollout(const Program& p, con
     options.tick = stop;
     const auto q_all = map(q), v_all = map(v);
     try {
-        share_out(count, threads, stopped, [&](size_t i, int k) {
+        parallel_for(count, threads, stopped, [&](size_t i, int k) {
             const bool anew = !names.empty() || options.record.dense;
             Room& room = rooms[k];
             room.carry(programs.of(i, k), k == 0 ? own : options, anew, q_all.row(i), v_all.row(i));

@@ -19,7 +19,7 @@ inline int useful_threads(size_t count, int threads) { return static_cast<int>(s
 // Call work(i, k) for every i below `count`, drawn from one counter by threads k. Thread 0 is the caller's. An
 // exception of a thread, or a Python signal, stops the loop and is thrown at the end.
 template <class Work>
-void share_out(size_t count, int threads, std::atomic<bool>& stopped, Work work) {
+void parallel_for(size_t count, int threads, std::atomic<bool>& stopped, Work work) {
     nb::gil_scoped_release release;
     std::atomic<size_t> next{0};
     std::mutex mutex;

@@ -10,7 +10,7 @@
 
 namespace pn {
 
-void FollowedRun::derivative(double at, const VecX& y_outside, VecX& rate_outside) {
+void ExternalRun::derivative(double at, const VecX& y_outside, VecX& rate_outside) {
     inside_ = inside_rate_ = VecX::Zero(system.ny);
     inside_.head(system.ns) = y_outside;
     system.derivative(at, inside_, inside_rate_);
@@ -18,7 +18,7 @@ void FollowedRun::derivative(double at, const VecX& y_outside, VecX& rate_outsid
 }
 
 // Positions use an absolute step, which stays small after many turns of a joint.
-MatX FollowedRun::jacobian(double at, const VecX& y_outside) {
+MatX ExternalRun::jacobian(double at, const VecX& y_outside) {
     const int n = system.ns;
     MatX out = MatX::Zero(n, n);
     VecX ahead = y_outside, back = y_outside, rate_ahead(n), rate_back(n);
@@ -34,7 +34,7 @@ MatX FollowedRun::jacobian(double at, const VecX& y_outside) {
     return out;
 }
 
-std::optional<int> FollowedRun::singular_onset() {
+std::optional<int> ExternalRun::singular_onset() {
     for (int e : w.now.slipping) {
         const Friction& friction = p.frictions[e];
         if (friction.dim == 1 || !at_rest(p, w, e, system.v)) continue;
@@ -47,12 +47,12 @@ std::optional<int> FollowedRun::singular_onset() {
 
 // Check if a chatter event was recorded less than `ChatterParameters::window` ago. Implicit steps then keep the modes and
 // locate no events.
-bool FollowedRun::bridges_cluster() const {
+bool ExternalRun::bridges_cluster() const {
     return !out.events.empty() && out.events.back().kind == Event::Kind::chatter &&
-           progress.t < out.events.back().time + Clusters::parameters.window;
+           progress.t < out.events.back().time + ChatterDetector::parameters.window;
 }
 
-bool FollowedRun::follow(double end, const OutsideStep::Interpolant& interpolant) {
+bool ExternalRun::follow(double end, const OutsideStep::Interpolant& interpolant) {
     between_steps();
     progress.numerical_energy = numerical_energy_before_;
     stepper.y0 = progress.y;

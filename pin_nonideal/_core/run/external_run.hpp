@@ -10,7 +10,7 @@
 
 namespace pn {
 
-struct FollowedRunParameters {
+struct ExternalRunParameters {
     // Relative step of central differences: cube root of the unit roundoff, which balances rounding and truncation
     // errors.
     double derivative_step = 6e-6;
@@ -20,9 +20,9 @@ struct FollowedRunParameters {
     double least_onset = 1.0 / 30.0;
 };
 
-class FollowedRun : public Simulation {
+class ExternalRun : public Simulation {
 public:
-    using Parameters = FollowedRunParameters;
+    using Parameters = ExternalRunParameters;
     static constexpr Parameters parameters{};
 
     using Simulation::Simulation;

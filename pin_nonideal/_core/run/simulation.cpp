@@ -21,13 +21,13 @@ Simulation::Simulation(const Program& program, Workspace& workspace, const Optio
       floor(system, stepper, norm, progress, recording), growth(system, progress, run_options, recording),
       watch(system, progress.gaps),
       locator(system, stepper, norm, progress.slip_at_start, progress.in_tension, watch), hand_over(system, progress),
-      output(system, stepper, progress, run_options, recording), notices(system, stepper, progress, recording),
+      output(system, stepper, progress, run_options, recording), warnings(system, stepper, progress, recording),
       value_events(run_options.events, system, stepper, progress), breaks(system, progress, output, recording),
       torques(system, progress, run_options, output, breaks),
-      landing(system, progress, watch, run_options, output, recording),
-      time_stepping(system, progress, watch, run_options, torques, output, notices, value_events, recording),
-      clusters(system, progress, run_options, stiffness, time_stepping, recording),
-      modes(system, progress, run_options, torques, output, landing, clusters, recording) {
+      impacts(system, progress, watch, run_options, output, recording),
+      time_stepping(system, progress, watch, run_options, torques, output, warnings, value_events, recording),
+      chatter(system, progress, run_options, stiffness, time_stepping, recording),
+      modes(system, progress, run_options, torques, output, impacts, chatter, recording) {
     progress.y = progress.rate = progress.configured_y = VecX::Zero(system.ny);
     // Time stepping solves for velocities. Accelerations are only recorded, so the solution nearest to the last one
     // suffices.
@@ -51,17 +51,17 @@ void Simulation::start(const VecX& q0, const VecX& v0) {
     torques.sample();
     if (system.ng > 0) {
         set_closed(p, w, std::vector<char>(p.gaps.size(), 0));
-        landing.strike(true);
+        impacts.resolve_impacts(true);
     }
     if (options.method.scheme == Method::Scheme::moreau && system.ng > 0) {
         time_stepping.begin(options.dt);
     } else {
         switch_modes(system, progress.t, progress.y, progress.rate, std::nullopt);
-        landing.remember_gaps();
+        impacts.remember_gaps();
     }
     output.now();
-    notices.pulls(std::nullopt);
-    notices.several(false);
+    warnings.pulls(std::nullopt);
+    warnings.several(false);
     value_events.start(progress.t, progress.y);
     progress.h = options.dt;
     if (options.method.adaptive()) {
@@ -293,18 +293,18 @@ bool Simulation::leaves_rate(const Proposal& proposal) const {
 // If no step is short enough, continue from the step's start with other modes or by time stepping. Return false if
 // neither applies.
 bool Simulation::goes_on(const Failure& failure) {
-    const bool may_end = modes.may_end(failure);
-    const bool at_hand_over = hand_over_ahead || progress.t - progress.hand_over_time <= Clusters::parameters.window;
+    const bool can_switch_modes = modes.can_switch_modes(failure);
+    const bool at_hand_over = hand_over_ahead || progress.t - progress.hand_over_time <= ChatterDetector::parameters.window;
     const bool of_hand_over = at_hand_over && ModeChanges::of_closed_contacts(failure);
-    const bool leads_on = of_hand_over || ModeChanges::leads_on(failure);
-    if (!may_end && !leads_on) return false;
+    const bool is_recoverable = of_hand_over || ModeChanges::is_recoverable(failure);
+    if (!can_switch_modes && !is_recoverable) return false;
     try {
         back_to_start();
-        if (may_end && modes.leave()) return true;
+        if (can_switch_modes && modes.force_switch()) return true;
     } catch (const Failure& at_start) {  // the current modes have no motion at the step's start
         if (at_start.kind == Failure::Kind::interrupted) throw;
     }
-    return leads_on && modes.step_over(failure, of_hand_over);
+    return is_recoverable && modes.step_over(failure, of_hand_over);
 }
 
 // Restore the modes and the dependent rows and forces of the step's start.
@@ -332,18 +332,18 @@ void Simulation::accept(const Proposal& proposal, const std::optional<FoundEvent
     progress.rate.head(stepper.active) = stepper.end_rate().head(stepper.active);
     growth.look();
     output.configured_now();
-    landing.remember_gaps(!event);
+    impacts.remember_gaps(!event);
     output.keep_step();
     value_events.tell(progress.t, out.events);
-    if (!event || !event->changes_modes()) notices.pulls(event);
-    output.inside_step(notices.several(true));
+    if (!event || !event->changes_modes()) warnings.pulls(event);
+    output.inside_step(warnings.several(true));
     stepper.end_directions();
     choice.choose();
     if (!event) return;
     if (event->changes_modes()) modes.change(*event);
-    notices.several(false);
+    warnings.several(false);
     if (event->kind != FoundEvent::Kind::reversal) return;
-    clusters.count();
+    chatter.count();
     modes.bridge(event->index);
 }
 

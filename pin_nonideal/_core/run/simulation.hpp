@@ -35,7 +35,7 @@ struct SimulationParameters {
     double shortest_sought = 1e-9;
 };
 
-// Time loop of one run. SteppedRun and FollowedRun advance the same loop from outside.
+// Time loop of one run. SteppedRun and ExternalRun advance the same loop from outside.
 class Simulation {
 public:
     using Parameters = SimulationParameters;
@@ -105,13 +105,13 @@ protected:
     EventLocator locator;
     HandOver hand_over;
     Output output;
-    Notices notices;
+    Warnings warnings;
     ValueEvents value_events;
     Breaks breaks;
     Torques torques;
-    Landing landing;
+    ImpactHandler impacts;
     TimeStepping time_stepping;
-    Clusters clusters;
+    ChatterDetector chatter;
     ModeChanges modes;
 
     // Data of the current step only.

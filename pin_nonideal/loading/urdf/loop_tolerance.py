@@ -179,7 +179,7 @@ def _independent_rows(
     if distance <= MAX_NOTED:
         nearly = (
             f"rows of the loops depend on others to {distance:.1e} m or rad, beyond the tolerance of the "
-            f"assembly ({tolerance:g}): they may lock what should move; "
+            f"assembly ({tolerance:g}): they may lock intended motion; "
             f"load(..., assembly_tolerance={MAX_NOTED:g}) leaves such rows out"
         )
     return (independent if rounded or gap > CLOSURE_TOLERANCE else None), q, gap, nearly

@@ -141,7 +141,9 @@ def _undefined_materials(root: ElementTree.Element) -> list[str]:
             root.remove(material)
             twice.append(str(material.get("name")))
         named.add(material.get("name"))
-    return notes + ([f"of materials defined twice the first counts: {quote_names(twice)}"] if twice else [])
+    return notes + (
+        [f"materials defined twice keep their first definition: {quote_names(twice)}"] if twice else []
+    )
 
 
 def _sizeless(shape: ElementTree.Element) -> bool:

@@ -54,7 +54,7 @@ def unread_notes(root: ElementTree.Element) -> list[str]:
     if misspelt:
         notes.append(f"attributes that URDF does not have are not read: {', '.join(misspelt)}")
     if repeated:
-        notes.append(f"of repeated elements the first counts: {', '.join(repeated)}")
+        notes.append(f"elements are ignored after the first of their kind: {', '.join(repeated)}")
     return notes
 
 

@@ -39,8 +39,8 @@ def urdf_text(path: Path, package_dirs: Sequence[str | Path] = ()) -> str:
             return str(xacro.process_file(str(path)).toxml())
     except Exception as error:  # any error of xacro's macros
         raise LoadingError(
-            f'"{path}" cannot be expanded by xacro: {" ".join(str(error).split())}; what it needs can be '
-            "given by hand: xacro FILE NAME:=VALUE > robot.urdf"
+            f'"{path}" cannot be expanded by xacro: {" ".join(str(error).split())}; to give it '
+            "arguments, run xacro by hand: xacro FILE NAME:=VALUE > robot.urdf"
         ) from None
 
 

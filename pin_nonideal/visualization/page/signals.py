@@ -301,7 +301,7 @@ def check_scene(run: Trajectory, what: str) -> None:
         InputError: the value is not a run, or its scene is missing or does not fit.
     """
     if not all(hasattr(run, name) for name in ("t", "q", "v", "scene")):
-        raise InputError(f"{what} shows a Trajectory, what `simulate` returns; got {type(run).__name__}")
+        raise InputError(f"{what} shows a Trajectory, the result of `simulate`; got {type(run).__name__}")
     if run.scene is None:
         raise InputError(
             f"{what} needs the scene of the run, which a trajectory read from a file has not: "

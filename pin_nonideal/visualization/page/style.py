@@ -16,7 +16,7 @@ EVENTS = {
     "several": ("#db2777", "the laws allow several motions from here on"),
     "paradox": ("#9d174d", "the laws allow no motion at a step's end"),
     "saturate": ("#a16207", "a drive reaches its limit of effort"),
-    "desaturate": ("#ca8a04", "a drive gives again what is asked of it"),
+    "desaturate": ("#ca8a04", "a drive returns below its limit of effort"),
     "jump": ("#be185d", "a prescribed rate jumps, with an impulse"),
     "user": ("#65a30d", "a condition of the user's"),
     "other": ("#64748b", "something else"),

@@ -39,7 +39,7 @@ bool no_forces(const ConeProblem& p, VecX& y) {
     ConeProblem nearest;
     nearest.associated = true;
     nearest.pose(M, r, elements);
-    ConePath().follow(nearest, f, ConePath::Slip::stands);
+    ConeInteriorPoint().follow(nearest, f, ConeInteriorPoint::Slip::stands);
     f = f.cwiseProduct(nearest.scale());
     y = VecX::Zero(n);
     for (int k = 0; k < m; ++k) y[rows[k]] = f[n + k];
@@ -124,7 +124,7 @@ bool squeezed(const ConeProblem& p, VecX& y) {
     ConeProblem nearest;
     nearest.associated = true;
     nearest.pose(M, r, elements);
-    ConePath().follow(nearest, f, ConePath::Slip::stands);
+    ConeInteriorPoint().follow(nearest, f, ConeInteriorPoint::Slip::stands);
     f = f.cwiseProduct(nearest.scale()).eval();
     for (const double edge : certificate_parameters.near_edges) {
         y = f.tail(n);

@@ -21,7 +21,7 @@ int tail_rows(const ConeElement& e) {
 
 }  // namespace
 
-Vector3d ConePath::tail(const ConeProblem& p, int e, const Eigen::Ref<const VecX>& x) const {
+Vector3d ConeInteriorPoint::tail(const ConeProblem& p, int e, const Eigen::Ref<const VecX>& x) const {
     Vector3d out = Vector3d::Zero();
     const int rows = tail_rows(p.elements[e]);
     out.head(rows) = x.segment(p.at[e] + head_rows(p.elements[e]), rows);
@@ -29,13 +29,13 @@ Vector3d ConePath::tail(const ConeProblem& p, int e, const Eigen::Ref<const VecX
 }
 
 // Return the part of element e of a force, or of its change, as a point of the cone. The head of a box is given.
-Cone ConePath::force(const ConeProblem& p, int e, const Eigen::Ref<const VecX>& f, double head) const {
+Cone ConeInteriorPoint::force(const ConeProblem& p, int e, const Eigen::Ref<const VecX>& f, double head) const {
     const double root = root_of(p.elements[e]);
     if (p.elements[e].is(ConeKind::contact)) head = root * f[p.at[e]];
     return {head, tail(p, e, f) / root};
 }
 
-void ConePath::start(const ConeProblem& p, Eigen::Ref<VecX> f, Slip slip) {
+void ConeInteriorPoint::start(const ConeProblem& p, Eigen::Ref<VecX> f, Slip slip) {
     mode_ = slip;
     if (static_cast<int>(states_.size()) < p.size()) states_.resize(p.size());
     auto w = w_.vector(p.n);
@@ -54,7 +54,7 @@ void ConePath::start(const ConeProblem& p, Eigen::Ref<VecX> f, Slip slip) {
 }
 
 // Update the slip speeds, and the residual of u = w + (mu |w_t|, 0).
-void ConePath::update(const ConeProblem& p, const Eigen::Ref<const VecX>& f) {
+void ConeInteriorPoint::update(const ConeProblem& p, const Eigen::Ref<const VecX>& f) {
     auto w = w_.vector(p.n), miss = miss_.vector(p.n);
     p.respond(f, w);
     miss = w;
@@ -75,7 +75,7 @@ void ConePath::update(const ConeProblem& p, const Eigen::Ref<const VecX>& f) {
     }
 }
 
-bool ConePath::factorize(const ConeProblem& p) {
+bool ConeInteriorPoint::factorize(const ConeProblem& p) {
     auto K = K_.matrix(p.n, p.n);
     K = p.W();
     for (int e = 0; e < p.size(); ++e) {
@@ -107,7 +107,7 @@ bool ConePath::factorize(const ConeProblem& p) {
 }
 
 // Compute the step to z o y = target that leaves `keep` of the residual, with the second-order terms of the predictor step.
-void ConePath::direction(const ConeProblem& p, double target, double keep) {
+void ConeInteriorPoint::direction(const ConeProblem& p, double target, double keep) {
     auto rhs = rhs_.vector(p.n), step = step_.vector(p.n);
     rhs = (keep - 1.0) * miss_.vector(p.n);
     for (int e = 0; e < p.size(); ++e) {
@@ -130,7 +130,7 @@ void ConePath::direction(const ConeProblem& p, double target, double keep) {
     }
 }
 
-double ConePath::length(const ConeProblem& p) const {
+double ConeInteriorPoint::length(const ConeProblem& p) const {
     double least = HUGE_VAL;
     const Eigen::Map<const VecX> step = step_.vector(p.n);
     for (int e = 0; e < p.size(); ++e) {
@@ -140,7 +140,7 @@ double ConePath::length(const ConeProblem& p) const {
     return least;
 }
 
-double ConePath::gap(const ConeProblem& p) const {
+double ConeInteriorPoint::gap(const ConeProblem& p) const {
     double sum = 0.0;
     int count = 0;
     for (int e = 0; e < p.size(); ++e) {
@@ -151,7 +151,7 @@ double ConePath::gap(const ConeProblem& p) const {
     return count > 0 ? sum / count : 0.0;
 }
 
-void ConePath::follow(const ConeProblem& p, Eigen::Ref<VecX> f, Slip slip) {
+void ConeInteriorPoint::follow(const ConeProblem& p, Eigen::Ref<VecX> f, Slip slip) {
     start(p, f, slip);
     auto step = step_.vector(p.n), kept = kept_.vector(p.n);
     for (int it = 0; it < parameters.max_steps; ++it, ++steps_) {

@@ -48,10 +48,11 @@ Nearest of_ball(const Vector3d& z, double radius) {
 Nearest nearest(const ConeElement& element, const Vector3d& z, const Vector3d& w, const Vector3d& given) {
     if (element.is(ConeKind::equality)) return {z, Matrix3d::Identity()};
     if (element.is(ConeKind::box))
-        return w.norm() > ConeShares::parameters.at_rest ? Nearest{given, Matrix3d::Zero()} : of_ball(z, element.bound);
-    if (w[0] > ConeShares::parameters.at_rest) return {};
+        return w.norm() > MinimumNormForces::parameters.at_rest ? Nearest{given, Matrix3d::Zero()}
+                                                               : of_ball(z, element.bound);
+    if (w[0] > MinimumNormForces::parameters.at_rest) return {};
     Vector3d slip(0.0, w[1], w[2]);
-    if (element.bound == 0.0 || slip.norm() == 0.0 || slip.norm() <= ConeShares::parameters.at_rest)
+    if (element.bound == 0.0 || slip.norm() == 0.0 || slip.norm() <= MinimumNormForces::parameters.at_rest)
         return of_cone(z, element.bound);
     return of_ray(z, Vector3d::UnitX() - element.bound / slip.norm() * slip);
 }
@@ -59,7 +60,7 @@ Nearest nearest(const ConeElement& element, const Vector3d& z, const Vector3d& w
 }  // namespace
 
 // Compute orthonormal columns of the forces that W responds to, in unscaled units. Returns their number.
-int ConeShares::span(const ConeProblem& p) {
+int MinimumNormForces::span(const ConeProblem& p) {
     auto transpose = transpose_.matrix(p.n, p.n);
     transpose = p.W().transpose();
     solver_.factor_orthogonally(transpose);
@@ -76,7 +77,7 @@ int ConeShares::span(const ConeProblem& p) {
 }
 
 // Compute g = P(z), and the stacked blocks of its derivative.
-void ConeShares::project(const ConeProblem& p, const Eigen::Ref<const VecX>& z, Eigen::Ref<VecX> g,
+void MinimumNormForces::project(const ConeProblem& p, const Eigen::Ref<const VecX>& z, Eigen::Ref<VecX> g,
                          bool differentiate) {
     const auto w = w_.vector(p.n), given = given_.vector(p.n);
     auto D = D_.matrix(p.n, 3);
@@ -94,7 +95,7 @@ void ConeShares::project(const ConeProblem& p, const Eigen::Ref<const VecX>& z, 
     }
 }
 
-double ConeShares::miss(const ConeProblem& p, const Eigen::Ref<const VecX>& y, int rank) {
+double MinimumNormForces::miss(const ConeProblem& p, const Eigen::Ref<const VecX>& y, int rank) {
     auto z = z_.vector(p.n), g = g_.vector(p.n);
     const auto E = basis_.matrix(p.n, rank);
     z.noalias() = E * y;
@@ -105,7 +106,7 @@ double ConeShares::miss(const ConeProblem& p, const Eigen::Ref<const VecX>& y, i
     return miss.norm();
 }
 
-bool ConeShares::even_out(const ConeProblem& p, Eigen::Ref<VecX> f) {
+bool MinimumNormForces::minimize_norm(const ConeProblem& p, Eigen::Ref<VecX> f) {
     const int rank = span(p);
     const auto E = basis_.matrix(p.n, rank);
     auto w = w_.vector(p.n), given = given_.vector(p.n);

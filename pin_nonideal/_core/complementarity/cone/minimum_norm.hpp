@@ -6,7 +6,7 @@
 
 namespace pn {
 
-struct ConeSharesParameters {
+struct MinimumNormForcesParameters {
     double at_rest = 1e-9;           // w below this part of the largest w0 counts as zero
     double tolerance = 3e-15;        // relative to the forces
     double stall_tolerance = 1e-12;  // the same if steps make no progress
@@ -15,15 +15,15 @@ struct ConeSharesParameters {
     int max_halvings = 10;           // maximum halvings of a step that does not reduce the residual
 };
 
-class ConeShares {
+class MinimumNormForces {
 public:
-    using Parameters = ConeSharesParameters;
+    using Parameters = MinimumNormForcesParameters;
     static constexpr Parameters parameters{};
 
     // Replace f, a solution, by the one of minimum norm in the units before scaling. E is an orthonormal basis of the
     // forces that W distinguishes. The result is f = P(E y) with E^T f unchanged. P projects on the set that the modes
     // of w allow: a cone if nothing moves, a ray if the contact slips. Returns false and keeps f if y was not found.
-    bool even_out(const ConeProblem& problem, Eigen::Ref<VecX> f);
+    bool minimize_norm(const ConeProblem& problem, Eigen::Ref<VecX> f);
 
 private:
     int span(const ConeProblem& problem);

@@ -21,13 +21,13 @@ ConeStatus ConeComplementarity::solve(const Eigen::Ref<const MatX>& W, const Eig
     ConeStatus status = found ? ConeStatus::solved : find_certificate(problem_, certificate_);
     if (status == ConeStatus::jammed) found = grow_friction(x);  // a solution may still exist
     if (status == ConeStatus::failed) found = grow_friction(x) || scatter(x) || take_nearest(x);
-    if (found && shares_alike_) stiffen(x);
+    if (found && uniform_compliance_) stiffen(x);
     unique_shares_ = newton_.regular();
     const bool as_it_was = warm && may_keep_shares && newton_.steps() == steps;
     if (found && !unique_shares_ && !as_it_was) {
         auto even = f_.vector(n);
         even = x;
-        const bool shorter = shares_.even_out(problem_, even);
+        const bool shorter = minimum_norm_.minimize_norm(problem_, even);
         if (shorter && newton_.solve(problem_, even, parameters.few_steps) <= std::max(parameters.evened, error_))
             x = even;
     }
@@ -45,7 +45,7 @@ bool ConeComplementarity::hold(const Eigen::Ref<const MatX>& W, const Eigen::Ref
     grown_.associated = true;
     auto x = even_.vector(problem_.n), w = w_.vector(problem_.n);
     x.setZero();
-    path_.follow(grown_, x, ConePath::Slip::stands);
+    interior_point_.follow(grown_, x, ConeInteriorPoint::Slip::stands);
     if (!x.allFinite()) return false;
     problem_.respond(x, w);
     if (w.cwiseAbs().maxCoeff() > parameters.held) return false;
@@ -53,7 +53,7 @@ bool ConeComplementarity::hold(const Eigen::Ref<const MatX>& W, const Eigen::Ref
     unique_shares_ = newton_.regular();
     auto even = f_.vector(problem_.n);
     even = x;
-    if (!unique_shares_ && shares_.even_out(problem_, even) &&
+    if (!unique_shares_ && minimum_norm_.minimize_norm(problem_, even) &&
         newton_.solve(problem_, even, parameters.few_steps) <= std::max(parameters.evened, error_))
         x = even;
     tidy(x);
@@ -100,9 +100,9 @@ bool ConeComplementarity::search(Eigen::Ref<VecX> f, bool warm) {
         f.setZero();
         if (polish(f, parameters.first_steps)) return true;
     }
-    path_.follow(problem_, f, ConePath::Slip::follows);
+    interior_point_.follow(problem_, f, ConeInteriorPoint::Slip::follows);
     if (polish(f, parameters.more_steps)) return true;
-    return !brief_ && (approach(f) || take_turns(f) || relax(f));
+    return !brief_ && (approach(f) || alternate(f) || relax(f));
 }
 
 // Solve with compliance to the whole forces that decreases to its limit. f is kept if this gives no solution.
@@ -115,7 +115,7 @@ bool ConeComplementarity::stiffen(Eigen::Ref<VecX> f) {
         grown_.W() = problem_.W();
         grown_.W().diagonal().array() += compliance;
         if (newton_.solve(grown_, there, parameters.more_steps) <= parameters.tolerance) continue;
-        path_.follow(grown_, there, ConePath::Slip::follows);
+        interior_point_.follow(grown_, there, ConeInteriorPoint::Slip::follows);
         if (!there.allFinite() || !(newton_.solve(grown_, there, parameters.more_steps) <= parameters.tolerance))
             return false;
     }
@@ -163,7 +163,7 @@ bool ConeComplementarity::approach(Eigen::Ref<VecX> f) {
             error = newton_.solve(grown_, f, parameters.more_steps);
         }
         if (!(error <= parameters.tolerance)) {
-            path_.follow(grown_, f, ConePath::Slip::follows);
+            interior_point_.follow(grown_, f, ConeInteriorPoint::Slip::follows);
             if (f.allFinite()) error = newton_.solve(grown_, f, parameters.more_steps);
         }
         compliance = std::max(parameters.min_compliance, 0.5 * compliance);
@@ -190,10 +190,10 @@ bool ConeComplementarity::take_nearest(Eigen::Ref<VecX> f) {
 
 // Alternate between slip speeds and the forces for fixed slip speeds (Cadoux, "Méthodes d'optimisation pour la
 // dynamique non régulière", 2009).
-bool ConeComplementarity::take_turns(Eigen::Ref<VecX> f) {
+bool ConeComplementarity::alternate(Eigen::Ref<VecX> f) {
     f.setZero();
     for (int turn = 0; turn < parameters.max_alternations; ++turn) {
-        path_.follow(problem_, f, ConePath::Slip::stands);
+        interior_point_.follow(problem_, f, ConeInteriorPoint::Slip::stands);
         if (!f.allFinite()) f.setZero();
         if (polish(f, parameters.more_steps)) return true;
     }
@@ -238,7 +238,8 @@ bool ConeComplementarity::grow_friction(Eigen::Ref<VecX> f) {
         there = f;
         double error = newton_.solve(grown_, there, parameters.more_steps);
         for (int turn = 0; turn < parameters.few_turns && !(error <= parameters.tolerance); ++turn) {
-            path_.follow(grown_, there, turn == 0 ? ConePath::Slip::follows : ConePath::Slip::stands);
+            interior_point_.follow(grown_, there,
+                                   turn == 0 ? ConeInteriorPoint::Slip::follows : ConeInteriorPoint::Slip::stands);
             if (!there.allFinite()) break;
             auto end = f_.vector(problem_.n);
             end = there;
@@ -265,7 +266,7 @@ bool ConeComplementarity::scatter(Eigen::Ref<VecX> f) {
         for (int e = 0; e < problem_.size(); ++e)
             if (problem_.elements[e].is(ConeKind::contact)) f[problem_.at[e]] = 2.0 * std::abs(f[problem_.at[e]]);
         if (polish(f, parameters.more_steps)) return true;
-        path_.follow(problem_, f, ConePath::Slip::stands);
+        interior_point_.follow(problem_, f, ConeInteriorPoint::Slip::stands);
         if (f.allFinite() && polish(f, parameters.more_steps)) return true;
     }
     return false;

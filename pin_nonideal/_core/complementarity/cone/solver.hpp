@@ -62,7 +62,7 @@ public:
     // Use a uniform compliance. If friction depends on shares of a load that W does not determine, several motions may
     // solve the problem. This option selects the motion of equally compliant elements, in the limit of stiff ones. It
     // does not depend on the order of the elements.
-    void share_alike(bool on) { shares_alike_ = on; }
+    void use_uniform_compliance(bool on) { uniform_compliance_ = on; }
 
     // Limit the search to Newton's method from the guess, from zero and from the end of the central path.
     void search_briefly(bool on) { brief_ = on; }
@@ -71,7 +71,7 @@ public:
     bool unique_shares() const { return unique_shares_; }  // W is shown to determine all of f
     const VecX& certificate() const { return certificate_; }
     int newton_steps() const { return newton_.steps(); }
-    int path_steps() const { return path_.steps(); }
+    int path_steps() const { return interior_point_.steps(); }
 
 private:
     bool search(Eigen::Ref<VecX> f, bool warm);
@@ -80,7 +80,7 @@ private:
     bool approach(Eigen::Ref<VecX> f);
     bool take_nearest(Eigen::Ref<VecX> f);
     bool stiffen(Eigen::Ref<VecX> f);
-    bool take_turns(Eigen::Ref<VecX> f);
+    bool alternate(Eigen::Ref<VecX> f);
     bool relax(Eigen::Ref<VecX> f);
     bool grow_friction(Eigen::Ref<VecX> f);
     bool scatter(Eigen::Ref<VecX> f);
@@ -88,12 +88,12 @@ private:
 
     ConeProblem problem_, grown_;
     ConeNewton newton_;
-    ConePath path_;
-    ConeShares shares_;
+    ConeInteriorPoint interior_point_;
+    MinimumNormForces minimum_norm_;
     Buffer even_, x_, f_, w_, nearest_;
     VecX certificate_;
     double error_ = 0.0, least_miss_ = 0.0, most_miss_ = 0.0;
-    bool unique_shares_ = false, shares_alike_ = false, brief_ = false;
+    bool unique_shares_ = false, uniform_compliance_ = false, brief_ = false;
 };
 
 }  // namespace pn

@@ -4,12 +4,12 @@
 
 namespace pn {
 
-Clusters::Clusters(System& system, Progress& progress, const Options& options, StiffnessGuard& stiffness,
+ChatterDetector::ChatterDetector(System& system, Progress& progress, const Options& options, StiffnessGuard& stiffness,
                    TimeStepping& time_stepping, Recording& out)
     : w(system.w), progress_(progress), options_(options), stiffness_(stiffness), time_stepping_(time_stepping),
       out_(out) {}
 
-bool Clusters::bridge(int element, double t_end) {
+bool ChatterDetector::bridge(int element, double t_end) {
     std::vector<double>& recent = progress_.recent_event_times;
     if (recent.size() > parameters.events) recent.erase(recent.begin());
     if (recent.size() < parameters.events || progress_.t - recent.front() > parameters.window) return false;
@@ -23,27 +23,27 @@ bool Clusters::bridge(int element, double t_end) {
     return false;
 }
 
-void Clusters::remember() {
+void ChatterDetector::remember() {
     std::vector<double>& last = progress_.mode_change_times;
     if (!last.empty() && last.back() == progress_.t) return;
     if (last.size() == parameters.dwindling_events) last.erase(last.begin());
     last.push_back(progress_.t);
 }
 
-bool Clusters::dwindles() const {
+bool ChatterDetector::is_zeno() const {
     const std::vector<double>& last = progress_.mode_change_times;
     return last.size() == parameters.dwindling_events && progress_.t - last.front() <= parameters.window;
 }
 
 // Return the length [s] of the next stretch: twice the last one if events accumulated again right after it.
-double Clusters::next_stretch() const {
+double ChatterDetector::next_stretch() const {
     const std::vector<double>& recent = progress_.recent_event_times;
     const double first = recent.empty() ? progress_.t : recent.front();
     const bool again = progress_.bridged_time > 0.0 && first - progress_.bridged_end < progress_.bridged_time;
     return again ? std::min(parameters.growth * progress_.bridged_time, parameters.longest) : parameters.window;
 }
 
-void Clusters::step_over(int element, double t_end) {
+void ChatterDetector::step_over(int element, double t_end) {
     progress_.bridged_time = next_stretch();
     progress_.recent_event_times.clear();
     progress_.mode_change_times.clear();

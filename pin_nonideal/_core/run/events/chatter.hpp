@@ -18,12 +18,12 @@ struct ChatterParameters {
     double window = 1e-4;  // window of the event count, and shortest stretch of time stepping [s]
 };
 
-class Clusters {
+class ChatterDetector {
 public:
     using Parameters = ChatterParameters;
     static constexpr Parameters parameters{};
 
-    Clusters(System& system, Progress& progress, const Options& options, StiffnessGuard& stiffness,
+    ChatterDetector(System& system, Progress& progress, const Options& options, StiffnessGuard& stiffness,
              TimeStepping& time_stepping, Recording& out);
 
     // Count an event at the current time that changes the motion.
@@ -35,7 +35,7 @@ public:
     bool bridge(int element, double t_end);
     // Check if an event without a known motion ends an accumulation of mode changes. A step cannot resolve the
     // remaining time until rest.
-    bool dwindles() const;
+    bool is_zeno() const;
     // Bridge one stretch by time stepping.
     void step_over(int element, double t_end);
 

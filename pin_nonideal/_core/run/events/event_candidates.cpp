@@ -111,7 +111,7 @@ std::vector<Watch> EventCandidates::find() {
     for (int e : w.now.loaded) {
         if (w.state.mode[e] != sticking) {
             if (may_stop(e)) list.push_back({Watch::Kind::slip, e});
-        } else if (!w.state.indeterminate && may_reach_limit(e)) {
+        } else if (!w.state.is_hyperstatic && may_reach_limit(e)) {
             list.push_back({Watch::Kind::stick, e});
         }
     }

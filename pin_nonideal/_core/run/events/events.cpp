@@ -202,7 +202,7 @@ std::vector<Event> switch_modes(System& system, double t, VecX& y, VecX& dy, con
     if (!p.frictions.empty() || !p.gaps.empty()) {
         seek_directions(system, friction.asked.at_rest, event.has_value());
         system.write(y);
-        w.state.indeterminate = shares_load(system, t, friction.asked.at_rest, friction.held);
+        w.state.is_hyperstatic = shares_load(system, t, friction.asked.at_rest, friction.held);
     }
     system.rate_of_evaluation(t, y, dy);
     if (!event) return {};
@@ -230,7 +230,7 @@ Strike strike_contacts(System& system, double t, VecX& y, bool starts, bool boun
     const std::vector<Mode> modes = system.w.state.mode;
     system.read(y);
     const std::vector<char>& touch = system.touching.at(p, system.w, t, system.q, system.v, starts).touch;
-    const Impact impact = strike(p, system.w, t, system.q, system.v, touch, bounces);
+    const Impact impact = resolve_impact(p, system.w, t, system.q, system.v, touch, bounces);
     system.write(y);
     set_closed(p, system.w, closed);  // the modes after the impact are selected later
     set_modes(p, system.w, modes);

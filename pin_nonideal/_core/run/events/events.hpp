@@ -50,8 +50,9 @@ bool turning(const System& system);
 // Return the kind of event for a change of an element's mode.
 Event::Kind kind_of_change(Mode before, Mode after);
 
-// Store the slip directions at a step's end for the next step, and the slip speeds in `slip`. The remaining slip of an
-// element that has `stopped_element` at rest is an error of the step. Slip up to this speed does not change a direction.
+// Store the slip directions at a step's end for the next step, and the slip speeds in `slip`. `stopped_element`:
+// element that came to rest at the step's end. Its remaining slip speed is an error of the step, so elements with lower
+// slip speeds keep their directions.
 void remember_directions(System& system, std::vector<double>& slip, int stopped_element = -1);
 
 }  // namespace pn

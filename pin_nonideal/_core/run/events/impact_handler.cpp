@@ -9,18 +9,18 @@
 
 namespace pn {
 
-Landing::Landing(System& system, Progress& progress, GapWatch& watch, const Options& options, Output& output,
+ImpactHandler::ImpactHandler(System& system, Progress& progress, GapWatch& watch, const Options& options, Output& output,
                  Recording& out)
     : p(system.p), w(system.w), system_(system), progress_(progress), watch_(watch), options_(options), output_(output),
       out_(out) {}
 
-bool Landing::strike(bool starts) {
+bool ImpactHandler::resolve_impacts(bool starts) {
     int count = 0;
-    while (count < parameters.most_at_once && strike_once(starts)) ++count;
+    while (count < parameters.most_at_once && resolve_one_impact(starts)) ++count;
     return count > 0;
 }
 
-bool Landing::strike_once(bool starts) {
+bool ImpactHandler::resolve_one_impact(bool starts) {
     if (system_.ng == 0 || !contacts_strike(system_, progress_.t, progress_.y, starts)) return false;
     output_.before_jump();
     const Strike found = strike_contacts(system_, progress_.t, progress_.y, starts);
@@ -36,7 +36,7 @@ bool Landing::strike_once(bool starts) {
     throw Failure(Failure::Kind::impact_energy, progress_.t, blocks, found.work);
 }
 
-void Landing::end_bouncing(double stop) {
+void ImpactHandler::end_bouncing(double stop) {
     output_.now();
     output_.configured_now();
     if (options_.output_dt > 0.0) stop = std::min(stop, output_.next());
@@ -66,7 +66,7 @@ void Landing::end_bouncing(double stop) {
     remember_gaps();
 }
 
-void Landing::remember_gaps(bool whole_step) {
+void ImpactHandler::remember_gaps(bool whole_step) {
     if (system_.ng == 0) return;
     system_.read(progress_.y);
     if (whole_step) watch_.sample_near_gaps(progress_.t);

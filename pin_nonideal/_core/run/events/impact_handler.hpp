@@ -14,15 +14,16 @@ struct ImpactHandlerParameters {
     int most_at_once = 100;
 };
 
-class Landing {
+class ImpactHandler {
 public:
     using Parameters = ImpactHandlerParameters;
     static constexpr Parameters parameters{};
 
-    Landing(System& system, Progress& progress, GapWatch& watch, const Options& options, Output& output, Recording& out);
+    ImpactHandler(System& system, Progress& progress, GapWatch& watch, const Options& options, Output& output,
+                  Recording& out);
 
     // Apply impacts until no touching contact approaches. Return true if there was an impact.
-    bool strike(bool starts);
+    bool resolve_impacts(bool starts);
     // Advance to the end of bouncing after an impact, not beyond `stop` or the next sample. Without low bouncing the
     // state stays.
     void end_bouncing(double stop);
@@ -31,7 +32,7 @@ public:
     void remember_gaps(bool whole_step = false);
 
 private:
-    bool strike_once(bool starts);
+    bool resolve_one_impact(bool starts);
 
     const Program& p;
     Workspace& w;

@@ -14,7 +14,7 @@ static bool of_modes(const Failure& failure) {
 }
 
 ModeChanges::ModeChanges(System& system, Progress& progress, const Options& options, Torques& torques, Output& output,
-                         Landing& landing, Clusters& clusters, Recording& out)
+                         ImpactHandler& impacts, ChatterDetector& chatter, Recording& out)
     : p(system.p),
       w(system.w),
       system_(system),
@@ -22,8 +22,8 @@ ModeChanges::ModeChanges(System& system, Progress& progress, const Options& opti
       options_(options),
       torques_(torques),
       output_(output),
-      landing_(landing),
-      clusters_(clusters),
+      impacts_(impacts),
+      chatter_(chatter),
       out_(out) {}
 
 void ModeChanges::change(FoundEvent event) {
@@ -33,26 +33,26 @@ void ModeChanges::change(FoundEvent event) {
     event.in_vain = event.kind == FoundEvent::Kind::touch && event.index >= 0 && has_let_go(event.index);
     try {
         if (contacts_land(system_, progress_.t, progress_.y)) event = {FoundEvent::Kind::touch, -1, progress_.t};
-        has_impact = event.kind == FoundEvent::Kind::touch && landing_.strike(false);
+        has_impact = event.kind == FoundEvent::Kind::touch && impacts_.resolve_impacts(false);
         for (const Event& found : switch_modes(system_, progress_.t, progress_.y, progress_.rate, event, &let_go)) {
             out_.events.push_back(found);
-            if (!has_impact) clusters_.count();
+            if (!has_impact) chatter_.count();
         }
     } catch (const Failure& failure) {
         keep_last(before, has_impact);
         const bool of_hand_over = event.of_hand_over && !has_impact && of_closed_contacts(failure);
-        if (!(of_hand_over || leads_on(failure)) || !step_over(failure, of_hand_over)) throw;
+        if (!(of_hand_over || is_recoverable(failure)) || !step_over(failure, of_hand_over)) throw;
         return;
     }
-    clusters_.remember();
+    chatter_.remember();
     const bool in_vain = event.kind == FoundEvent::Kind::touch && event.index >= 0 && !has_impact;
     const bool same_modes = std::equal(before.mode.begin(), before.mode.end(), w.state.mode.begin());
     if (!same_modes || before.closed != w.state.closed) progress_.gaps.ask_anew();
     else if (in_vain && !w.state.closed[event.index]) progress_.gaps.defer_retry(event.index, progress_.t);
     for (int gap : let_go) progress_.gaps.defer_retry(gap, progress_.t);
-    landing_.remember_gaps();
+    impacts_.remember_gaps();
     if (has_impact) return end_bouncing();
-    if (same_modes) clusters_.count();
+    if (same_modes) chatter_.count();
     output_.configured_now();
     bridge(event.of_gap() ? 0 : event.index);
 }
@@ -67,25 +67,25 @@ bool ModeChanges::has_let_go(int gap) const {
 // End the bouncing. If the motion of a low flight is not found, bridge it by time stepping if possible.
 void ModeChanges::end_bouncing() {
     try {
-        landing_.end_bouncing(torques_.next_stop(progress_.t, options_.end()));
+        impacts_.end_bouncing(torques_.next_stop(progress_.t, options_.end()));
     } catch (const Failure& failure) {
-        if (!leads_on(failure) || !step_over(failure)) throw;
+        if (!is_recoverable(failure) || !step_over(failure)) throw;
     }
 }
 
 // A proof of no motion, or of several motions, is reported to the user.
-bool ModeChanges::leads_on(const Failure& failure) {
+bool ModeChanges::is_recoverable(const Failure& failure) {
     const bool shown = failure.solutions != Failure::Solutions::not_told;
     return failure.kind == Failure::Kind::step_size || (of_modes(failure) && !shown);
 }
 
-bool ModeChanges::may_end(const Failure& failure) const {
+bool ModeChanges::can_switch_modes(const Failure& failure) const {
     const double spacing = mode_switch_parameters.forced_switch_spacing * tiny_step_at(progress_.t);
     return of_modes(failure) && options_.method.adaptive() && system_.ng > 0 &&
            progress_.t >= progress_.forced_switch_time + spacing;
 }
 
-bool ModeChanges::leave() {
+bool ModeChanges::force_switch() {
     const double t = progress_.t, ahead = tiny_step_at(t);
     const VecX y = progress_.y;
     try {
@@ -103,7 +103,7 @@ bool ModeChanges::leave() {
 }
 
 void ModeChanges::bridge(int element) {
-    if (clusters_.bridge(element, options_.end())) go_on_with_new_modes();
+    if (chatter_.bridge(element, options_.end())) go_on_with_new_modes();
 }
 
 // Check if the solver failed, which proves nothing.
@@ -119,14 +119,14 @@ bool ModeChanges::step_over(const Failure& failure, bool of_hand_over) {
     if (options_.method.outside() || !(system_.ne > 0 || system_.ng > 0)) return false;
     const bool of_elements = system_.ne > 0 && of_modes(failure) && !failure.elements.empty();
     const int element = of_elements ? failure.elements.front() : 0;
-    if (!(of_hand_over || undecided(failure) || clusters_.dwindles() || creeps())) return false;
+    if (!(of_hand_over || undecided(failure) || chatter_.is_zeno() || creeps())) return false;
     for (;;) {
-        clusters_.step_over(element, options_.end());
+        chatter_.step_over(element, options_.end());
         try {
             go_on_with_new_modes();
             return true;
         } catch (const Failure& again) {  // the solver fails again a little later
-            if (system_.ng == 0 || !of_modes(again) || !leads_on(again)) throw;
+            if (system_.ng == 0 || !of_modes(again) || !is_recoverable(again)) throw;
         }
         if (progress_.t >= options_.end()) return true;
     }
@@ -143,7 +143,7 @@ bool ModeChanges::creeps() const {
 
 void ModeChanges::go_on_with_new_modes() {
     switch_modes(system_, progress_.t, progress_.y, progress_.rate, std::nullopt);
-    landing_.remember_gaps();
+    impacts_.remember_gaps();
     output_.configured_now();
 }
 

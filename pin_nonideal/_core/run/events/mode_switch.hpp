@@ -24,17 +24,17 @@ inline double tiny_step_at(double t) { return mode_switch_parameters.tiny_step *
 class ModeChanges {
 public:
     ModeChanges(System& system, Progress& progress, const Options& options, Torques& torques, Output& output,
-                Landing& landing, Clusters& clusters, Recording& out);
+                ImpactHandler& impacts, ChatterDetector& chatter, Recording& out);
 
     // Switch modes and state at an event that has been reached.
     void change(FoundEvent event);
-    // Forced switch: if no step is short enough, the motion of the current modes may have ended. `may_end` is false if
-    // the last forced switch was less than `forced_switch_spacing` tiny steps ago. `leave` selects modes one tiny step
-    // ahead. It returns false if it finds none.
-    bool may_end(const Failure& failure) const;
-    bool leave();
+    // Forced switch: if no step is short enough, the motion of the current modes may have ended. `can_switch_modes`
+    // returns false if the last forced switch was less than `forced_switch_spacing` tiny steps ago. `force_switch`
+    // selects modes one tiny step ahead. It returns false if it finds none.
+    bool can_switch_modes(const Failure& failure) const;
+    bool force_switch();
     // Check if the failure only means that no motion or no step was found, which proves nothing.
-    static bool leads_on(const Failure& failure);
+    static bool is_recoverable(const Failure& failure);
     // Bridge by time stepping if no motion or no short enough step was found. Applies to an accumulation of events, to
     // creeping slip, to unilateral contacts without a solution, and beside a hand-over. Return false if it does not apply.
     bool step_over(const Failure& failure, bool of_hand_over = false);
@@ -58,8 +58,8 @@ private:
     const Options& options_;
     Torques& torques_;
     Output& output_;
-    Landing& landing_;
-    Clusters& clusters_;
+    ImpactHandler& impacts_;
+    ChatterDetector& chatter_;
     Recording& out_;
 };
 

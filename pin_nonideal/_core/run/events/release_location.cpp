@@ -132,7 +132,7 @@ std::optional<double> ReleaseLocator::release_rate_inside(const std::vector<Mode
 // hold as long as some forces within all limits do. Elements that slip without moving are included. The step is
 // repeated up to the release on its interpolant. It is extended slightly if its own end does not show the release.
 std::optional<FoundEvent> ReleaseLocator::release_together() {
-    if (!w.state.indeterminate) return std::nullopt;
+    if (!w.state.is_hyperstatic) return std::nullopt;
     const std::vector<Mode> modes = w.state.mode;
     ModeQuestion asked;
     std::optional<double> rate = release_rate_at_end(modes, asked);

@@ -8,11 +8,11 @@ namespace pn {
 // Tolerance of the first instant with several motions, relative to the step.
 constexpr double several_width = 1e-12;
 
-Notices::Notices(System& system, Stepper& stepper, Progress& progress, Recording& out)
+Warnings::Warnings(System& system, Stepper& stepper, Progress& progress, Recording& out)
     : p(system.p), w(system.w), system_(system), stepper_(stepper), progress_(progress), out_(out),
       sample_(VecX::Zero(system.ny)) {}
 
-void Notices::tell_pulls(const std::optional<FoundEvent>& event) {
+void Warnings::record_pulls(const std::optional<FoundEvent>& event) {
     const int n = static_cast<int>(p.contacts.size());
     std::vector<char> asked(n, 0), now(n, 0);
     const auto ask = [&](int i, bool located) {
@@ -30,7 +30,7 @@ void Notices::tell_pulls(const std::optional<FoundEvent>& event) {
     progress_.in_tension = now;
 }
 
-std::optional<double> Notices::begin_several(bool after_step) {
+std::optional<double> Warnings::record_several(bool after_step) {
     const int element = w.now.several_element;
     const double at = after_step && w.state.unique == Uniqueness::several ? last_unique() : progress_.t;
     out_.events.push_back({at, w.now.no_motion ? Event::Kind::paradox : Event::Kind::several, element});
@@ -39,7 +39,7 @@ std::optional<double> Notices::begin_several(bool after_step) {
 
 // Return the first instant with several motions, by bisection of the step just taken on its interpolant. The workspace
 // is restored.
-double Notices::last_unique() {
+double Warnings::last_unique() {
     const RunState kept = w.state;
     stepper_.make_interpolant();
     double low = 0.0, high = 1.0;

@@ -9,13 +9,13 @@
 
 namespace pn {
 
-class Notices {
+class Warnings {
 public:
-    Notices(System& system, Stepper& stepper, Progress& progress, Recording& out);
+    Warnings(System& system, Stepper& stepper, Progress& progress, Recording& out);
 
     // Record contacts and wheels in tension, once each time the tension begins.
     void pulls(const std::optional<FoundEvent>& event) {
-        if (!p.contacts.empty()) tell_pulls(event);
+        if (!p.contacts.empty()) record_pulls(event);
     }
     // Record the instant from which the laws allow several motions, once each time. At the end of a time step this
     // includes laws that allow no motion. Return the recorded instant, which can lie inside the step.
@@ -23,12 +23,12 @@ public:
         const bool before = progress_.several_motions;
         progress_.several_motions = w.state.unique == Uniqueness::several || w.now.several || w.now.no_motion;
         if (before || !progress_.several_motions) return std::nullopt;
-        return begin_several(after_step);
+        return record_several(after_step);
     }
 
 private:
-    void tell_pulls(const std::optional<FoundEvent>& event);
-    std::optional<double> begin_several(bool after_step);
+    void record_pulls(const std::optional<FoundEvent>& event);
+    std::optional<double> record_several(bool after_step);
     double last_unique();
 
     const Program& p;

@@ -10,8 +10,8 @@ namespace pn {
 struct ErrorNormParameters {
     // Tolerance of the force of a sticking element over a step, relative to its limit.
     double share_part = 1e-4;
-    // Rounding of the force of a sticking element, relative to the largest given force. Far from the loads of a long
-    // chain limits are as small as that.
+    // Rounding of the force of a sticking element, relative to the largest given force. A friction limit
+    // in a part of a long chain without large loads may be as small as this rounding.
     double stuck_force_rounding = 64 * std::numeric_limits<double>::epsilon();
     // Shortest step [s] that resolves a load. The error of a load that jumps does not decrease with the step, so
     // shorter steps skip it.

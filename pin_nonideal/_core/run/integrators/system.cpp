@@ -75,7 +75,7 @@ void System::watch(double t, VecX& dy) {
             const auto [speed, change] = slip_toward_rest(p, w, e);
             share = speed;
             rate = change;
-        } else if (w.state.mode[e] == sticking && !w.state.indeterminate) {
+        } else if (w.state.mode[e] == sticking && !w.state.is_hyperstatic) {
             const auto [force, limit] = holding_force(p, w, e, t, q, v);
             // The force along one direction keeps its sign: it is smooth through zero.
             share = (p.frictions[e].dim == 1 ? force[0] : force.norm()) / std::max(limit, min_scale);
@@ -170,7 +170,7 @@ void System::settle(double t, VecX& y, VecX& dy, bool evaluates, bool goes_throu
     const double longest_single = longest_single_move(p, w);
     if (longest_single > 0.0) q_before_ = q;
     bool moved = project_position(p, w, t, q, v, true, !evaluates);
-    if (longest_single > 0.0 && strays_from_planes(p, w, longest_single)) {
+    if (longest_single > 0.0 && left_planes(p, w, longest_single)) {
         q = q_before_;
         chosen = move_out(p, w, t, q, v);
         project_position(p, w, t, q, v, true, !evaluates);

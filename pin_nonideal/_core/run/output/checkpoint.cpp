@@ -21,10 +21,10 @@ void fields(Archive& a, Modes& x) {
 }
 
 static void fields(Archive& a, RunState& x) {
-    auto& [mode, closed, slip_direction, last_direction, is_sticking_deferred, seeks_directions, indeterminate,
+    auto& [mode, closed, slip_direction, last_direction, is_sticking_deferred, seeks_directions, is_hyperstatic,
            rank_tolerance, z, held_torque, has_held, unknown, warm, percussion, third_order_lam, has_ideal_row_choice,
            unique, growth, steps_since] = x;
-    a(mode, closed, slip_direction, last_direction, is_sticking_deferred, seeks_directions, indeterminate,
+    a(mode, closed, slip_direction, last_direction, is_sticking_deferred, seeks_directions, is_hyperstatic,
       rank_tolerance, z, held_torque, has_held, unknown, warm, percussion, third_order_lam, has_ideal_row_choice, unique,
       growth, steps_since);
 }

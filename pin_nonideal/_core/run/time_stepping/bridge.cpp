@@ -28,10 +28,10 @@ bool asks_always(const Program& p, const Options& options) {
 }  // namespace
 
 TimeStepping::TimeStepping(System& system, Progress& progress, GapWatch& watch, const Options& options,
-                           Torques& torques, Output& output, Notices& notices, ValueEvents& value_events,
+                           Torques& torques, Output& output, Warnings& warnings, ValueEvents& value_events,
                            Recording& out)
     : p(system.p), w(system.w), system_(system), progress_(progress), options_(options), torques_(torques),
-      output_(output), notices_(notices), value_events_(value_events), out_(out), moreau_(system),
+      output_(output), warnings_(warnings), value_events_(value_events), out_(out), moreau_(system),
       moreau_contacts_(system, watch), is_autonomous_(!may_differ(system.p, options)),
       always_evaluated_(asks_always(system.p, options)) {}
 
@@ -179,8 +179,8 @@ void TimeStepping::step(double size, double stop, double t_end) {
     remember_directions(system_, progress_.slip_at_start);
     if (watched || system_.watches())
         for (const Event& change : changes_since(system_, t, closed_before_, before_)) out_.events.push_back(change);
-    notices_.pulls(std::nullopt);
-    notices_.several(false);
+    warnings_.pulls(std::nullopt);
+    warnings_.several(false);
     output_.keep_time_step(from, y_from);
     value_events_.look_at_end(t, y);
     value_events_.tell(t, out_.events);

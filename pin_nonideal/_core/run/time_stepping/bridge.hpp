@@ -23,7 +23,7 @@ public:
     static constexpr Parameters parameters{};
 
     TimeStepping(System& system, Progress& progress, GapWatch& watch, const Options& options, Torques& torques,
-                 Output& output, Notices& notices, ValueEvents& value_events, Recording& out);
+                 Output& output, Warnings& warnings, ValueEvents& value_events, Recording& out);
 
     // Set the closed contacts and the modes at the start of a run with unilateral contacts, and evaluate its motion.
     void begin(double size);
@@ -45,7 +45,7 @@ private:
     const Options& options_;
     Torques& torques_;
     Output& output_;
-    Notices& notices_;
+    Warnings& warnings_;
     ValueEvents& value_events_;
     Recording& out_;
     Moreau moreau_;
