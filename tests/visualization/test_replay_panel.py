@@ -13,6 +13,7 @@ import pytest
 
 import pin_nonideal as pn
 from pin_nonideal.trajectory.columns import column_name
+from pin_nonideal.visualization.page import payload
 from pin_nonideal.visualization.page.body_overlays import inertia_box
 from pin_nonideal.visualization.page.signal_list import OTHERS, rounding_of, signals_of, without_rounding
 from pin_nonideal.visualization.page.signals import default_plot_names
@@ -484,3 +485,15 @@ def test_values_below_rounding_are_zero() -> None:
     level = rounding_of([("N", np.array([3.0, -50.0, 1e-9])), ("rad", np.array([2.0, np.nan]))])
     assert level == {"N": pytest.approx(5e-8), "rad": pytest.approx(2e-12)}
     np.testing.assert_array_equal(without_rounding(np.array([3.0, -1e-9, np.nan]), 5e-8), [3.0, 0.0, np.nan])
+
+
+def test_forces_that_are_rounding_of_the_weight_are_zero(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Multipliers of a loop in free fall are rounding, and their largest value is no measure of it."""
+    run, drawn = four_bar(), []
+    stored = payload.stored_plot
+    monkeypatch.setattr(payload, "stored_plot", lambda *pair: (drawn.append(pair[1]), stored(*pair))[1])
+    for factor, is_drawn in ((1e-12, False), (1e-6, True)):
+        run.lam, run.lam_ideal = factor * four_bar().lam, None
+        drawn.clear()
+        payload.packed_runs([run], ["run"], None, "title", ["reactions"], True)
+        assert any(values.any() for values in drawn[0].curves.values()) == is_drawn
