@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -192,7 +193,7 @@ def test_panels_cover_no_control_and_curves_are_tall(loop: Watched, size: tuple[
         const hit = document.elementFromPoint(left + width / 2, top + height / 2);
         return hit !== item && !item.contains(hit);
       }).map((item) => item.id)""")
-    heights = loop.run("() => [...document.querySelectorAll('.plot canvas')].map((one) => one.clientHeight)")
+    heights = loop.run("() => replay.curveHeights")
     list_height = loop.run("() => document.querySelector('#panel .scroll').clientHeight")
     loop.page.set_viewport_size({"width": 1000, "height": 720})
     assert covered == []
@@ -248,6 +249,37 @@ def test_tables_and_legends_are_whole(feet: Watched, size: tuple[int, int]) -> N
     assert max(found["titles_cut"]) <= 0
     assert found["subtitle"].startswith("13 joints · 4 contacts · ")
     assert len(set(found["rows"])) <= 2
+
+
+RANGES = """() => ["#forces .scroll", "#lanes"].map((name) => {
+  const box = document.querySelector(name);
+  const note = box.parentElement.querySelector(":scope > .range, h2 .range");
+  const all = name === "#lanes" ? box.scrollHeight / 13 : box.querySelectorAll("tbody tr").length;
+  return [box.scrollHeight > box.clientHeight + 1, note.offsetHeight > 0 ? note.textContent : "", all];
+})"""
+
+
+@pytest.mark.parametrize("size", SIZES, ids=str)
+def test_lists_with_hidden_rows_tell_which_rows_are_visible(feet: Watched, size: tuple[int, int]) -> None:
+    feet.page.set_viewport_size({"width": size[0], "height": size[1]})
+    feet.run("() => { replay.showForces(true); dispatchEvent(new Event('resize')); }")
+    drawn = "() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
+    feet.run(drawn)
+    found = feet.run(RANGES)
+    if size == (900, 500):
+        assert [cut for cut, _, _ in found] == [True, True]
+    for cut, text, count in found:
+        assert bool(text) == cut
+        assert not cut or re.fullmatch(rf"1 to \d+ of {count} ↕", text)
+    feet.run(
+        "() => document.querySelectorAll('#forces .scroll, #lanes').forEach((box) => box.scrollTo(0, 9999))"
+    )
+    feet.run(drawn)
+    for cut, text, count in feet.run(RANGES):
+        assert not cut or re.fullmatch(rf"\d+ to {count} of {count} ↕", text)
+    feet.run(
+        "() => document.querySelectorAll('#forces .scroll, #lanes').forEach((box) => box.scrollTo(0, 0))"
+    )
 
 
 def test_the_gap_of_a_loop_begins_its_line_where_the_line_above_begins(loop: Watched) -> None:
