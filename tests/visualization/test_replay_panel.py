@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +14,7 @@ import pytest
 
 import pin_nonideal as pn
 from pin_nonideal.trajectory.columns import column_name
+from pin_nonideal.visualization.page import payload
 from pin_nonideal.visualization.page.body_overlays import inertia_box
 from pin_nonideal.visualization.page.signal_list import OTHERS, rounding_of, signals_of, without_rounding
 from pin_nonideal.visualization.page.signals import default_plot_names
@@ -191,7 +193,7 @@ def test_panels_cover_no_control_and_curves_are_tall(loop: Watched, size: tuple[
         const hit = document.elementFromPoint(left + width / 2, top + height / 2);
         return hit !== item && !item.contains(hit);
       }).map((item) => item.id)""")
-    heights = loop.run("() => [...document.querySelectorAll('.plot canvas')].map((one) => one.clientHeight)")
+    heights = loop.run("() => replay.curveHeights")
     list_height = loop.run("() => document.querySelector('#panel .scroll').clientHeight")
     loop.page.set_viewport_size({"width": 1000, "height": 720})
     assert covered == []
@@ -247,6 +249,37 @@ def test_tables_and_legends_are_whole(feet: Watched, size: tuple[int, int]) -> N
     assert max(found["titles_cut"]) <= 0
     assert found["subtitle"].startswith("13 joints · 4 contacts · ")
     assert len(set(found["rows"])) <= 2
+
+
+RANGES = """() => ["#forces .scroll", "#lanes"].map((name) => {
+  const box = document.querySelector(name);
+  const note = box.parentElement.querySelector(":scope > .range, h2 .range");
+  const all = name === "#lanes" ? box.scrollHeight / 13 : box.querySelectorAll("tbody tr").length;
+  return [box.scrollHeight > box.clientHeight + 1, note.offsetHeight > 0 ? note.textContent : "", all];
+})"""
+
+
+@pytest.mark.parametrize("size", SIZES, ids=str)
+def test_lists_with_hidden_rows_tell_which_rows_are_visible(feet: Watched, size: tuple[int, int]) -> None:
+    feet.page.set_viewport_size({"width": size[0], "height": size[1]})
+    feet.run("() => { replay.showForces(true); dispatchEvent(new Event('resize')); }")
+    drawn = "() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
+    feet.run(drawn)
+    found = feet.run(RANGES)
+    if size == (900, 500):
+        assert [cut for cut, _, _ in found] == [True, True]
+    for cut, text, count in found:
+        assert bool(text) == cut
+        assert not cut or re.fullmatch(rf"1 to \d+ of {count} ↕", text)
+    feet.run(
+        "() => document.querySelectorAll('#forces .scroll, #lanes').forEach((box) => box.scrollTo(0, 9999))"
+    )
+    feet.run(drawn)
+    for cut, text, count in feet.run(RANGES):
+        assert not cut or re.fullmatch(rf"\d+ to {count} of {count} ↕", text)
+    feet.run(
+        "() => document.querySelectorAll('#forces .scroll, #lanes').forEach((box) => box.scrollTo(0, 0))"
+    )
 
 
 def test_the_gap_of_a_loop_begins_its_line_where_the_line_above_begins(loop: Watched) -> None:
@@ -484,3 +517,15 @@ def test_values_below_rounding_are_zero() -> None:
     level = rounding_of([("N", np.array([3.0, -50.0, 1e-9])), ("rad", np.array([2.0, np.nan]))])
     assert level == {"N": pytest.approx(5e-8), "rad": pytest.approx(2e-12)}
     np.testing.assert_array_equal(without_rounding(np.array([3.0, -1e-9, np.nan]), 5e-8), [3.0, 0.0, np.nan])
+
+
+def test_forces_that_are_rounding_of_the_weight_are_zero(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Multipliers of a loop in free fall are rounding, and their largest value is no measure of it."""
+    run, drawn = four_bar(), []
+    stored = payload.stored_plot
+    monkeypatch.setattr(payload, "stored_plot", lambda *pair: (drawn.append(pair[1]), stored(*pair))[1])
+    for factor, is_drawn in ((1e-12, False), (1e-6, True)):
+        run.lam, run.lam_ideal = factor * four_bar().lam, None
+        drawn.clear()
+        payload.packed_runs([run], ["run"], None, "title", ["reactions"], True)
+        assert any(values.any() for values in drawn[0].curves.values()) == is_drawn

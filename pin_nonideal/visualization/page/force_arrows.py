@@ -112,11 +112,22 @@ def arrows_of(
     return _above_rounding([*arrows, *more], run.scene.model, motion.size)
 
 
+def weight_scales(model: pin.Model, size: float) -> dict[str, float]:
+    """Return the weight of all bodies [N], its moment at the size of the model [N m], and the lesser of both.
+
+    Args:
+        model: model of the scene.
+        size: size of the model [m].
+    """
+    weight = sum(inertia.mass for inertia in model.inertias) * float(np.linalg.norm(model.gravity.linear))
+    return {"N": weight, "N m": weight * size, "N, N m": weight * min(1.0, size)}
+
+
 def _above_rounding(arrows: list[Arrow], model: pin.Model, size: float) -> list[Arrow]:
     """Return the arrows above rounding, relative to the largest arrows and to the weight of all bodies."""
-    weight = sum(inertia.mass for inertia in model.inertias) * float(np.linalg.norm(model.gravity.linear))
-    force = max([weight, *(arrow.largest() for arrow in arrows if arrow.unit == "N")])
-    moment = max([weight * size, *(arrow.largest() for arrow in arrows if arrow.unit == "N m")])
+    scales = weight_scales(model, size)
+    force = max([scales["N"], *(arrow.largest() for arrow in arrows if arrow.unit == "N")])
+    moment = max([scales["N m"], *(arrow.largest() for arrow in arrows if arrow.unit == "N m")])
     least = {
         "N": MIN_RELATIVE_SIZE * max(force, moment / size),
         "N m": MIN_RELATIVE_SIZE * max(moment, force * size),

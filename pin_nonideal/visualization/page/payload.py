@@ -18,7 +18,7 @@ from .camera import link_length, pattern_spacings, up_direction, view
 from .constraint_curves import Guide, guides_of
 from .contact_points import contact_point_marks, contact_points
 from .contact_surfaces import contact_surfaces
-from .force_arrows import arrows_of
+from .force_arrows import arrows_of, weight_scales
 from .frames import Motion, sample
 from .friction_glyphs import elements_of
 from .joint_tracks import Tracks
@@ -98,7 +98,8 @@ def packed_runs(
     items = [] if plots is None else parse_plots("plots", plots)
     curves = None if plots is None else [item for item in items if not names_relation(run, item)]
     signals = signals_of(run, finer)
-    rounding = rounding_of((signal.unit, signal.values) for signal in signals)
+    scales = weight_scales(model, motion.size)
+    rounding = rounding_of(((signal.unit, signal.values) for signal in signals), scales)
     header = {
         "title": title,
         "subtitle": subtitle_of(run),

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -243,16 +244,19 @@ def _thin_signal(item: _RecordedSignal, t: Array, points: int) -> Signal:
     return Signal(label, item.unit, item.section, words, plot.t, plot.curves[label])
 
 
-def rounding_of(pairs: Iterator[tuple[str, Array]]) -> dict[str, float]:
+def rounding_of(
+    pairs: Iterable[tuple[str, Array]], scales: Mapping[str, float] = MappingProxyType({})
+) -> dict[str, float]:
     """Return the size of rounding for each unit.
 
     Args:
         pairs: units and values in them.
+        scales: least sizes by unit, such as the weight of all bodies for forces.
 
     Returns:
         By unit 1e-9 of the largest value of forces and moments, and 1e-12 of other largest values.
     """
-    largest: dict[str, float] = {}
+    largest = dict(scales)
     for unit, values in pairs:
         size = np.abs(values[np.isfinite(values)]).max(initial=0.0)
         largest[unit] = max(largest.get(unit, 0.0), float(size))

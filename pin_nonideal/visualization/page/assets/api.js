@@ -21,6 +21,7 @@ function publicApi(player) {
     box: () => player.stage.box(),
     show: (what, shown) => player.stage.show(what, shown),
     get looks() { return player.plots.map((plot) => plot.curves.map(({ color, dash }) => `${color} ${dash}`)); },
+    get curveHeights() { return player.plots.map((plot) => plot.bottom - plot.top); },
     get margin() { return player.timeline.axis.left; },
     get address() { return player.address.text(); },
     get gap() { return player.stage.marks.gap(); },

@@ -18,6 +18,7 @@ class Bands {
     Object.assign(this, { bands: run.modes, looks: run.looks, end: run.times[run.times.length - 1], canvas, tip });
     canvas.parentElement.hidden = !this.bands.length;
     canvas.style.height = `${this.bands.length * BAND}px`;
+    canvas.parentElement.addEventListener("scroll", () => this.writeRange());
     this.axis = new TimeAxis(span, canvas, seek, (t, event) => {
       hover(t);
       this.showTip(t === null ? "" : this.textAt(t, event.offsetY), event);
@@ -51,7 +52,10 @@ class Bands {
     return Math.min(Math.max(...this.bands.map((band) => c.measureText(band.label).width)), room) + 14;
   }
 
+  writeRange() { writeRange(element("lanes-range"), this.canvas.parentElement, this.bands.map((_, row) => (row + 1) * BAND)); }
+
   resize(left) {
+    this.writeRange();
     const { context: c, width, height } = fitCanvas(this.canvas);
     if (!this.bands.length || !width) return;
     Object.assign(this.axis, { left, right: width - 8 });

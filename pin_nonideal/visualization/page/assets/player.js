@@ -2,7 +2,7 @@
 
 const ICONS = { play: "M7 4.5v15l13-7.5z", pause: "M6 5h4v14H6zM14 5h4v14h-4z" };
 const SPEEDS = Array.from({ length: 27 }, (_, i) => Number(`${[1, 2, 5][i % 3]}e${Math.floor(i / 3) - 4}`)).slice(0, 25);
-const MIN_CURVE_HEIGHT = 100; // minimum height of a curve [pixels]
+const MIN_CANVAS_HEIGHT = 124; // minimum height of a plot [pixels]: 100 for its curves, and the labels of its axis
 const PLAY_SECONDS = [5, 15]; // shortest and longest duration of playback at the default speed [s]
 const element = (id) => document.getElementById(id);
 
@@ -277,7 +277,7 @@ class Player {
     plots.style.removeProperty("--tall");
     if (!this.dock || !last || last.box.offsetTop !== this.plots[0].box.offsetTop) return;
     const more = plots.clientHeight - last.box.offsetTop + plots.offsetTop - last.box.offsetHeight;
-    plots.style.setProperty("--tall", `${Math.max(MIN_CURVE_HEIGHT, last.canvas.clientHeight + more)}px`);
+    plots.style.setProperty("--tall", `${Math.max(MIN_CANVAS_HEIGHT, last.canvas.clientHeight + more)}px`);
   }
 
   resize() {

@@ -1,5 +1,14 @@
 // Table of forces: a row for each point of action, a column for each part.
 
+/** Writes which rows of a scrolled box are visible; `ends` are their lower ends in its content [pixels]. */
+function writeRange(note, box, ends) {
+  const whole = box.scrollHeight <= box.clientHeight + 1, top = box.scrollTop, middle = (k) => ((ends[k - 1] || 0) + ends[k]) / 2;
+  const seen = ends.map((_, k) => k + 1).filter((row) => middle(row - 1) > top && middle(row - 1) < top + box.clientHeight);
+  note.hidden = whole || !seen.length;
+  note.textContent = note.hidden ? "" : `${seen[0]} to ${seen[seen.length - 1]} of ${ends.length} ↕`;
+  note.title = "scroll for more";
+}
+
 class ForceTable {
   constructor(run, arrows, box) {
     Object.assign(this, { arrows, box });
@@ -15,6 +24,9 @@ class ForceTable {
       cell.style.setProperty("--swatch", run.looks.forces[kind]);
       head.append(cell);
     }
+    this.ends = [];
+    this.scroll = box.querySelector(".scroll");
+    this.scroll.addEventListener("scroll", () => this.writeRange());
     this.parts = arrows.items.length <= 6; // few enough to show components too
     this.cells = [];
     const rows = new Map(), body = table.createTBody();
@@ -33,17 +45,23 @@ class ForceTable {
 
   /** Shortens names in their middle, since their ends differ, and ends the visible part below a whole row. */
   fit() {
-    const scroll = this.box.querySelector(".scroll"), names = [...this.box.querySelectorAll("tbody td:first-child")];
+    const { scroll } = this, names = [...this.box.querySelectorAll("tbody td:first-child")];
     if (!names.length || !scroll.clientWidth) return;
     const style = getComputedStyle(names[0]), c = document.createElement("canvas").getContext("2d");
     c.font = `${style.fontSize} ${style.fontFamily}`;
     for (const cell of names) cell.textContent = shortened(c, cell.title, parseFloat(style.maxWidth) - 2);
     scroll.style.maxHeight = "";
+    this.ends = [];
+    this.writeRange();
     if (scroll.scrollHeight <= scroll.clientHeight + 1) return;
     const top = scroll.getBoundingClientRect().top, ends = [...scroll.querySelectorAll("tr")].map((row) => row.getBoundingClientRect().bottom - top + scroll.scrollTop);
     const last = ends.filter((end) => end <= scroll.clientHeight + 0.5).pop();
     if (last) scroll.style.maxHeight = `${last}px`;
+    this.ends = ends.slice(1); // the first row is the head
+    this.writeRange();
   }
+
+  writeRange() { writeRange(this.box.querySelector(".range"), this.scroll, this.ends); }
 
   update() {
     for (const [arrow, cell] of this.cells) {
