@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Collection, Iterator, Sequence
+from itertools import compress
 from typing import cast
 
 import numpy as np
@@ -67,12 +68,13 @@ def open_contacts(run: RunFields) -> frozenset[str]:
     closed, scene = getattr(run, "closed", None), getattr(run, "scene", None)
     if closed is None or scene is None:
         return frozenset()
-    met = set(np.nonzero(closed)[1].tolist())
-    return frozenset(name for k, name in enumerate(scene.contact_names) if k not in met)
+    return frozenset(compress(scene.contact_names, ~np.any(closed, axis=0)))
 
 
 def motion_columns(run: RunFields, fields: Collection[str]) -> dict[str, Array]:
     """Return the columns of some fields of the joints and of the energies, (nt,) each.
+
+    Energies of contacts that are open at all samples are left out.
 
     Args:
         run: trajectory of the run.
@@ -83,8 +85,9 @@ def motion_columns(run: RunFields, fields: Collection[str]) -> dict[str, Array]:
         for name, values, _ in _joints(run)
         if name.removesuffix(_number(name)).rpartition(".")[2] in fields
     }
+    energy, left_out = run.energy or {}, open_contacts(run)
     if "energy" in fields:
-        table |= {column_name(f"energy.{name}"): values for name, values in (run.energy or {}).items()}
+        table |= {column_name(f"energy.{name}"): energy[name] for name in energy if name not in left_out}
     return table
 
 
@@ -197,10 +200,12 @@ def _remaining_columns(run: RunFields, left_out: Collection[str]) -> Iterator[tu
             if of_all is not None:
                 yield f"{name}.{field}", cast("Array", of_all[:, k]), unit
     for name, values in (run.reactions or {}).items():
-        yield from _number_columns(f"{name}.reaction", values[:, :6], ["N"] * 3 + ["N m"] * 3)
+        if name not in left_out:
+            yield from _number_columns(f"{name}.reaction", values[:, :6], ["N"] * 3 + ["N m"] * 3)
     for field, unit in (("energy", "J"), ("power", "W")):
         for name, values in (getattr(run, field) or {}).items():
-            yield f"{field}.{name}", values, unit
+            if name not in left_out:
+                yield f"{field}.{name}", values, unit
     yield from _number_columns("z", run.z, [])
     yield "violation", run.violation, "m or rad"
     yield "violation_rate", run.violation_rate, "m/s or rad/s"

@@ -105,7 +105,7 @@ def _of_laws(scene: Scene, outcome: core.Outcome) -> Table:
     elements = len(scene.element_names)
     return {
         "law_forces": dict(zip(program.law_names, parts, strict=False)),
-        "law_dofs": [list(dofs) for dofs in supports],
+        "law_dofs": supports,
         "limits": outcome.limits.reshape(nt, elements) if elements else None,
     }
 

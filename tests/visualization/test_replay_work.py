@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import sys
+from collections import Counter
 from itertools import product
+from pathlib import Path
+from types import SimpleNamespace
 
 import coal
 import numpy as np
@@ -10,15 +14,25 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal.visualization.page import between_samples, camera, frames, payload, resampling
+from pin_nonideal.core_loader import core
+from pin_nonideal.visualization.page import (
+    between_samples,
+    camera,
+    frames,
+    mode_timeline,
+    payload,
+    resampling,
+    signals,
+)
 
 COUNT = 4
+QUIET = {"record": ("forces", "energy"), "progress": False}
 
 
-def boxes(beside=False):
-    """Boxes that fall on a floor and come to rest; two of them have contacts with each other if `beside`."""
+def boxes(beside=False, count=COUNT):
+    """Boxes that fall on a floor and come to rest; they have contacts with each other if `beside`."""
     model, shapes = pin.Model(), pin.GeometryModel()
-    for k in range(2 if beside else COUNT):
+    for k in range(count):
         place = np.array([0.6 * k, 0.0, 0.08 + 0.02 * k])
         pn.free_body(model, f"box {k}", coal.Box(0.1, 0.1, 0.1), 500.0, collision_model=shapes, place=place)
     contacts = pn.ground_contacts(model, shapes, mu=0.4)
@@ -89,7 +103,7 @@ def test_displacements_between_samples_are_computed_once(monkeypatch):
 
 def test_forces_of_contacts_that_stay_open_are_not_resampled(monkeypatch):
     """Two boxes have 160 gaps, which the page shows if they close."""
-    run, asked, read = boxes(beside=True), set(), resampling._ResampledFields.__getitem__
+    run, asked, read = boxes(beside=True, count=2), set(), resampling._ResampledFields.__getitem__
 
     def recorded(self, name):
         if self.field == "contact_forces":
@@ -101,6 +115,58 @@ def test_forces_of_contacts_that_stay_open_are_not_resampled(monkeypatch):
     between = {name for name in run.scene.contact_names if "ground" not in name}
     assert len(between) == 160
     assert asked == set(run.scene.contact_names) - between
+
+
+def calls(run):
+    """Number of calls of each function of the package during the work on a page, comprehensions apart."""
+    counts, package = Counter(), str(Path(pn.__file__).parent)
+
+    def count(frame, event, _):
+        code = frame.f_code
+        if event == "call" and code.co_filename.startswith(package) and not code.co_name.startswith("<"):
+            counts[code.co_qualname] += 1
+
+    sys.setprofile(count)
+    try:
+        packed(run)
+    finally:
+        sys.setprofile(None)
+    return counts
+
+
+def test_constraints_and_planes_of_contacts_are_collected_once():
+    counts = calls(boxes(beside=True, count=2))
+    assert (counts["constraints_of"], counts["planes_of"]) == (1, 1)
+
+
+def test_no_function_is_called_for_each_contact_that_stays_open():
+    """Two boxes side by side have 160 contacts with each other, which all stay open."""
+    alone, beside = calls(boxes(count=2)), calls(boxes(beside=True, count=2))
+    assert {name: number for name, number in (beside - alone).items() if number >= 80} == {}
+
+
+def test_gaps_of_many_contacts_are_computed_at_few_samples_and_drawn_at_all(monkeypatch):
+    """The few samples choose the curves of the plot."""
+    run, sizes, values = boxes(beside=True, count=2), [], core.gap_values
+
+    def counted(program, q, t, blocks):
+        sizes.append((len(t), len(blocks)))
+        return values(program, q, t, blocks)
+
+    monkeypatch.setattr(mode_timeline, "MAX_GAP_VALUES", 2000.0)
+    monkeypatch.setattr(mode_timeline, "core", SimpleNamespace(gap_values=counted))
+    (plot,) = signals.plots_of(run, ["gaps"])
+    every, few = len(run.scene.contact_names), mode_timeline.MIN_GAP_SAMPLES
+    assert sizes == [(few, every), (len(run.t), signals.MAX_CURVES)]
+    np.testing.assert_array_equal(plot.t, run.t)
+    assert plot.note == f"{signals.MAX_CURVES} of {every}, those that move most"
+
+
+def test_a_page_of_100000_samples_takes_as_many_calls_as_one_of_1000():
+    short, long = (pn.simulate(pn.load("four_bar"), 0.1, output_dt=dt, **QUIET) for dt in (1e-4, 1e-6))
+    assert (len(short.t), len(long.t)) == (1001, 100001)
+    grown = calls(long) - calls(short)
+    assert {name: number for name, number in grown.items() if number > 40} == {}
 
 
 def test_resampled_values_are_a_mapping_with_values_at_the_frames():

@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from pin_nonideal.types import Array
 
-from .contact_surfaces import ground_of, planes_of
+from .contact_surfaces import Plane, ground_of, planes_of
 from .frames import Motion
 from .visuals import Visual
 
@@ -53,7 +53,12 @@ class View:
 
 
 def view(
-    scene: Scene, motion: Motion, visuals: list[Visual], marks: list[tuple[int, Array]], shown: Array
+    scene: Scene,
+    motion: Motion,
+    visuals: list[Visual],
+    marks: list[tuple[int, Array]],
+    shown: Array,
+    planes: list[Plane] | None = None,
 ) -> View:
     """Return the view that shows the whole motion.
 
@@ -63,6 +68,7 @@ def view(
         visuals: drawn shapes.
         marks: additional points, as joint index and position in its frame [m].
         shown: additional points of the world in the view [m], (k, 3).
+        planes: planes of the contacts, if they are known.
     """
     model = scene.model
     up = up_direction(model)
@@ -90,7 +96,7 @@ def view(
         outline=_extreme_points(beside),
         size=max(size, 0.05 * _diagonal(points)),
         link=link_length(model, marks, max(size, 0.05 * _diagonal(points))),
-        ground=_ground(scene, visuals, points, size, up, follow),
+        ground=_ground(planes_of(scene) if planes is None else planes, visuals, points, size, up, follow),
         follow=follow,
         stays=stays,
     )
@@ -159,10 +165,10 @@ def _joints_in_view(njoints: int, clouds: list[tuple[int, Array]], size: float) 
 
 
 def _ground(
-    scene: Scene, visuals: list[Visual], points: Array, size: float, up: Array, follow: bool
+    planes: list[Plane], visuals: list[Visual], points: Array, size: float, up: Array, follow: bool
 ) -> float | None:
     """Return the height of the ground plane in contact, or of a floor below a robot near height zero."""
-    touched = ground_of(planes_of(scene), up)
+    touched = ground_of(planes, up)
     if touched is not None:
         return float(touched.point @ up)
     if any(v.joint == 0 and v.shape.kind == "plane" for v in visuals) or follow:

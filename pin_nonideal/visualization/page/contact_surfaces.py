@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from pin_nonideal.description.contacts import JointLimit
-from pin_nonideal.description.contacts.round import CapsuleContact, SphereContact, segments
+from pin_nonideal.description.contacts.round import CapsuleContact, SphereContact
 from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.states.kinematics import frame_on_joint
 from pin_nonideal.types import Array
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 # Margin of a patch beyond the contact points, and maximum distance from their median, in model sizes.
 PATCH_MARGIN, MAX_PATCH_REACH = 0.25, 2.5
 PATCH: Color = (0.66, 0.46, 0.24, 0.6)
+# Segment of a sphere in the axes of its frame [m].
+CENTER = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 STOP: Color = (0.28, 0.33, 0.41, 1.0)
 
 
@@ -81,7 +83,9 @@ def ground_of(planes: list[Plane], up: Array) -> Plane | None:
     return min(level, key=lambda plane: float(plane.point @ up)) if level else None
 
 
-def contact_surfaces(run: Trajectory, motion: Motion, visuals: list[Visual], up: Array) -> list[Visual]:
+def contact_surfaces(
+    run: Trajectory, motion: Motion, visuals: list[Visual], up: Array, planes: list[Plane] | None = None
+) -> list[Visual]:
     """Return patches of planes without shapes, and the stops of joints with impacts.
 
     Args:
@@ -89,8 +93,9 @@ def contact_surfaces(run: Trajectory, motion: Motion, visuals: list[Visual], up:
         motion: motion of the run.
         visuals: existing shapes.
         up: direction against gravity, (3,).
+        planes: planes of the contacts, if they are known.
     """
-    planes = planes_of(run.scene)
+    planes = planes_of(run.scene) if planes is None else planes
     ground, drawn = ground_of(planes, up), {visual.joint for visual in visuals}
     hidden = [
         plane for plane in planes if plane is not ground and (plane.joint not in drawn or not plane.joint)
@@ -105,16 +110,19 @@ def _round_bodies(scene: Scene) -> list[Visual]:
     """Return the spheres and capsules in contact with each other, for a scene without shapes."""
     if scene.visual_model is not None and len(scene.visual_model.geometryObjects):
         return []
-    bodies: dict[tuple[str, bytes], Visual] = {}
+    sides: dict[tuple[Any, ...], None] = {}  # of many contacts each, in their order
     for item in scene.contacts:
-        if not isinstance(item, SphereContact | CapsuleContact):
-            continue
-        for frame, ends, radius in zip(
-            (item.frame1, item.frame2), segments(item), (item.radius1, item.radius2), strict=True
-        ):
-            way = ends[1] - ends[0]
-            if radius > 0.0 and (frame, way.tobytes()) not in bodies:  # corners and edges have radius 0
-                bodies[frame, way.tobytes()] = _round_body(scene.model, frame, ends[0], ends[1], radius)
+        if isinstance(item, SphereContact):
+            sides[item.frame1, CENTER, item.radius1] = sides[item.frame2, CENTER, item.radius2] = None
+        elif isinstance(item, CapsuleContact):
+            sides[item.frame1, item.segment1, item.radius1] = None
+            sides[item.frame2, item.segment2, item.radius2] = None
+    bodies: dict[tuple[str, bytes], Visual] = {}
+    for frame, segment, radius in sides:
+        start, end = np.array(segment)
+        key = (frame, (end - start).tobytes())
+        if radius > 0.0 and key not in bodies:  # corners and edges have radius 0
+            bodies[key] = _round_body(scene.model, frame, start, end, radius)
     return list(bodies.values())
 
 

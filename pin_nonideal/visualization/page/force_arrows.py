@@ -25,7 +25,7 @@ from pin_nonideal.validation import axis_triad, unit_axis
 
 from .contact_points import ContactPoint
 from .frames import Motion
-from .markers import Side, constraints_of, side_of, sides_of
+from .markers import Constraint, Side, constraints_of, side_of, sides_of
 from .visuals import joint_axis
 
 if TYPE_CHECKING:
@@ -68,7 +68,11 @@ class Arrow:
 
 
 def arrows_of(
-    run: Trajectory, motion: Motion, touches: Sequence[ContactPoint], more: Sequence[Arrow] = ()
+    run: Trajectory,
+    motion: Motion,
+    touches: Sequence[ContactPoint],
+    more: Sequence[Arrow] = (),
+    held: Sequence[Constraint] | None = None,
 ) -> list[Arrow]:
     """Return the arrows of the recorded forces that exceed rounding.
 
@@ -77,6 +81,7 @@ def arrows_of(
         motion: motion of the run.
         touches: contacts of the run.
         more: arrows of other forces.
+        held: constraints of the scene, if they are known.
     """
     forces = getattr(run, "contact_forces", None) or {}
     arrows = [
@@ -85,9 +90,7 @@ def arrows_of(
         if touch.name in forces
     ]
     if run.lam is not None:
-        for name, item, shown in constraints_of(run.scene):
-            if shown == core.DisplayKind.contact:  # the forces of contacts are drawn at their points
-                continue
+        for name, item, shown in constraints_of(run.scene) if held is None else held:
             rows = run.scene.constraint_slices[name]
             parts = {"total": motion.of(run.lam[:, rows])}
             if run.lam_ideal is not None:

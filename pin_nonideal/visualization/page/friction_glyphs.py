@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -67,9 +68,10 @@ def elements_of(
     contacts = {touch.name: touch for touch in touches}
     places = {mark.name: mark for mark in marks}
     laws = dict(zip(run.element_names, run.element_laws, strict=False))
+    counts = Counter(run.element_laws)
     for band, (name, _) in enumerate(bands_of(run)):
         law = run.law_names[laws[name]] if name in laws else name
-        whole = name not in laws or run.element_laws.count(laws[name]) == 1
+        whole = name not in laws or counts[laws[name]] == 1
         if law in joints:
             at, share = joints[law], _joint_share(run, law, joints[law], run.element_names.index(name))
             axis, part = joint_axis(run.scene.model, at)[0], None if share is None else motion.of(share)

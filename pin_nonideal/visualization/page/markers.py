@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -17,6 +18,9 @@ from pin_nonideal.states.kinematics import frame_on_joint, joint_placements
 from pin_nonideal.types import Array
 
 from .frames import Motion
+
+# Name of the rows of a constraint, its description, and its display kind.
+Constraint = tuple[str, Any, core.DisplayKind]
 
 
 @dataclass(frozen=True)
@@ -76,20 +80,25 @@ class Side:
         return np.asarray(np.einsum("nij,nj->ni", turn, local))
 
 
-def marks_of(scene: Scene) -> list[Mark]:
+def marks_of(scene: Scene, held: Sequence[Constraint] | None = None) -> list[Mark]:
     """Return the marks of all anchors, rods, points and spheres on planes, and springs of a scene.
 
     Args:
         scene: scene of the run.
+        held: its constraints, if they are known.
     """
-    marks = []
-    for name, item, shown in constraints_of(scene):
+    marks = [
+        _tie(scene, name, shown.name, item)
+        for name, item, shown in (constraints_of(scene) if held is None else held)
+        if shown in (core.DisplayKind.anchor, core.DisplayKind.rod)
+    ]
+    described = compiled_scene(scene).described
+    for name in scene.constraint_slices:
+        item = described[name]
         if isinstance(item, PointContact):
             side = side_of(scene.model, item.frame)
             point = side.placement.act(np.array(item.offset))
             marks.append(Mark(name, "contact", side.joint, point, side.joint, point))
-        elif shown in (core.DisplayKind.anchor, core.DisplayKind.rod):
-            marks.append(_tie(scene, name, shown.name, item))
     springs = [item for item in scene.forces if isinstance(item, SpringDamper)]
     return marks + [_tie(scene, item.name or f"spring {item.frame1}", "spring", item) for item in springs]
 
@@ -102,15 +111,20 @@ def _tie(scene: Scene, name: str, kind: str, item: Any) -> Mark:
     return Mark(name, kind, first.joint, first.point, second.joint, second.point, axes)
 
 
-def constraints_of(scene: Scene) -> list[tuple[str, Any, core.DisplayKind]]:
-    """Return constraints and contacts with the names of their rows and their display kinds from the core.
+def constraints_of(scene: Scene) -> list[Constraint]:
+    """Return the constraints with the names of their rows and their display kinds from the core.
+
+    Contacts that are drawn at their points are left out.
 
     Args:
         scene: scene of the run.
     """
     compiled = compiled_scene(scene)
-    shown = {c.name: c.shown for c in compiled.program.constraints}
-    return [(name, compiled.described[name], shown[name]) for name in scene.constraint_slices]
+    kinds = ((c.name, c.shown) for c in compiled.program.constraints)
+    shown = {name: kind for name, kind in kinds if kind != core.DisplayKind.contact}
+    return [
+        (name, compiled.described[name], shown[name]) for name in scene.constraint_slices if name in shown
+    ]
 
 
 def side_of(model: pin.Model, frame: str) -> Side:

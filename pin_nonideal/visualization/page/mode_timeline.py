@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,10 +19,10 @@ if TYPE_CHECKING:
 
 # Maximum number of samples at which gaps are computed.
 MAX_GAP_SAMPLES = 5000
-# Maximum number of gaps at all samples, about half a second of work. Scenes of many contacts have fewer
-# samples, but at least `MIN_GAP_SAMPLES`.
-MAX_GAP_VALUES = 2e6
-MIN_GAP_SAMPLES = 100
+# Maximum number of gaps at all samples, about a quarter of a second of work. Scenes of many contacts have
+# fewer samples, but at least `MIN_GAP_SAMPLES`.
+MAX_GAP_VALUES = 1e6
+MIN_GAP_SAMPLES = 20
 
 Bands = list[tuple[float, float, int]]
 
@@ -78,13 +79,15 @@ def has_open_contact(run: Trajectory) -> bool:
     return closed is not None and not np.asarray(closed).all()
 
 
-def gaps_of(run: Trajectory) -> tuple[Array, dict[str, Array]]:
-    """Return times [s], (k,), and the gaps of the contacts at these times by name [m, rad], (k,).
+def gaps_of(run: Trajectory, names: Sequence[str] | None = None) -> tuple[Array, dict[str, Array]]:
+    """Return times [s], (k,), and the gaps of contacts at these times by name [m, rad], (k,).
 
     Args:
         run: run of the replay.
+        names: names of the contacts; None for all.
     """
-    t, names, compiled = np.asarray(run.t, dtype=float), run.scene.contact_names, compiled_scene(run.scene)
+    t, compiled = np.asarray(run.t, dtype=float), compiled_scene(run.scene)
+    names = run.scene.contact_names if names is None else names
     count = int(np.clip(MAX_GAP_VALUES / max(1, len(names)), MIN_GAP_SAMPLES, MAX_GAP_SAMPLES))
     chosen = np.unique(np.linspace(0, len(t) - 1, min(len(t), count)).astype(int))
     numbers = {name: block for block, name in enumerate(compiled.block_names)}

@@ -17,12 +17,12 @@ from .body_overlays import collisions_of, colored_collisions, inertia_box
 from .camera import link_length, pattern_spacings, up_direction, view
 from .constraint_curves import Guide, guides_of
 from .contact_points import contact_point_marks, contact_points
-from .contact_surfaces import contact_surfaces
+from .contact_surfaces import contact_surfaces, planes_of
 from .force_arrows import arrows_of, weight_scales
 from .frames import Motion, sample
 from .friction_glyphs import elements_of
 from .joint_tracks import Tracks
-from .markers import marks_of
+from .markers import constraints_of, marks_of
 from .mode_timeline import bands_of
 from .relations import names_relation, stored_relations
 from .resampling import resample
@@ -74,8 +74,8 @@ def packed_runs(
             `STAGES`.
     """
     run, payload = runs[0], Payload()
-    scene, marks = run.scene, marks_of(run.scene)
-    motions = []
+    scene, held, planes = run.scene, constraints_of(run.scene), planes_of(run.scene)
+    marks, motions = marks_of(scene, held), []
     for one in runs:
         stage("motion")
         motions.append(sample(one, fps, share=len(runs)))
@@ -84,19 +84,21 @@ def packed_runs(
     stage("shapes")
     ends = [(m.joint1, m.point1) for m in marks] + [(m.joint2, m.point2) for m in marks]
     visuals, has_no_shapes = _drawn(scene, motion, ends)
-    visuals = visuals + contact_surfaces(finer, motion, visuals, up_direction(model))
+    visuals = visuals + contact_surfaces(finer, motion, visuals, up_direction(model), planes)
     guides = guides_of(finer, motion)
     shapes = Shapes(payload)
-    looking = view(scene, motion, visuals, ends, np.vstack([np.zeros((0, 3)), *(g.points for g in guides)]))
+    curves = np.vstack([np.zeros((0, 3)), *(guide.points for guide in guides)])
+    looking = view(scene, motion, visuals, ends, curves, planes)
     drawn = shapes.add(visuals)
     stage("forces")
     touches = contact_points(finer, motion)
-    arrows = arrows_of(finer, motion, touches, applied_force_arrows(finer, motion, marks)) if forces else []
+    applied = applied_force_arrows(finer, motion, marks) if forces else []
+    arrows = arrows_of(finer, motion, touches, applied, held) if forces else []
     for number, spacing in pattern_spacings(motion, visuals, _sliding_axes(model)).items():
         drawn[number]["wrap"] = spacing
     stage("curves")
     items = [] if plots is None else parse_plots("plots", plots)
-    curves = None if plots is None else [item for item in items if not names_relation(run, item)]
+    chosen = None if plots is None else [item for item in items if not names_relation(run, item)]
     signals = signals_of(run, finer)
     scales = weight_scales(model, motion.size)
     rounding = rounding_of(((signal.unit, signal.values) for signal in signals), scales)
@@ -121,7 +123,7 @@ def packed_runs(
         "guides": [stored_guide(payload, guide) for guide in guides],
         "trails": [{"joint": j, "point": point} for j, point in _trails(model, guides, has_no_shapes)],
         "arrows": [stored_arrow(payload, motion, arrow) for arrow in arrows],
-        "plots": _plots(payload, runs, [one for one, _ in known], names, curves, rounding),
+        "plots": _plots(payload, runs, [one for one, _ in known], names, chosen, rounding),
         "events": _events(payload, run),
         "modes": _modes(payload, run),
         "elements": [

@@ -125,12 +125,16 @@ def _loads(run: Trajectory) -> Iterator[_RecordedSignal]:
                 continue
             size = np.linalg.norm(run.lam[:, rows], axis=1)
             yield _RecordedSignal(f"{name}, |lam|", "N, N m", REACTIONS, "reaction load multipliers", size)
-    for name, values in (run.contact_forces or {}).items() if has_open_contact(run) else ():
+    for name in (run.contact_forces or {}) if has_open_contact(run) else ():
         if name in left_out:
             continue
-        size = np.linalg.norm(values, axis=1)
+        size = np.linalg.norm(run.contact_forces[name], axis=1)
         yield _RecordedSignal(f"{name}, force", "N", REACTIONS, "contact reaction load", size)
-    for name, wrench in (getattr(run, "reactions", None) or {}).items():
+    reactions = getattr(run, "reactions", None) or {}
+    for name in reactions:
+        if name in left_out:
+            continue
+        wrench = reactions[name]
         for what, unit, part in (("force", "N", wrench[:, :3]), ("moment", "N m", wrench[:, 3:6])):
             size = np.linalg.norm(part, axis=1)
             yield _RecordedSignal(f"{name}, load, |{what}|", unit, REACTIONS, "reaction bearing wrench", size)
@@ -145,16 +149,21 @@ class _Columns:
 
     def __init__(self, run: Trajectory) -> None:
         self.run = run
-        every = (*run.scene.model.names, *run.rows, *run.element_names)
-        self._names = {column_name(name): name for name in every}
+        left_out = open_contacts(run)  # they have no columns
+        laws = (run.law_names[law] for law in run.element_laws)
+        elements = [name for name, law in zip(run.element_names, laws, strict=True) if law not in left_out]
+        rows = [name for name in run.rows if name not in left_out]
+        self._names = {column_name(name): name for name in (*run.scene.model.names, *rows, *elements)}
         # Names of columns of the ledger, with the field and the name of the entry.
         self._ledger = {
             column_name(f"{field}.{own}"): (field, str(own))
             for field in ("energy", "power")
             for own in getattr(run, field, None) or {}
+            if own not in left_out
         }
         self._units: dict[tuple[str, str], str] = {}  # by joint and number of the component
-        self._laws = {column_name(law): str(law) for law in getattr(run, "law_forces", None) or {}}
+        acting = (law for law in getattr(run, "law_forces", None) or {} if law not in left_out)
+        self._laws = {column_name(law): str(law) for law in acting}
 
     def signal(self, name: str, values: Array) -> _RecordedSignal:
         """Return the signal of a column; its words end with the field."""

@@ -186,7 +186,10 @@ def _plot(run: Trajectory, name: str) -> list[Plot]:
         return [Plot("Normal force", "N", t, _widest_curves(normal), note=omission_note(len(normal)))]
     if name == "gaps":
         times, gaps = gaps_of(run)
-        return [Plot("Gaps", "m, rad", times, _widest_curves(gaps), note=omission_note(len(gaps)))]
+        count, curves = len(gaps), _widest_curves(gaps)
+        if len(curves) < count and len(times) < len(t):
+            times, curves = gaps_of(run, list(curves))
+        return [Plot("Gaps", "m, rad", times, curves, note=omission_note(count))]
     if name == "tau":
         return _in_joints("Actuation", model, t, np.asarray(run.tau))
     if name == "F_nonideal":
