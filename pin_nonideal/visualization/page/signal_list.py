@@ -125,10 +125,11 @@ def _loads(run: Trajectory) -> Iterator[_RecordedSignal]:
                 continue
             size = np.linalg.norm(run.lam[:, rows], axis=1)
             yield _RecordedSignal(f"{name}, |lam|", "N, N m", REACTIONS, "reaction load multipliers", size)
-    for name in (run.contact_forces or {}) if has_open_contact(run) else ():
+    forces = run.contact_forces or {}
+    for name in forces if has_open_contact(run) else ():
         if name in left_out:
             continue
-        size = np.linalg.norm(run.contact_forces[name], axis=1)
+        size = np.linalg.norm(forces[name], axis=1)
         yield _RecordedSignal(f"{name}, force", "N", REACTIONS, "contact reaction load", size)
     reactions = getattr(run, "reactions", None) or {}
     for name in reactions:
@@ -150,8 +151,9 @@ class _Columns:
     def __init__(self, run: Trajectory) -> None:
         self.run = run
         left_out = open_contacts(run)  # they have no columns
-        laws = (run.law_names[law] for law in run.element_laws)
-        elements = [name for name, law in zip(run.element_names, laws, strict=True) if law not in left_out]
+        laws = zip(run.element_names, run.element_laws, strict=False)
+        open_elements = {name for name, law in laws if run.law_names[law] in left_out}
+        elements = [name for name in run.element_names if name not in open_elements]
         rows = [name for name in run.rows if name not in left_out]
         self._names = {column_name(name): name for name in (*run.scene.model.names, *rows, *elements)}
         # Names of columns of the ledger, with the field and the name of the entry.
