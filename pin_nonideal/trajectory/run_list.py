@@ -5,6 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from pin_nonideal import html_tables
+from pin_nonideal.errors import PinNonidealError
+
+from .trajectory import Trajectory
 
 MAX_ROWS = 20  # runs of a table
 
@@ -19,14 +22,15 @@ class RunList(list[Any]):
         return html_tables.table(f"{len(self)} runs{more}", rows, header)
 
 
-def _cells(run: Any) -> tuple[object, ...]:
+def _cells(run: Trajectory | PinNonidealError) -> tuple[object, ...]:
     """Return the cells of a run, or of the trajectory and the message of an error."""
-    error = run if isinstance(run, Exception) else None
-    trajectory = getattr(run, "trajectory", None) if error else run
-    reason = getattr(trajectory, "failure", None) or (
-        "" if error is None else f"{type(error).__name__}: {error}"
-    )
-    if trajectory is None or not len(trajectory.t):
-        return "", 0, 0, "", reason
-    violation = f"{float(trajectory.violation.max()):.1e}"
-    return f"{trajectory.t[-1]:g}", len(trajectory.t), trajectory.stats.steps, violation, reason
+    if isinstance(run, PinNonidealError):
+        return *_numbers(getattr(run, "trajectory", None)), f"{type(run).__name__}: {run}"
+    return *_numbers(run), run.failure or ""
+
+
+def _numbers(run: Trajectory | None) -> tuple[object, ...]:
+    """Return end time, samples, steps and largest violation; empty cells without samples."""
+    if run is None or not len(run.t):
+        return "", 0, 0, ""
+    return f"{run.t[-1]:g}", len(run.t), run.stats.steps, f"{float(run.violation.max()):.1e}"
