@@ -6,8 +6,6 @@ import itertools
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
 from pin_nonideal.compilation.error_context import joint_of
 from pin_nonideal.core_loader import core
 from pin_nonideal.scene.scene import Scene, compiled_scene
@@ -98,8 +96,9 @@ def outcome_fields(scene: Scene, outcome: core.Outcome, options: Any) -> Table:
 def _of_laws(scene: Scene, outcome: core.Outcome) -> Table:
     """Return the forces of the laws on the degrees of freedom of each law, and the limits of the elements."""
     program, nt = compiled_scene(scene).program, len(outcome.t)
-    supports = program.law_supports
-    ends = np.cumsum([0, *(len(dofs) for dofs in supports)]).tolist()
+    flat, last = (numbers.astype(int).tolist() for numbers in program.law_supports())
+    ends = [0, *last]
+    supports = [flat[start:end] for start, end in itertools.pairwise(ends)]
     forces = outcome.law_forces.reshape(nt, ends[-1])
     parts = [forces[:, start:end] for start, end in itertools.pairwise(ends)]
     elements = len(scene.element_names)

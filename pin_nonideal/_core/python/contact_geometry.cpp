@@ -32,15 +32,19 @@ template <class Take>
 void evaluate_blocks(const Program& p, const Array2& q, const Array& t, const std::vector<int>& blocks, Part part,
                      const Take& take) {
     check_states(p, q, t.shape(0), blocks);
-    Workspace w(p);
+    Terms terms;
+    terms.allocate(p.mechanism);
+    std::vector<RowValues> values(blocks.size());
+    for (size_t i = 0; i < blocks.size(); ++i) values[i].resize(p.blocks[blocks[i]].kind, p.mechanism.nv);
     const VecX at_rest = VecX::Zero(p.mechanism.nv);
     for (size_t k = 0; k < t.shape(0); ++k) {
         const VecX at = map(q).row(k);
-        kinematics(p.mechanism, w.now.terms, at, at_rest);
-        const State state{p.mechanism, w.now.terms, w.now.row_time(t(k)), w.now.terms.q, at_rest};
-        for (const int block : blocks) {
-            evaluate(p.blocks[block].kind, state, part, w.now.values[block]);
-            take(p.blocks[block], w.now.values[block]);
+        kinematics(p.mechanism, terms, at, at_rest);
+        const State state{p.mechanism, terms, t(k), terms.q, at_rest};
+        for (size_t i = 0; i < blocks.size(); ++i) {
+            const Block& block = p.blocks[blocks[i]];
+            evaluate(block.kind, state, part, values[i]);
+            take(block, values[i]);
         }
     }
 }

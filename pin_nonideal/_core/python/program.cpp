@@ -1,11 +1,13 @@
 #include "python/program.hpp"
 
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
 #include "dynamics/law_forces.hpp"
 #include "dynamics/power.hpp"
+#include "python/arrays.hpp"
 #include "python/constraints.hpp"
 #include "python/runner.hpp"
 #include "tree/pinocchio_reader.hpp"
@@ -27,7 +29,15 @@ void bind_program(nb::module_& m) {
         .def_prop_ro("first_gap", [](const Program& p) { return p.first_gap; })
         .def_prop_ro("law_names", [](const Program& p) { return p.law_names; })
         .def_prop_ro("power_names", &power_names)
-        .def_prop_ro("law_supports", &law_supports)
+        // Degrees of freedom on which each law acts, one law after the other, and the end of each law's among them.
+        .def("law_supports", [](const Program& p) {
+            std::vector<double> dofs, ends;
+            for (const std::vector<int>& support : law_supports(p)) {
+                dofs.insert(dofs.end(), support.begin(), support.end());
+                ends.push_back(static_cast<double>(dofs.size()));
+            }
+            return std::make_pair(to_numpy(std::move(dofs)), to_numpy(std::move(ends)));
+        })
         .def_prop_ro("reaction_blocks", &reaction_blocks)
         .def_prop_ro("element_laws", [](const Program& p) {
             std::vector<int> laws;
