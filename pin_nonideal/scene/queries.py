@@ -8,7 +8,7 @@ from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.errors import UnknownNameError, nearest
 from pin_nonideal.states.rows import rows_at
 from pin_nonideal.types import Array, State
-from pin_nonideal.validation import number
+from pin_nonideal.validation import number, text
 
 from .evaluation import Evaluator
 from .state import SceneStates
@@ -40,7 +40,7 @@ class Queries:
     def jacobian(self, name: str, q: State | None, t: float) -> Array:
         """Rows of one constraint or contact, (rows, nv)."""
         slices = self._compiled.slices
-        if name not in slices:
+        if text("jacobian: name", name) not in slices:
             raise UnknownNameError(
                 f'no constraint or contact "{name}" in scene "{self._name}"{nearest(name, slices)}'
             )

@@ -74,6 +74,7 @@ SCENES = {
     "notes": ("notes", lambda g: pn.Scene(g.model, notes="hello")),
     "ground below no base": ("put_on_ground", lambda g: g.scene.put_on_ground()),
     "rows of nothing": ("nope", lambda g: g.scene.jacobian("nope")),
+    "rows of a state": ("name", lambda g: g.scene.jacobian({"crank_joint": 0.1})),
     "masked angle": ("q", lambda g: g.scene.mass_matrix(np.ma.masked_array([1.0, 2.0, 3.0], [0, 1, 0]))),
     "tolerance of a stepper": ("rtol", lambda g: g.scene.stepper(0.1, method="dop853", rtol=5.0)),
     "steps beyond the period": ("period", lambda g: g.scene.stepper(0.01, dt=1.0)),
