@@ -64,7 +64,7 @@ def test_prescribed_wheels_go_where_they_roll_for_long(kind, many):
 
 @pytest.mark.parametrize("method", ["Radau", "BDF", "LSODA"])
 @pytest.mark.parametrize("kind", wheeled_robots.KINDS)
-@pytest.mark.parametrize("seed", seeds(range(10), always=[0])[:10])
+@pytest.mark.parametrize("seed", seeds(range(10), always=[9], count=1))  # 9: off by 0.2 m without restarts
 def test_prescribed_wheels_by_methods_outside_the_core(kind, method, seed):
     assert miss(seed, kind, 20.0, method=method, rtol=1e-7, atol=1e-9) < ADDED * 1e-7
 
