@@ -30,11 +30,20 @@ inline Eigen::Map<const RowMajor> map(const Array2& a) {
 using Numbers = nb::ndarray<nb::numpy, double, nb::ndim<1>>;
 using Table = nb::ndarray<nb::numpy, double, nb::ndim<2>>;
 
-inline Numbers to_numpy(std::vector<double>&& x) {  // moves the buffer without a copy
+// Capsule that owns a vector, whose buffer moves without a copy.
+inline nb::capsule owner_of(std::vector<double>&& x) {
     auto* kept = new std::vector<double>(std::move(x));
     kept->reserve(1);  // an empty array needs an address too
-    nb::capsule owner(kept, [](void* v) noexcept { delete static_cast<std::vector<double>*>(v); });
+    return nb::capsule(kept, [](void* v) noexcept { delete static_cast<std::vector<double>*>(v); });
+}
+inline Numbers to_numpy(std::vector<double>&& x) {
+    const nb::capsule owner = owner_of(std::move(x));
+    auto* kept = static_cast<std::vector<double>*>(owner.data());
     return Numbers(kept->data(), {kept->size()}, owner);
+}
+inline Table to_table(std::vector<double>&& x, size_t rows, size_t columns) {  // x by rows
+    const nb::capsule owner = owner_of(std::move(x));
+    return Table(static_cast<std::vector<double>*>(owner.data())->data(), {rows, columns}, owner);
 }
 inline Numbers to_numpy(const double* data, size_t n) { return to_numpy(std::vector<double>(data, data + n)); }
 inline Numbers to_numpy(const VecX& x) { return to_numpy(x.data(), x.size()); }

@@ -20,13 +20,6 @@ void check_states(const Program& p, const Array2& q, size_t times, const std::ve
         if (block < 0 || block >= static_cast<int>(p.blocks.size())) throw std::invalid_argument("no such block");
 }
 
-Table to_table(std::vector<double>&& values, size_t rows, size_t columns) {
-    auto* kept = new std::vector<double>(std::move(values));
-    kept->reserve(1);  // an empty array needs an address too
-    const nb::capsule owner(kept, [](void* data) noexcept { delete static_cast<std::vector<double>*>(data); });
-    return Table(kept->data(), {rows, columns}, owner);
-}
-
 // Place the bodies at each state and evaluate a part of each block, with `take(block, values)` after it.
 template <class Take>
 void evaluate_blocks(const Program& p, const Array2& q, const Array& t, const std::vector<int>& blocks, Part part,

@@ -281,7 +281,7 @@ bool BlockNewton::has_changed_piece(const Island& island) const {
 }
 
 double BlockNewton::stiffen(const BlockProblem& p, const Island& island, BlockFactor& factor, VecX& f, VecX& x, VecX& w) {
-    keeps_factor_ = true;
+    keeps_factor_ = yielding_ > 0.0;
     const double error = solve(p, island, factor, Search::bold, 0.0, f, x, w);
     keeps_factor_ = false;
     return error;
@@ -295,6 +295,7 @@ double BlockNewton::solve(const BlockProblem& p, const Island& island, BlockFact
         for (int i : island.elements)
             for (int r = p.elements[i].row; r < p.elements[i].row + p.elements[i].dim(); ++r) act(r);
     };
+    if (!keeps_factor_) yielding_ = 0.0;
     double merit, error = begin(p, island, f, x, w, merit), least = error;
     if (error <= parameters.solved) return error;
     keeps_factor_ = keeps_factor_ && !has_changed_piece(island);

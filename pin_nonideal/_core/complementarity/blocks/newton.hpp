@@ -94,7 +94,7 @@ private:
     std::vector<Projection> there_;  // at the last evaluation
     VecX y_, e_, z_, df_, dx_, dw_, f_try_, w_try_, f_best_;
     double compliance_ = 0.0;
-    double yielding_ = 0.0;      // compliance and proximal weight of the last factor
+    double yielding_ = 0.0;      // compliance and proximal weight of the last factor, 0 if the last solution needed none
     bool keeps_factor_ = false;  // the next step uses the last factor
     double unit_ = 0.0;  // largest free velocity of the island, in units of the square root of an energy
     int steps_ = 0, factors_ = 0;
