@@ -154,7 +154,7 @@ def _bounds(scene: Scene, bounds: object, dofs: list[int]) -> tuple[Array, Array
         )
 
     def bound(k: int, others: float) -> Array:
-        entry, what = bounds[k], f"bounds[{k}]"
+        entry, what = bounds[k], f"bounds: {('least', 'largest')[k]}"
         if by_name(entry) is not None:
             return named_joint_values(scene.model, entry, what, others)[dofs]
         if np.ndim(entry) == 0:

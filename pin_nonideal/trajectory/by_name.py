@@ -16,6 +16,7 @@ from pin_nonideal.validation import choice, text
 
 from .fields import RunFields, reactions_of
 from .frame_reaction import carrier_of, frame_reaction
+from .missing_array import NO_ELEMENT, NOT_RECORDED, REASONS, missing_array
 from .records import FrameRecord, JointRecord, LawRecord, angles
 
 
@@ -29,14 +30,15 @@ def joint_record(run: RunFields, name: str) -> JointRecord:
         raise UnknownNameError(f'no joint "{name}" in this run{nearest(name, known)}')
     place = known[name]
     rates = slice(place.v_first, place.v_first + place.nv)
-    v, a, tau = (None if x is None else x[:, rates] for x in (run.v, run.a, run.tau))
-    assert v is not None
+    v, owner = run.v[:, rates], f'run.joint("{name}")'
+    a = run.a[:, rates] if run.recorded("a") else missing_array(f"{owner}.a", REASONS["a"])
+    tau = run.tau[:, rates] if run.recorded("tau") else missing_array(f"{owner}.tau", REASONS["tau"])
     q = run.q[:, place.q_first : place.q_first + place.nq]
     if place.kind.startswith(COS_SIN_JOINTS):
         q = np.column_stack([q[:, :-2], angles(q[:, -2:], v[:, -1], run.t)])
     is_scalar = place.nv == 1 and q.shape[1] == 1
-    parts = [x if x is None or not is_scalar else x[:, 0] for x in (q, v, a, tau)]
-    return JointRecord(place.name, *parts)  # type: ignore[arg-type]
+    parts = [x[:, 0] if is_scalar and isinstance(x, np.ndarray) else x for x in (q, v, a, tau)]
+    return JointRecord(place.name, *parts)
 
 
 def frame_record(run: RunFields, name: str) -> FrameRecord:
@@ -60,7 +62,7 @@ def force_of(run: RunFields, name: str) -> Array:
     if contact:
         force: Array = reaction_of(run, name, "world")[:, :3]
         return force
-    if run.lam is None:
+    if not run.recorded("lam"):
         raise InputError(f'force("{name}") needs a run with record="forces"')
     multipliers: Array = run.lam[:, first:end]
     return multipliers
@@ -71,7 +73,9 @@ def law_record(run: RunFields, name: str) -> LawRecord:
     name = text("law: name", name)
     if name not in run.law_names:
         raise UnknownNameError(f'no law "{name}" in this run{nearest(name, run.law_names)}')
-    index, force, power = run.law_names.index(name), None, None
+    index, owner = run.law_names.index(name), f'run.law("{name}")'
+    force = missing_array(f"{owner}.force", NOT_RECORDED.format('"laws"'))
+    power = missing_array(f"{owner}.power", NOT_RECORDED.format('"laws" or "power"'))
     if run.law_forces:
         force = np.zeros(run.v.shape)
         force[:, run.law_dofs[index]] = run.law_forces[name]
@@ -80,8 +84,12 @@ def law_record(run: RunFields, name: str) -> LawRecord:
         power = list(run.power.values())[len(run.power) - len(run.law_names) + index]
     own = [e for e, law in enumerate(run.element_laws) if law == index]
     columns = own[0] if len(own) == 1 else own
-    limit = run.limits[:, columns] if own and run.limits is not None else None
-    mode = run.modes[:, columns] if own and run.modes is not None else None
+    limit = missing_array(f"{owner}.limit", REASONS["limits"] if own else NO_ELEMENT)
+    mode = missing_array(f"{owner}.mode", NO_ELEMENT)
+    if own and run.recorded("limits"):
+        limit = run.limits[:, columns]
+    if own and run.recorded("modes"):
+        mode = run.modes[:, columns]
     return LawRecord(name, force, power, limit, mode, functools.partial(_slip_velocity, run, own))
 
 
@@ -128,6 +136,6 @@ def _wrenches(run: RunFields, name: str) -> Array:
     if model.frames[index].type == pin.FrameType.JOINT:
         of_joint: Array = reactions_of(run)[str(model.frames[index].name)]
         return of_joint
-    if run.a is None:
+    if not run.recorded("a"):
         raise InputError(f'reaction("{name}") of a fixed joint needs a run with record=("a", "reactions")')
     return frame_reaction(run, name, index)

@@ -65,10 +65,9 @@ def open_contacts(run: RunFields) -> frozenset[str]:
     Args:
         run: trajectory of the run.
     """
-    closed, scene = getattr(run, "closed", None), getattr(run, "scene", None)
-    if closed is None or scene is None:
+    if run.scene is None or not run.recorded("closed"):
         return frozenset()
-    return frozenset(compress(scene.contact_names, ~np.any(closed, axis=0)))
+    return frozenset(compress(run.scene.contact_names, ~np.any(run.closed, axis=0)))
 
 
 def motion_columns(run: RunFields, fields: Collection[str]) -> dict[str, Array]:
@@ -180,7 +179,7 @@ def _joints(run: RunFields) -> Iterator[tuple[str, Array, str]]:
         forces = [FORCE_OF.get(unit, "") for unit in rate]
         per = {"q": position, "tau": forces}
         per |= {key: [unit and unit + end for unit in rate] for key, end in RATES.items()}
-        for field in ("q", "v", "a", "tau"):
+        for field in filter(run.recorded, ("q", "v", "a", "tau")):
             yield from _number_columns(f"{place.name}.{field}", getattr(record, field), per[field])
 
 
@@ -190,15 +189,15 @@ def _remaining_columns(run: RunFields, left_out: Collection[str]) -> Iterator[tu
         if name in left_out:
             continue
         for field in ("lam", "lam_ideal"):
-            multipliers = getattr(run, field)
-            own = None if multipliers is None else multipliers[:, first:end]
-            yield from _number_columns(f"{name}.{field}", own, [EITHER_FORCE] * (end - first))
+            if run.recorded(field):
+                own = getattr(run, field)[:, first:end]
+                yield from _number_columns(f"{name}.{field}", own, [EITHER_FORCE] * (end - first))
     for k, name in enumerate(run.element_names):
         if left_out and run.law_names[run.element_laws[k]] in left_out:
             continue
-        for field, of_all, unit in (("mode", run.modes, "1"), ("limit", run.limits, EITHER_FORCE)):
-            if of_all is not None:
-                yield f"{name}.{field}", cast("Array", of_all[:, k]), unit
+        for column, field, unit in (("mode", "modes", "1"), ("limit", "limits", EITHER_FORCE)):
+            if run.recorded(field):
+                yield f"{name}.{column}", cast("Array", getattr(run, field)[:, k]), unit
     for name, values in (run.reactions or {}).items():
         if name not in left_out:
             yield from _number_columns(f"{name}.reaction", values[:, :6], ["N"] * 3 + ["N m"] * 3)
@@ -206,7 +205,8 @@ def _remaining_columns(run: RunFields, left_out: Collection[str]) -> Iterator[tu
         for name, values in (getattr(run, field) or {}).items():
             if name not in left_out:
                 yield f"{field}.{name}", values, unit
-    yield from _number_columns("z", run.z, [])
+    if run.recorded("z"):
+        yield from _number_columns("z", run.z, [])
     yield "violation", run.violation, "m or rad"
     yield "violation_rate", run.violation_rate, "m/s or rad/s"
 
@@ -222,7 +222,7 @@ def _motion(place: JointPlace) -> tuple[tuple[str, ...], tuple[str, ...]]:
 def _by_dof(run: RunFields, left_out: Collection[str]) -> Iterator[tuple[str, Array, Sequence[int]]]:
     """Yield the fields that have a column for each degree of freedom, with the dofs on which they act."""
     for field in ("F_ideal", "F_nonideal"):
-        if getattr(run, field) is not None:
+        if run.recorded(field):
             yield field, getattr(run, field), range(run.v.shape[1])
     dofs = dict(zip(run.law_names, run.law_dofs, strict=True)) if run.law_forces else {}
     for name, part in (run.law_forces or {}).items():
@@ -232,12 +232,8 @@ def _by_dof(run: RunFields, left_out: Collection[str]) -> Iterator[tuple[str, Ar
         yield f"C.{name}", part[:, order], np.asarray(dofs[name])[order].tolist()
 
 
-def _number_columns(
-    name: str, values: Array | None, units: Sequence[str]
-) -> Iterator[tuple[str, Array, str]]:
-    """Return one column under the given name, several columns under numbered names, or none for None."""
-    if values is None:
-        return
+def _number_columns(name: str, values: Array, units: Sequence[str]) -> Iterator[tuple[str, Array, str]]:
+    """Yield one column under the given name, or several columns under numbered names."""
     if values.ndim == 1:
         yield name, values, units[0] if len(units) == 1 else ""
         return

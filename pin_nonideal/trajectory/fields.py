@@ -10,13 +10,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pin_nonideal.errors import UnknownNameError, nearest
 from pin_nonideal.states.joint_layout import JointPlace
 from pin_nonideal.types import Array, Table
 
 from .dense_output import DenseOutput
 from .groups import RECORD_OF, Group, GroupField
 from .lazy_fields import LazyFields
+from .missing_array import REASONS, ArrayField
 from .records import Event, Stats, UserEventRecord
+
+_MISSING: Any = None  # the attribute returns a MissingArray instead
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -28,18 +32,18 @@ class RunFields(LazyFields):
     v: Array
     violation: Array
     violation_rate: Array
-    a: Array | None = None
-    tau: Array | None = None
-    F_ideal: Array | None = None
-    F_nonideal: Array | None = None
-    lam: Array | None = None
-    lam_ideal: Array | None = None
+    a: Array = _MISSING
+    tau: Array = _MISSING
+    F_ideal: Array = _MISSING
+    F_nonideal: Array = _MISSING
+    lam: Array = _MISSING
+    lam_ideal: Array = _MISSING
     energy: dict[str, Array] | None = None
     power: dict[str, Array] | None = None
-    z: Array | None = None
-    modes: NDArray[np.int8] | None = None
-    closed: NDArray[np.bool_] | None = None
-    limits: Array | None = None
+    z: Array = _MISSING
+    modes: NDArray[np.int8] = _MISSING
+    closed: NDArray[np.bool_] = _MISSING
+    limits: Array = _MISSING
     law_forces: dict[str, Array] | None = None
     reactions: dict[str, Array] | None = None
     contact_forces: dict[str, Array] | None = None
@@ -59,6 +63,24 @@ class RunFields(LazyFields):
     notes: list[str] = field(default_factory=list)
     failure: str | None = None
 
+    def attributes(self) -> Table:
+        """Return all fields by name, with stand-ins for fields that the run does not have."""
+        return {name: getattr(self, name) for name in vars(self)}
+
+    def recorded(self, field: str) -> bool:
+        """Return whether the run has a field, such as "lam"; see the attributes of this class.
+
+        Args:
+            field: name of the attribute.
+
+        Raises:
+            UnknownNameError: there is no such attribute.
+        """
+        fields = vars(self)
+        if field not in fields:
+            raise UnknownNameError(f'recorded: no field "{field}" of a run{nearest(field, fields)}')
+        return fields[field] is not None
+
 
 _DEFAULTS: Table = {}
 _MAKERS: dict[str, Callable[[], object]] = {}
@@ -72,6 +94,8 @@ for _field in dataclasses.fields(RunFields):
 
 for _name in RECORD_OF:
     setattr(RunFields, _name, GroupField(_name))
+for _name in REASONS:
+    setattr(RunFields, _name, ArrayField(_name))
 
 
 def with_defaults(fields: Table) -> Table:

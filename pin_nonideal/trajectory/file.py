@@ -23,6 +23,7 @@ from pin_nonideal.types import Table
 
 from .dense_output import DenseOutput
 from .fields import RunFields
+from .missing_array import REASONS
 from .npz import npz_bytes
 from .records import LEDGER, Event, Stats, UserEventRecord
 
@@ -34,7 +35,6 @@ MAX_COMPRESSED_BYTES = 1_000_000
 READ_ERRORS: tuple[type[Exception], ...] = (OSError, ValueError, LookupError, TypeError, AttributeError)
 READ_ERRORS += (EOFError, RuntimeError, tokenize.TokenError, zipfile.BadZipFile, zlib.error)
 REQUIRED_FIELDS = ("t", "q", "v", "violation", "violation_rate")
-OPTIONAL_FIELDS = ("a", "tau", "F_ideal", "F_nonideal", "lam", "lam_ideal", "z", "modes", "closed", "limits")
 # Fields by name, with one row or number for each sample; a file has a table for each, or None.
 GROUPS = ("energy", "power", "law_forces", "reactions", "contact_forces")
 DENSE_FIELDS = ("times", "states", "modes", "directions", "sought", "torque", "moved")
@@ -80,8 +80,8 @@ def to_bytes(run: RunFields) -> bytes:
 def _arrays(run: RunFields) -> Table:
     """Return all arrays of a trajectory and its header, by their names in a file."""
     arrays: Table = {key: getattr(run, key) for key in REQUIRED_FIELDS}
-    arrays |= {key: getattr(run, key) for key in OPTIONAL_FIELDS if getattr(run, key) is not None}
-    if run.closed is not None:
+    arrays |= {key: getattr(run, key) for key in REASONS if run.recorded(key)}
+    if run.recorded("closed"):
         arrays["closed"] = run.closed.astype(np.int8)
     tables = {group: vars(run)[group] for group in GROUPS}
     for group, table in tables.items():
@@ -141,7 +141,7 @@ def read_from(stream: Any, source: Path) -> tuple[Table, Table | None]:
             raise LoadingError(f'"{source}" is no complete trajectory: {", ".join(missing)} missing')
         loose = {key: arrays.pop(key) for key in list(arrays) if key.startswith("loose/")}
         _check_arrays(arrays, source)
-        fields: Table = {key: arrays.get(key) for key in (*REQUIRED_FIELDS, *OPTIONAL_FIELDS)}
+        fields: Table = {key: arrays.get(key) for key in (*REQUIRED_FIELDS, *REASONS)}
         for group in GROUPS:
             if header.get(group) is not None:  # files of earlier versions have fewer groups
                 if group == "energy":
@@ -332,8 +332,7 @@ def _check_arrays(arrays: Table, source: Path) -> None:
             )
         columns = (
             2
-            if key in ("q", "v", *OPTIONAL_FIELDS)
-            or key.startswith(("law_forces/", "reactions/", "contact_forces/"))
+            if key in ("q", "v", *REASONS) or key.startswith(("law_forces/", "reactions/", "contact_forces/"))
             else 1
         )
         if x.ndim != columns:

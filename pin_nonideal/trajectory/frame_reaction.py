@@ -86,7 +86,6 @@ def frame_reaction(run: RunFields, name: str, index: int) -> Array:
     if not joint:  # the universe has no reaction; its children show the same masses and gravity
         bodies = [_whole_body(model, child, _on(run, child)) for child in part.children]
     accelerations = run.a
-    assert accelerations is not None  # `by_name` checks it
     wrenches = np.empty((len(run.t), 12))
     for k in range(len(run.t)):
         motions = BodyMotions(model, run.q[k], run.v[k], accelerations[k])

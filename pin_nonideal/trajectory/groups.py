@@ -52,7 +52,7 @@ class GroupField:
     def __init__(self, field: str) -> None:
         self._field = field
 
-    def __get__(self, run: Any, owner: Any = None) -> Any:
+    def __get__(self, run: object, owner: object = None) -> Any:
         if run is None:
             return self
         fields = vars(run)
@@ -64,6 +64,6 @@ class GroupField:
             fields[self._field] = group
         return group
 
-    def __set__(self, run: Any, arrays: Mapping[str, Array] | None) -> None:
+    def __set__(self, run: object, arrays: Mapping[str, Array] | None) -> None:
         empty = isinstance(arrays, Group) and not arrays.recorded
         vars(run)[self._field] = None if empty else arrays

@@ -99,21 +99,23 @@ class Stats:
 class LawRecord:
     """Force, power, limit and mode of one law over a run.
 
+    Arrays that the run does not have are false in a condition; other uses raise an InputError.
+
     Attributes:
         name: name of the law.
         force: part of C in M a = F + C + A^T lam that belongs to the law, including sticking elements [N or N
-            m], (nt, nv), or None.
-        power: power of the force [W], (nt,), or None.
+            m], (nt, nv); record "laws".
+        power: power of the force [W], (nt,); record "laws" or "power".
         limit: friction limit of the law's element, static if it sticks, else kinetic [N or N m], (nt,), or
-            (nt, n) for a law of n elements; None without elements or if not recorded.
-        mode: mode of the element, +1 or -1 for slip, 0 for stick, with the shape of `limit`, or None.
+            (nt, n) for a law of n elements; record "laws" or "forces".
+        mode: mode of the element, +1 or -1 for slip, 0 for stick, with the shape of `limit`.
     """
 
     name: str
-    force: Array | None
-    power: Array | None
-    limit: Array | None
-    mode: NDArray[np.int8] | None
+    force: Array
+    power: Array
+    limit: Array
+    mode: NDArray[np.int8]
     _slip: Callable[[], Array | None] = field(default=lambda: None, repr=False)
 
     @functools.cached_property
@@ -151,20 +153,22 @@ class Sample(SimpleNamespace):
 class JointRecord:
     """Motion of one joint over a run; arrays (nt,) for one degree of freedom, else (nt, n).
 
+    Arrays that the run did not record are false in a condition; other uses raise an InputError.
+
     Attributes:
         name: name of the joint.
         q: configuration [rad or m]. The angle of an unbounded joint is continuous over full turns, as is the
             last number of a planar joint, (x, y, angle).
         v: velocity.
-        a: acceleration, or None; record "a".
-        tau: torque or force of the actuation [N m or N], or None; record "tau" or "forces".
+        a: acceleration; record "a".
+        tau: torque or force of the actuation [N m or N]; record "tau" or "forces".
     """
 
     name: str
     q: Array
     v: Array
-    a: Array | None
-    tau: Array | None
+    a: Array
+    tau: Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,7 +32,10 @@ SUMMARY_LINE = re.compile(r"([a-z]+(?: [a-z]+)*(?: \[J\])?)(?:: +| +(?=\d))(.*)"
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Trajectory(RunFields):
-    """Samples of a run; fields that were not recorded are None or empty tables.
+    """Samples of a run.
+
+    Fields that were not recorded are false in a condition, and all other uses raise an InputError that names
+    the value of `record`; see also `recorded`.
 
     Attributes:
         t: times [s], (nt,).
@@ -51,7 +54,7 @@ class Trajectory(RunFields):
             "actuation", "forces", "constraints", each law, and "projection". "balance" is the difference of
             the total energy and the work, and must be zero. Record "energy".
         power: power by column [W]: "actuation", "forces", "constraints", each law.  Record "power".
-        z: states of laws, (nt, nz), or None if no law has states.
+        z: states of laws, (nt, nz), if a law has states.
         modes: mode of each friction element, +1 or -1 for slip, 0 for stick, 2 for an open contact, (nt,
             ne).
         closed: whether each contact is closed, in the order of the scene's `contact_names`, (nt, n).
@@ -127,7 +130,7 @@ class Trajectory(RunFields):
             name: name of a joint; "base" is the only floating joint.
 
         Returns:
-            Record of the joint; fields that were not recorded are None.
+            Record of the joint.
 
         Raises:
             UnknownNameError: there is no such joint.
@@ -171,7 +174,7 @@ class Trajectory(RunFields):
             name: name of a law of the scene, or of a contact with friction.
 
         Returns:
-            Record of the law; fields that were not recorded are None.
+            Record of the law.
 
         Raises:
             UnknownNameError: there is no such law.
@@ -288,7 +291,7 @@ class Trajectory(RunFields):
         if len(run) and run.energy and self.energy:
             # The balance is relative to the start of the run.
             run.energy["balance"] += run.energy["total"][0] - self.energy["total"][0]
-        return run if np.ndim(t) else Sample(**run.samples(0).__dict__)
+        return run if np.ndim(t) else Sample(**run.samples(0).attributes())
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write all arrays to one .npz file; an existing file is replaced completely or not at all.

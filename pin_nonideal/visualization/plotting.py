@@ -112,7 +112,7 @@ def default_plots(runs: Sequence[Trajectory]) -> list[str]:
 def _default_plots(first: Trajectory) -> list[str]:
     """Return the default plots of a scene for which its run has recorded fields."""
     kinds = ["q", "v", *(["energy"] if first.energy else [])]
-    if first.scene.contacts and first.lam is not None:
+    if first.scene.contacts and first.recorded("lam"):
         kinds.append("contacts")
     if has_open_contact(first):
         kinds.append("gaps")

@@ -31,6 +31,9 @@ class KnownRun(SimpleNamespace):
     def law(self, name: str) -> Any:
         return law_record(self, name)
 
+    def recorded(self, field: str) -> bool:
+        return getattr(self, field, None) is not None
+
     def columns(self) -> Any:
         return columns(self)
 

@@ -89,11 +89,11 @@ def arrows_of(
         for touch in touches
         if touch.name in forces
     ]
-    if run.lam is not None:
+    if run.recorded("lam"):
         for name, item, shown in constraints_of(run.scene) if held is None else held:
             rows = run.scene.constraint_slices[name]
             parts = {"total": motion.of(run.lam[:, rows])}
-            if run.lam_ideal is not None:
+            if run.recorded("lam_ideal"):
                 ideal = motion.of(run.lam_ideal[:, rows])
                 rest = parts["total"] - ideal
                 acts = np.abs(rest).max(initial=0.0) > MIN_RELATIVE_SIZE * np.abs(ideal).max(initial=0.0)
@@ -105,13 +105,13 @@ def arrows_of(
                 arrows += _reaction(run.scene, motion, name, kind, item, shown, lam)
     # Friction of contacts is part of the contact forces.
     touching = {*forces, *(arrow.name for arrow in [*arrows, *more] if arrow.kind == "total")}
-    drawn = [] if run.law_names and touching.issuperset(run.law_names) else [("nonideal", run.F_nonideal)]
+    drawn = [] if run.law_names and touching.issuperset(run.law_names) else [("nonideal", "F_nonideal")]
     if not arrows and not touching:
-        drawn.append(("ideal", run.F_ideal))
-    drawn.append(("drive", run.tau))
-    for kind, force in drawn:
-        if force is not None:
-            arrows += _at_joints(run.scene.model, motion, kind, motion.of(force))
+        drawn.append(("ideal", "F_ideal"))
+    drawn.append(("drive", "tau"))
+    for kind, field in drawn:
+        if run.recorded(field):
+            arrows += _at_joints(run.scene.model, motion, kind, motion.of(getattr(run, field)))
     return _above_rounding([*arrows, *more], run.scene.model, motion.size)
 
 

@@ -104,10 +104,10 @@ def _hinge_axis(run: Trajectory, anchor: str) -> Array:
 
 def _joint_share(run: Trajectory, law: str, joint: int, element: int) -> Array | None:
     """Return the friction in a joint over its limit, (nt,)."""
-    force, limits = run.law(law).force, run.limits
-    if force is None or limits is None:
+    if not (run.recorded("law_forces") and run.recorded("limits")):
         return None
-    return _part(np.abs(force[:, run.scene.model.joints[joint].idx_v]), limits[:, element])
+    force = run.law(law).force[:, run.scene.model.joints[joint].idx_v]
+    return _part(np.abs(force), run.limits[:, element])
 
 
 def _part(size: Array, limit: Array) -> Array:

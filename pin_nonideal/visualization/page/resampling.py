@@ -52,7 +52,7 @@ def resample(run: Trajectory, motion: Motion) -> tuple[Trajectory, Motion]:
     if getattr(run, "dense", None) is not None and len(inner):
         dense = run.at(motion.times[inner])
 
-    def at_frames(values: Array, exact: Any = None) -> Array:
+    def at_frames(values: Array, exact: Array | None = None) -> Array:
         samples = motion.of(np.asarray(values, dtype=float))
         if exact is not None:
             samples[inner] = exact
@@ -64,14 +64,14 @@ def resample(run: Trajectory, motion: Motion) -> tuple[Trajectory, Motion]:
         "v": _velocities(run, motion, inner),
     }
     for key in SAMPLED_FIELDS:
-        if getattr(run, key, None) is not None:
-            values[key] = at_frames(getattr(run, key), getattr(dense, key, None))
+        if run.recorded(key):
+            values[key] = at_frames(getattr(run, key), None if dense is None else getattr(dense, key))
     for key in TABLE_FIELDS:
         parts = getattr(run, key, None)
         if parts is not None:
             values[key] = _ResampledFields(key, parts, getattr(dense, key, None) or {}, at_frames)
     for key in ("modes", "closed"):  # constant from a sample to the next
-        if getattr(run, key, None) is not None:
+        if run.recorded(key):
             values[key] = np.asarray(getattr(run, key))[motion.before]
     if dense is not None:
         values["v"][inner] = dense.v

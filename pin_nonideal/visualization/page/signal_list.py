@@ -102,7 +102,7 @@ def _component_signals(run: Trajectory, finer: Trajectory) -> Iterator[_Recorded
     for kind, field, own, items in (
         ("position", "q", True, positions(model, finer.q)),
         ("velocity", "v", True, velocities(model, finer.v)),
-        ("acceleration", "a", False, [] if run.a is None else velocities(model, run.a, "/s²")),
+        ("acceleration", "a", False, velocities(model, run.a, "/s²") if run.recorded("a") else []),
     ):
         counts: dict[str, int] = {}
         for item in items:
@@ -119,7 +119,7 @@ def _component_signals(run: Trajectory, finer: Trajectory) -> Iterator[_Recorded
 def _loads(run: Trajectory) -> Iterator[_RecordedSignal]:
     """Return sizes of forces: multipliers of constraints, forces of contacts, loads of bearings."""
     left_out = open_contacts(run)
-    if run.lam is not None:
+    if run.recorded("lam"):
         for name, rows in run.scene.constraint_slices.items():
             if name in left_out:
                 continue

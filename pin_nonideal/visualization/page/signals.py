@@ -121,7 +121,7 @@ def default_plot_names(run: Trajectory) -> list[str]:
     Args:
         run: run of the replay.
     """
-    driven = getattr(run, "tau", None) is not None and bool(np.any(run.tau))
+    driven = run.recorded("tau") and bool(np.any(run.tau))
     first = ("tau", "F_nonideal") if driven else ()
     return [
         name for name in (*first, "energy", "gaps", "violation", "reactions", "q") if _record_of(run, name)
@@ -134,15 +134,15 @@ def _record_of(run: Trajectory, name: str) -> bool:
     if name == "violation":
         return bool(run.scene.constraint_slices)
     if name == "reactions":
-        return run.lam is not None and bool(run.scene.constraint_slices)
+        return run.recorded("lam") and bool(run.scene.constraint_slices)
     if name == "contacts":
-        return run.lam is not None and bool(run.scene.contacts)
+        return run.recorded("lam") and bool(run.scene.contacts)
     if name == "gaps":
         return has_open_contact(run)
     if name == "F_nonideal":
-        return run.F_nonideal is not None and bool(np.any(run.F_nonideal))
+        return run.recorded("F_nonideal") and bool(np.any(run.F_nonideal))
     if name in ("a", "tau"):
-        return getattr(run, name, None) is not None
+        return run.recorded(name)
     return True
 
 
@@ -160,7 +160,7 @@ def _plot(run: Trajectory, name: str) -> list[Plot]:
             raise InputError('plot "contacts" needs a contact, and this scene has none')
         if name == "gaps":
             raise InputError('plot "gaps" needs a contact that opens, and this run has none')
-        if name == "F_nonideal" and run.F_nonideal is not None:
+        if name == "F_nonideal" and run.recorded("F_nonideal"):
             raise InputError('plot "F_nonideal" needs a nonideal force, and this run has none')
         record = {"a": "a", "tau": "tau", "power": "power"}.get(name, "energy")
         record = "forces" if name in ("reactions", "contacts", "F_nonideal") else record
@@ -172,7 +172,7 @@ def _plot(run: Trajectory, name: str) -> list[Plot]:
         return [Plot("Work", "J", t, {k: v for k, v in energy.items() if k not in STORED_ENERGY})]
     if name == "violation":
         return [Plot("Constraint violation", "m, rad", t, {"largest residual": run.violation}, log=True)]
-    if name == "reactions" and run.lam is not None:
+    if name == "reactions":
         slices, left_out = run.scene.constraint_slices, open_contacts(run)
         size = {k: np.linalg.norm(run.lam[:, s], axis=1) for k, s in slices.items() if k not in left_out}
         return [Plot("Reactions, |lam|", "N, N m", t, _widest_curves(size), note=omission_note(len(size)))]
@@ -180,7 +180,7 @@ def _plot(run: Trajectory, name: str) -> list[Plot]:
         return [
             Plot("Power", "W", t, _widest_curves(run.power or {}), note=omission_note(len(run.power or {})))
         ]
-    if name == "contacts" and run.lam is not None:
+    if name == "contacts":
         slices = list(run.scene.constraint_slices.items())[len(run.scene.constraints) :]
         normal = {key: run.lam[:, rows.stop - 1] for key, rows in slices}
         return [Plot("Normal force", "N", t, _widest_curves(normal), note=omission_note(len(normal)))]
@@ -198,7 +198,7 @@ def _plot(run: Trajectory, name: str) -> list[Plot]:
         return _by_unit("Position", t, positions(model, run.q))
     if name == "v":
         return _by_unit("Velocity", t, velocities(model, run.v))
-    if name == "a" and run.a is not None:
+    if name == "a":
         return _by_unit("Acceleration", t, velocities(model, run.a, "/s²"))
     place = [c for c in positions(model, run.q) if c.joint == name]
     rate = [c for c in velocities(model, run.v) if c.joint == name]

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
 from pin_nonideal.types import Array
@@ -149,18 +150,19 @@ def _frictions(run: Trajectory, name: str, over_load: bool) -> list[Relation]:
         record = run.law(law)
         force = np.asarray(record.force)[:, run.scene.model.joints[known[law]].idx_v]
         place = by_unit.setdefault(unit, Relation(name or "Friction", label, f"friction [{unit}]", {}, {}))
-        place.curves[law] = _broken(x, np.abs(force) if over_load else force, record.mode)
-        if record.limit is not None and record.limit.ndim == 1:
+        has_mode = run.law_names.index(law) in run.element_laws
+        mode = record.mode if has_mode else np.zeros(len(x), dtype=np.int8)
+        place.curves[law] = _broken(x, np.abs(force) if over_load else force, mode)
+        if has_mode and record.limit.ndim == 1:
             speed = np.abs(run.v[:, run.scene.model.joints[known[law]].idx_v])
             most = record.limit + _viscous(run, law) * speed
-            place.bounds[law] = (x, most) if over_load else _opposed(x, most, record.mode)
+            place.bounds[law] = (x, most) if over_load else _opposed(x, most, mode)
     return list(by_unit.values())
 
 
-def _opposed(x: Array, most: Array, mode: Any) -> tuple[Array, Array]:
+def _opposed(x: Array, most: Array, mode: NDArray[np.int8]) -> tuple[Array, Array]:
     """Return the largest friction of slipping samples against their motion, and of the others both ways."""
-    slips = np.zeros(len(x), dtype=int) if mode is None else np.sign(np.asarray(mode, dtype=int))
-    forth, back = slips >= 0, slips <= 0
+    forth, back = mode >= 0, mode <= 0
     return np.concatenate([x[forth], x[back]]), np.concatenate([-most[forth], most[back]])
 
 
@@ -170,11 +172,9 @@ def _viscous(run: Trajectory, name: str) -> float:
     return float(getattr(run.scene.laws[index], "viscous", 0.0))
 
 
-def _broken(x: Array, y: Array, mode: Any) -> tuple[Array, Array]:
+def _broken(x: Array, y: Array, mode: NDArray[np.int8]) -> tuple[Array, Array]:
     """Return a curve with a gap at each change of mode, because friction is discontinuous there."""
-    if mode is None:
-        return x, y
-    at = np.flatnonzero(np.diff(np.asarray(mode).reshape(len(x), -1)[:, 0])) + 1
+    at = np.flatnonzero(np.diff(mode.reshape(len(x), -1)[:, 0])) + 1
     return np.insert(x, at, np.nan), np.insert(y, at, np.nan)
 
 

@@ -1,0 +1,92 @@
+"""Arrays that a run does not have: each use of one raises an error that explains how to record it."""
+
+from __future__ import annotations
+
+from typing import Any, NoReturn
+
+from pin_nonideal.errors import InputError
+from pin_nonideal.types import Array
+
+NO_ELEMENT = "does not exist, since the law has no friction element"
+NOT_RECORDED = "was not recorded; pass record={} to simulate"
+# Arrays of a Trajectory, with the reason why a run does not have them.
+REASONS = {
+    "a": NOT_RECORDED.format('"a"'),
+    "tau": NOT_RECORDED.format('"tau" or "forces"'),
+    "F_ideal": NOT_RECORDED.format('"forces"'),
+    "F_nonideal": NOT_RECORDED.format('"forces"'),
+    "lam": NOT_RECORDED.format('"forces"'),
+    "lam_ideal": NOT_RECORDED.format('"forces"'),
+    "limits": NOT_RECORDED.format('"laws" or "forces"'),
+    "z": "does not exist, since no law of the scene has states",
+    "modes": "does not exist, since the scene has no friction element",
+    "closed": "does not exist, since the scene has no unilateral contact",
+}
+# Operators of arrays that a MissingArray refuses.
+OPERATORS = (
+    *("abs", "add", "array", "call", "contains", "float", "floordiv", "ge", "getitem", "gt", "iter", "le"),
+    *("len", "lt", "matmul", "mod", "mul", "neg", "pos", "pow", "radd", "rmatmul", "rmul", "rsub"),
+    *("rtruediv", "setitem", "sub", "truediv"),
+)
+
+
+class MissingArray:
+    """Array that a run does not have: false in a condition; all other uses raise an InputError.
+
+    Args:
+        message: message of the error.
+    """
+
+    __slots__ = ("_message",)
+
+    def __init__(self, message: str) -> None:
+        self._message = message
+
+    def __bool__(self) -> bool:
+        return False
+
+    def __repr__(self) -> str:
+        return f"<{self._message}>"
+
+    def __getattr__(self, name: str) -> NoReturn:
+        if name.startswith("__"):  # Python and NumPy ask for protocols such as pickling
+            raise AttributeError(name)
+        raise InputError(self._message)
+
+
+def _explain(array: MissingArray, *_: object, **__: object) -> NoReturn:
+    raise InputError(repr(array)[1:-1])
+
+
+for _name in OPERATORS:
+    setattr(MissingArray, f"__{_name}__", _explain)
+
+
+def missing_array(array: str, reason: str) -> Any:
+    """Return the stand-in of an array that a run does not have.
+
+    Args:
+        array: expression that returns the stand-in, such as "run.a".
+        reason: reason why the run does not have the array, as the end of a sentence about it.
+    """
+    return MissingArray(f"{array} {reason}")
+
+
+class ArrayField:
+    """Attribute of a Trajectory that returns an array, or its stand-in if the run does not have it.
+
+    Args:
+        field: field of the Trajectory.
+    """
+
+    def __init__(self, field: str) -> None:
+        self._field = field
+
+    def __get__(self, run: object, owner: object = None) -> Any:
+        if run is None:
+            return self
+        array = vars(run)[self._field]
+        return missing_array(f"run.{self._field}", REASONS[self._field]) if array is None else array
+
+    def __set__(self, run: object, array: Array | None) -> None:
+        vars(run)[self._field] = None if isinstance(array, MissingArray) else array
