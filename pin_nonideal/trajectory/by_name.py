@@ -16,7 +16,7 @@ from pin_nonideal.validation import choice, text
 
 from .fields import RunFields, reactions_of
 from .frame_reaction import carrier_of, frame_reaction
-from .missing_array import NO_ELEMENT, NOT_RECORDED, REASONS, missing_array
+from .missing_array import NOT_RECORDED, REASONS, missing_array
 from .records import FrameRecord, JointRecord, LawRecord, angles
 
 
@@ -84,12 +84,10 @@ def law_record(run: RunFields, name: str) -> LawRecord:
         power = list(run.power.values())[len(run.power) - len(run.law_names) + index]
     own = [e for e, law in enumerate(run.element_laws) if law == index]
     columns = own[0] if len(own) == 1 else own
-    limit = missing_array(f"{owner}.limit", REASONS["limits"] if own else NO_ELEMENT)
-    mode = missing_array(f"{owner}.mode", NO_ELEMENT)
+    limit = missing_array(f"{owner}.limit", REASONS["limits"]) if own else None
     if own and run.recorded("limits"):
         limit = run.limits[:, columns]
-    if own and run.recorded("modes"):
-        mode = run.modes[:, columns]
+    mode = run.modes[:, columns] if own and run.modes is not None else None
     return LawRecord(name, force, power, limit, mode, functools.partial(_slip_velocity, run, own))
 
 

@@ -205,7 +205,7 @@ def _remaining_columns(run: RunFields, left_out: Collection[str]) -> Iterator[tu
         for name, values in (getattr(run, field) or {}).items():
             if name not in left_out:
                 yield f"{field}.{name}", values, unit
-    if run.recorded("z"):
+    if run.z is not None:
         yield from _number_columns("z", run.z, [])
     yield "violation", run.violation, "m or rad"
     yield "violation_rate", run.violation_rate, "m/s or rad/s"

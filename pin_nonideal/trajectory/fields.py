@@ -40,9 +40,9 @@ class RunFields(LazyFields):
     lam_ideal: Array = _MISSING
     energy: dict[str, Array] | None = None
     power: dict[str, Array] | None = None
-    z: Array = _MISSING
-    modes: NDArray[np.int8] = _MISSING
-    closed: NDArray[np.bool_] = _MISSING
+    z: Array | None = None
+    modes: NDArray[np.int8] | None = None
+    closed: NDArray[np.bool_] | None = None
     limits: Array = _MISSING
     law_forces: dict[str, Array] | None = None
     reactions: dict[str, Array] | None = None
@@ -64,7 +64,7 @@ class RunFields(LazyFields):
     failure: str | None = None
 
     def attributes(self) -> Table:
-        """Return all fields by name, with stand-ins for fields that the run does not have."""
+        """Return all fields by name, with stand-ins for arrays that the run did not record."""
         return {name: getattr(self, name) for name in vars(self)}
 
     def recorded(self, field: str) -> bool:

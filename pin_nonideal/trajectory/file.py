@@ -35,6 +35,7 @@ MAX_COMPRESSED_BYTES = 1_000_000
 READ_ERRORS: tuple[type[Exception], ...] = (OSError, ValueError, LookupError, TypeError, AttributeError)
 READ_ERRORS += (EOFError, RuntimeError, tokenize.TokenError, zipfile.BadZipFile, zlib.error)
 REQUIRED_FIELDS = ("t", "q", "v", "violation", "violation_rate")
+OPTIONAL_FIELDS = (*REASONS, "z", "modes", "closed")
 # Fields by name, with one row or number for each sample; a file has a table for each, or None.
 GROUPS = ("energy", "power", "law_forces", "reactions", "contact_forces")
 DENSE_FIELDS = ("times", "states", "modes", "directions", "sought", "torque", "moved")
@@ -80,8 +81,8 @@ def to_bytes(run: RunFields) -> bytes:
 def _arrays(run: RunFields) -> Table:
     """Return all arrays of a trajectory and its header, by their names in a file."""
     arrays: Table = {key: getattr(run, key) for key in REQUIRED_FIELDS}
-    arrays |= {key: getattr(run, key) for key in REASONS if run.recorded(key)}
-    if run.recorded("closed"):
+    arrays |= {key: getattr(run, key) for key in OPTIONAL_FIELDS if run.recorded(key)}
+    if run.closed is not None:
         arrays["closed"] = run.closed.astype(np.int8)
     tables = {group: vars(run)[group] for group in GROUPS}
     for group, table in tables.items():
@@ -141,7 +142,7 @@ def read_from(stream: Any, source: Path) -> tuple[Table, Table | None]:
             raise LoadingError(f'"{source}" is no complete trajectory: {", ".join(missing)} missing')
         loose = {key: arrays.pop(key) for key in list(arrays) if key.startswith("loose/")}
         _check_arrays(arrays, source)
-        fields: Table = {key: arrays.get(key) for key in (*REQUIRED_FIELDS, *REASONS)}
+        fields: Table = {key: arrays.get(key) for key in (*REQUIRED_FIELDS, *OPTIONAL_FIELDS)}
         for group in GROUPS:
             if header.get(group) is not None:  # files of earlier versions have fewer groups
                 if group == "energy":
@@ -330,11 +331,8 @@ def _check_arrays(arrays: Table, source: Path) -> None:
             raise LoadingError(
                 f'"{source}" is no trajectory: {key} must be finite; it holds {x[~np.isfinite(x)][0]}'
             )
-        columns = (
-            2
-            if key in ("q", "v", *REASONS) or key.startswith(("law_forces/", "reactions/", "contact_forces/"))
-            else 1
-        )
+        is_table = key.startswith(("law_forces/", "reactions/", "contact_forces/"))
+        columns = 2 if is_table or key in ("q", "v", *OPTIONAL_FIELDS) else 1
         if x.ndim != columns:
             shape = "a table" if columns == 2 else "one column"
             raise LoadingError(f'"{source}" is no trajectory: {key} must be {shape}; got shape {x.shape}')

@@ -1,4 +1,4 @@
-"""Arrays that a run does not have: each use of one raises an error that explains how to record it."""
+"""Arrays that a run did not record: each use of one raises an error that explains how to record it."""
 
 from __future__ import annotations
 
@@ -7,9 +7,8 @@ from typing import Any, NoReturn
 from pin_nonideal.errors import InputError
 from pin_nonideal.types import Array
 
-NO_ELEMENT = "does not exist, since the law has no friction element"
 NOT_RECORDED = "was not recorded; pass record={} to simulate"
-# Arrays of a Trajectory, with the reason why a run does not have them.
+# Reason why a run does not have an array of a Trajectory.
 REASONS = {
     "a": NOT_RECORDED.format('"a"'),
     "tau": NOT_RECORDED.format('"tau" or "forces"'),
@@ -18,9 +17,6 @@ REASONS = {
     "lam": NOT_RECORDED.format('"forces"'),
     "lam_ideal": NOT_RECORDED.format('"forces"'),
     "limits": NOT_RECORDED.format('"laws" or "forces"'),
-    "z": "does not exist, since no law of the scene has states",
-    "modes": "does not exist, since the scene has no friction element",
-    "closed": "does not exist, since the scene has no unilateral contact",
 }
 # Operators of arrays that a MissingArray refuses.
 OPERATORS = (
@@ -31,7 +27,7 @@ OPERATORS = (
 
 
 class MissingArray:
-    """Array that a run does not have: false in a condition; all other uses raise an InputError.
+    """Array that a run did not record: false in a condition; all other uses raise an InputError.
 
     Args:
         message: message of the error.
@@ -44,6 +40,12 @@ class MissingArray:
 
     def __bool__(self) -> bool:
         return False
+
+    def __eq__(self, other: object) -> bool:
+        return other is None or (isinstance(other, MissingArray) and other._message == self._message)
+
+    def __hash__(self) -> int:
+        return hash(self._message)
 
     def __repr__(self) -> str:
         return f"<{self._message}>"
@@ -63,7 +65,7 @@ for _name in OPERATORS:
 
 
 def missing_array(array: str, reason: str) -> Any:
-    """Return the stand-in of an array that a run does not have.
+    """Return the stand-in of an array that a run did not record.
 
     Args:
         array: expression that returns the stand-in, such as "run.a".
@@ -73,7 +75,7 @@ def missing_array(array: str, reason: str) -> Any:
 
 
 class ArrayField:
-    """Attribute of a Trajectory that returns an array, or its stand-in if the run does not have it.
+    """Attribute of a Trajectory that returns an array, or its stand-in if the run did not record it.
 
     Args:
         field: field of the Trajectory.

@@ -105,7 +105,7 @@ def _of_laws(scene: Scene, outcome: core.Outcome) -> Table:
     return {
         "law_forces": dict(zip(program.law_names, parts, strict=False)),
         "law_dofs": supports,
-        "limits": outcome.limits.reshape(nt, elements) if elements else None,
+        "limits": outcome.limits.reshape(nt, elements),
     }
 
 

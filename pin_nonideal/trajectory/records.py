@@ -99,7 +99,7 @@ class Stats:
 class LawRecord:
     """Force, power, limit and mode of one law over a run.
 
-    Arrays that the run does not have are false in a condition; other uses raise an InputError.
+    Arrays that the run did not record are false in a condition; other uses raise an InputError.
 
     Attributes:
         name: name of the law.
@@ -107,15 +107,15 @@ class LawRecord:
             m], (nt, nv); record "laws".
         power: power of the force [W], (nt,); record "laws" or "power".
         limit: friction limit of the law's element, static if it sticks, else kinetic [N or N m], (nt,), or
-            (nt, n) for a law of n elements; record "laws" or "forces".
-        mode: mode of the element, +1 or -1 for slip, 0 for stick, with the shape of `limit`.
+            (nt, n) for a law of n elements, None without elements; record "laws" or "forces".
+        mode: mode of the element, +1 or -1 for slip, 0 for stick, with the shape of `limit`, or None.
     """
 
     name: str
     force: Array
     power: Array
-    limit: Array
-    mode: NDArray[np.int8]
+    limit: Array | None
+    mode: NDArray[np.int8] | None
     _slip: Callable[[], Array | None] = field(default=lambda: None, repr=False)
 
     @functools.cached_property

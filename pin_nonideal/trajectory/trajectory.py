@@ -34,7 +34,7 @@ SUMMARY_LINE = re.compile(r"([a-z]+(?: [a-z]+)*(?: \[J\])?)(?:: +| +(?=\d))(.*)"
 class Trajectory(RunFields):
     """Samples of a run.
 
-    Fields that were not recorded are false in a condition, and all other uses raise an InputError that names
+    Arrays that were not recorded are false in a condition, and all other uses raise an InputError that names
     the value of `record`; see also `recorded`.
 
     Attributes:
@@ -54,10 +54,11 @@ class Trajectory(RunFields):
             "actuation", "forces", "constraints", each law, and "projection". "balance" is the difference of
             the total energy and the work, and must be zero. Record "energy".
         power: power by column [W]: "actuation", "forces", "constraints", each law.  Record "power".
-        z: states of laws, (nt, nz), if a law has states.
+        z: states of laws, (nt, nz), or None if no law has states.
         modes: mode of each friction element, +1 or -1 for slip, 0 for stick, 2 for an open contact, (nt,
-            ne).
-        closed: whether each contact is closed, in the order of the scene's `contact_names`, (nt, n).
+            ne), or None without friction elements.
+        closed: whether each contact is closed, in the order of the scene's `contact_names`, (nt, n),
+            or None without unilateral contacts.
         limits: limit of each friction element in its mode [N or N m], (nt, ne); record "laws" or "forces".
         law_forces: part of C of each law by name, on the degrees of freedom `law_dofs`; record "laws" or
             "forces". See `law`.

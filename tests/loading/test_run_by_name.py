@@ -46,12 +46,6 @@ def test_joints(tree):
         tree.joint("j9")
 
 
-def test_what_was_not_recorded_is_none():
-    run = pn.simulate(pn.Scene(MODEL), 0.01)
-    assert run.joint("j0").a is None
-    assert run.joint("j0").tau is None
-
-
 @pytest.mark.parametrize("output_dt", [None, 0.01, 0.3])
 def test_angles_count_whole_turns(output_dt):
     """An endless joint that turns at 30 rad/s, sampled more seldom than it turns."""

@@ -77,10 +77,11 @@ def contact_points(run: Trajectory, motion: Motion) -> list[ContactPoint]:
 
 def _closed_mask(run: Trajectory, names: list[str]) -> NDArray[np.bool_]:
     """Check if contacts are closed at each sample, (nt, n)."""
-    if not run.recorded("closed"):
+    closed = getattr(run, "closed", None)
+    if closed is None:
         return np.ones((len(run.t), len(names)), dtype=bool)
     column = {name: k for k, name in enumerate(run.scene.contact_names)}
-    return np.asarray(run.closed)[:, [column[name] for name in names]]
+    return np.asarray(closed)[:, [column[name] for name in names]]
 
 
 def _action_lines(run: Trajectory, motion: Motion, chosen: list[int]) -> Array:

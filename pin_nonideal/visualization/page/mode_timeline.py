@@ -51,17 +51,18 @@ def bands_of(run: Trajectory) -> list[tuple[str, Bands]]:
         run: run of the replay.
     """
     named_bands: list[tuple[str, Bands]] = []
-    if run.recorded("modes"):
+    if run.modes is not None:
         modes = np.asarray(run.modes)
         is_ever_closed = np.any(modes != OPEN, axis=0)
         struck = {str(event.element) for event in run.events}
         shown = [k for k, name in enumerate(run.element_names) if is_ever_closed[k] or name in struck]
         bands = mode_bands(run.t, modes[:, shown])
         named_bands = [(run.element_names[k], band) for k, band in zip(shown, bands, strict=True)]
-    if not run.recorded("closed"):
+    closed = getattr(run, "closed", None)
+    if closed is None:
         return named_bands
     rubbing = {run.law_names[law] for law in run.element_laws}
-    for name, column in zip(run.scene.contact_names, np.asarray(run.closed).T, strict=True):
+    for name, column in zip(run.scene.contact_names, np.asarray(closed).T, strict=True):
         if name not in rubbing and column.any() and not column.all():
             modes = np.where(column, CLOSED, OPEN).astype(np.int8)
             named_bands.append((name, mode_bands(run.t, modes[:, None])[0]))
@@ -74,7 +75,8 @@ def has_open_contact(run: Trajectory) -> bool:
     Args:
         run: run of the replay.
     """
-    return run.recorded("closed") and not np.asarray(run.closed).all()
+    closed = getattr(run, "closed", None)
+    return closed is not None and not np.asarray(closed).all()
 
 
 def gaps_of(run: Trajectory, names: Sequence[str] | None = None) -> tuple[Array, dict[str, Array]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,7 +62,7 @@ def available(run: Trajectory) -> list[str]:
     return names + [f"phase {model.names[joint]}" for joint in sorted(joints)]
 
 
-def is_relation(item: Any) -> bool:
+def is_relation(item: object) -> bool:
     """Check if a name is that of a relation: "phase", "friction" or "load", alone or before a name."""
     return isinstance(item, str) and item.split(" ", 1)[0] in KINDS
 
@@ -150,19 +150,18 @@ def _frictions(run: Trajectory, name: str, over_load: bool) -> list[Relation]:
         record = run.law(law)
         force = np.asarray(record.force)[:, run.scene.model.joints[known[law]].idx_v]
         place = by_unit.setdefault(unit, Relation(name or "Friction", label, f"friction [{unit}]", {}, {}))
-        has_mode = run.law_names.index(law) in run.element_laws
-        mode = record.mode if has_mode else np.zeros(len(x), dtype=np.int8)
-        place.curves[law] = _broken(x, np.abs(force) if over_load else force, mode)
-        if has_mode and record.limit.ndim == 1:
+        place.curves[law] = _broken(x, np.abs(force) if over_load else force, record.mode)
+        if record.limit is not None and record.limit.ndim == 1:
             speed = np.abs(run.v[:, run.scene.model.joints[known[law]].idx_v])
             most = record.limit + _viscous(run, law) * speed
-            place.bounds[law] = (x, most) if over_load else _opposed(x, most, mode)
+            place.bounds[law] = (x, most) if over_load else _opposed(x, most, record.mode)
     return list(by_unit.values())
 
 
-def _opposed(x: Array, most: Array, mode: NDArray[np.int8]) -> tuple[Array, Array]:
+def _opposed(x: Array, most: Array, mode: NDArray[np.int8] | None) -> tuple[Array, Array]:
     """Return the largest friction of slipping samples against their motion, and of the others both ways."""
-    forth, back = mode >= 0, mode <= 0
+    slips = np.zeros(len(x), dtype=int) if mode is None else np.sign(np.asarray(mode, dtype=int))
+    forth, back = slips >= 0, slips <= 0
     return np.concatenate([x[forth], x[back]]), np.concatenate([-most[forth], most[back]])
 
 
@@ -172,9 +171,11 @@ def _viscous(run: Trajectory, name: str) -> float:
     return float(getattr(run.scene.laws[index], "viscous", 0.0))
 
 
-def _broken(x: Array, y: Array, mode: NDArray[np.int8]) -> tuple[Array, Array]:
+def _broken(x: Array, y: Array, mode: NDArray[np.int8] | None) -> tuple[Array, Array]:
     """Return a curve with a gap at each change of mode, because friction is discontinuous there."""
-    at = np.flatnonzero(np.diff(mode.reshape(len(x), -1)[:, 0])) + 1
+    if mode is None:
+        return x, y
+    at = np.flatnonzero(np.diff(np.asarray(mode).reshape(len(x), -1)[:, 0])) + 1
     return np.insert(x, at, np.nan), np.insert(y, at, np.nan)
 
 
