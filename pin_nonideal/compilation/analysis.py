@@ -149,8 +149,14 @@ def zero_rows(
         InconsistentConstraintsError: a vanishing row has a nonzero right-hand side.
         LoopClosureError: a vanishing row has a residual above the tolerance.
     """
-    blocks = sorted(program.constraints, key=lambda c: c.first)
-    opening = {c.name for c in program.constraints[program.first_gap :]}
+    free_gaps = set(program.free_gaps)
+    chosen = [block for block in range(len(program.block_names)) if block not in free_gaps]
+    if not chosen:
+        return [], []
+    described = program.constraints
+    chosen.sort(key=lambda block: described[block].first)
+    blocks = [described[block] for block in chosen]
+    opening = set(program.block_names[program.first_gap :])
     owners = [(c.name, row) for c in blocks for row in range(c.count)]
     # Rows that move in time may vanish at a few states only, so they stay. Gaps are never duplicates.
     fixed = np.array([c.moves_in_time for c in blocks for _ in range(c.count)], dtype=bool)
@@ -162,8 +168,8 @@ def zero_rows(
     for _ in range(3):
         q = pin.integrate(model, q0, generator.standard_normal(model.nv))
         v = generator.standard_normal(model.nv)
-        samples.append(rows_at(runner, q, v, 0.37)[:3])
-        own, greatest = (row_lengths(runner, q, v, 0.37, own=own)[: len(owners)] for own in (True, False))
+        samples.append(rows_at(runner, q, v, 0.37, chosen)[:3])
+        own, greatest = (row_lengths(runner, q, v, 0.37, own=own, blocks=chosen) for own in (True, False))
         vanishing &= own <= VANISHING_LENGTH * greatest
     wide = np.hstack([A for A, _, _ in samples])
     right = np.column_stack([b for _, b, _ in samples])
@@ -174,9 +180,11 @@ def zero_rows(
         _check_vanishing(*owners[row], np.abs(right[row]).max(), np.abs(right).max(), gap, tolerance)
         dropped.append((*owners[row], "vanishes"))
     pairs = duplicate_rows(np.hstack([wide, right]), ~vanishing & ~fixed & ~opens, wide.shape[1])
+    numbers = [c.first + row for c in blocks for row in range(c.count)]
     dropped += [(*owners[row], f'copy of a row of "{owners[first][0]}"') for row, first, _ in pairs]
     rows = {owner: row for row, owner in enumerate(owners)}
-    return sorted(dropped, key=lambda entry: rows[entry[:2]]), pairs
+    duplicates = [(numbers[row], numbers[first], factor) for row, first, factor in pairs]
+    return sorted(dropped, key=lambda entry: rows[entry[:2]]), duplicates
 
 
 def _check_vanishing(

@@ -45,7 +45,7 @@ def lower_contact_friction(
         out: the program under construction.
         context: names of the scene.
     """
-    if not any(getattr(c, key, 0.0) for key in ("mu", "torsional", "rolling")):
+    if not (getattr(c, "mu", 0.0) or getattr(c, "torsional", 0.0) or getattr(c, "rolling", 0.0)):
         return
     law = out.add_law(name)
     slip = _user_slip if isinstance(c, UserContact) else _flat_slip if hasattr(c, "plane") else _round_slip

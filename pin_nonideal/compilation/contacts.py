@@ -56,8 +56,9 @@ def lower_contacts(
     Raises:
         InputError, UnknownNameError: a frame or joint does not exist or does not fit.
     """
+    kinds = get_args(Contact)
     for name, c in contacts:
-        if not isinstance(c, get_args(Contact)):
+        if not isinstance(c, kinds):
             known = ", ".join(kind.__name__ for kind in get_args(Contact))
             raise InputError(f"a contact must be one of {known}; got {short_repr(c)}")
         if isinstance(c, JointLimit):
@@ -106,14 +107,14 @@ def lower_gaps(c: Contact, name: str, out: core.Builder, resolver: Resolver) -> 
         f1, f2, hull = resolver.rim(c, who)
         block = out.add_rim(name, f1, f2, solid=hull, rim=c.rim, radius=c.radius2)
     else:
-        block = _round_gap(c, name, out, resolver)
+        block = _round_gap(c, name, who, out, resolver)
     out.set_unilateral(restitution=c.restitution)
     return [block]
 
 
-def _round_gap(c: RoundContact, name: str, out: core.Builder, resolver: Resolver) -> int:
+def _round_gap(c: RoundContact, name: str, who: str, out: core.Builder, resolver: Resolver) -> int:
     """Add the row of a contact between two solids with rounding radii."""
-    who, radius = words(c, name), c.radius1 + c.radius2
+    radius = c.radius1 + c.radius2
     if isinstance(c, HullContact):
         f1, f2, hull = resolver.hull(c, who)
         return out.add_hull(name, f1, f2, solid=hull, radius=radius)

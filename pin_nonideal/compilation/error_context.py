@@ -94,7 +94,7 @@ def named_failure(
     if kind is kinds.singular_mass:
         return _singular(model, failure.elements[0], t)
     if kind is kinds.inconsistent:
-        names = [*(c.name for c in program.constraints), *program.element_names]
+        names = [*program.block_names, *program.element_names]
         return _inconsistent([names[i] for i in failure.elements], value, t, model, around.pairs)
     if kind is kinds.not_finite:
         return NonFiniteError(f"acceleration is not finite at t = {t:.4g} s", time=t)
@@ -106,7 +106,7 @@ def named_failure(
         blocks = block_names(program)
         return _modes_error(names or [blocks[i] for i in program.contacts], t)
     if kind is kinds.closure:
-        name = program.constraints[failure.elements[0]].name
+        name = program.block_names[failure.elements[0]]
         return open_loop_error(name, {name: value}, t)
     if kind is kinds.interrupted:
         return RunInterrupted(f"the run was interrupted at t = {t:.4g} s", time=t)

@@ -10,6 +10,7 @@ from pin_nonideal.core_loader import core
 from pin_nonideal.description.constraints import HingeAnchor, JointCoupling, PointAnchor, is_mimic
 from pin_nonideal.description.laws import JointFriction
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
+from pin_nonideal.states.rows import row_slices
 
 from .callbacks import ReactionNames
 from .constraints import frames_of
@@ -177,7 +178,8 @@ def _in_constraint(
         block = out.add_hinge_slip(name, f1, f2, axis=list(axis))
         return [FrictionSite(core.Load.revolute, block=block, anchor=anchor, axis=axis)]
     ball = isinstance(c, PointAnchor) or type(c).__name__ in BALLS
-    rows = next(rows.count for rows in out.constraints if rows.name == law.joint)
+    place = row_slices(out)[law.joint]
+    rows = place.stop - place.start
     if not ball or rows != 3:
         held = f" that holds {rows} of three directions" if ball else ""
         raise InputError(

@@ -91,7 +91,7 @@ def lower_stepwise(spec: SceneSpec, builder: core.Builder, resolver: Resolver) -
     ):
         yield LoweredItem("contact", name, contact, partial(_relower, lower_gaps, name, resolver))
     joints = {name: i for i, name in enumerate(resolver.model.names) if i}
-    blocks = {c.name: block for block, c in enumerate(builder.constraints)}
+    blocks = {name: block for block, name in enumerate(builder.block_names)}
     names = ReactionNames(row_slices(builder), blocks, joints)
     context = LoweringContext(resolver, dict(zip(constraint_names, spec.constraints, strict=True)), names)
     for law, name in zip(spec.laws, law_names, strict=True):

@@ -11,7 +11,13 @@ import pinocchio as pin
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.constraints import HingeAnchor, Rolling
 from pin_nonideal.description.contacts import PointContact
-from pin_nonideal.description.contacts.round import BoxContact, CapsuleContact, SphereContact, segments
+from pin_nonideal.description.contacts.round import (
+    BoxContact,
+    CapsuleContact,
+    Segment,
+    SphereContact,
+    segments,
+)
 from pin_nonideal.description.contacts.solids import (
     CylinderContact,
     EllipsoidContact,
@@ -53,7 +59,8 @@ class Resolver:
         self.model, self.q0 = model, q0
         self._placements = joint_placements(model, q0)
         self._frames: dict[str, Frame] = {}
-        self._segments: dict[tuple[object, ...], tuple[Frame, float]] = {}  # shared by contacts
+        self._placed_frames: dict[tuple[str, Vector3, Vector3], Frame] = {}  # shared by contacts
+        self._segments: dict[tuple[str, Segment], tuple[Frame, float]] = {}
 
     def frame_id(self, name: str, who: str) -> int:
         """Return the index of a frame; a joint's name selects the frame of the joint."""
@@ -136,31 +143,30 @@ class Resolver:
 
     def capsules(self, c: SphereContact | CapsuleContact, who: str) -> tuple[Frame, Frame, float, float]:
         """Return frames at the segment centers, z along the segments, and the half lengths [m]."""
-        (first, half1), (second, half2) = (
-            self._segment(frame, ends, who)
-            for frame, ends in zip(self._two_bodies(c, who), segments(c), strict=True)
-        )
+        self._two_bodies(c, who)
+        ends1, ends2 = segments(c)
+        first, half1 = self._segment(c.frame1, ends1, who)
+        second, half2 = self._segment(c.frame2, ends2, who)
         return first, second, half1, half2
 
-    def _segment(self, frame: Frame, ends: Array, who: str) -> tuple[Frame, float]:
-        joint, R, p = frame
-        key = (joint, *R, *p, ends.tobytes())
+    def _segment(self, frame: str, ends: Segment, who: str) -> tuple[Frame, float]:
+        key = frame, ends
         if key not in self._segments:
-            self._segments[key] = along(frame, ends, who)
+            self._segments[key] = along(self.frame(frame, who), np.array(ends), who)
         return self._segments[key]
 
     def box(self, c: BoxContact, who: str) -> tuple[Frame, Frame, list[float]]:
         """Return frames at the centers of sphere and box, and half edges minus the rounding radius [m]."""
-        first, second = self._two_bodies(c, who)
+        self._two_bodies(c, who)
         half = [0.5 * edge - c.radius2 for edge in c.size]
-        return translated_frame(first, c.offset), rotated_frame(translated_frame(second, c.xyz), c.rpy), half
+        return self._placed(c.frame1, c.offset, who), self._placed(c.frame2, c.xyz, who, c.rpy), half
 
     def hull(
         self, c: HullContact, who: str
     ) -> tuple[Frame, Frame, tuple[list[float], list[float], list[int]]]:
         """Return the frame at the sphere's center, the frame of the hull, and the hull in the core's form."""
-        first, second = self._two_bodies(c, who)
-        return translated_frame(first, c.offset), second, core_hull(c)
+        second = self._two_bodies(c, who)[1]
+        return self._placed(c.frame1, c.offset, who), second, core_hull(c)
 
     def cylinder(
         self, c: CylinderContact, who: str
@@ -196,6 +202,14 @@ class Resolver:
             one,
             other,
         )
+
+    def _placed(self, frame: str, by: Vector3, who: str, rpy: Vector3 = (0.0, 0.0, 0.0)) -> Frame:
+        """Return a frame translated in its axes and then rotated; contacts of the same shapes share it."""
+        key = frame, by, rpy
+        if key not in self._placed_frames:
+            moved = translated_frame(self.frame(frame, who), by)
+            self._placed_frames[key] = rotated_frame(moved, rpy) if any(rpy) else moved
+        return self._placed_frames[key]
 
     def _two_bodies(self, c: Any, who: str) -> list[Frame]:
         ends = [self.frame(c.frame1, who), self.frame(c.frame2, who)]

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pinocchio as pin
 
-from pin_nonideal.description.contacts.round import Segment
+from pin_nonideal.description.contacts.base import similar
+from pin_nonideal.description.contacts.round import CapsuleContact, Segment
 from pin_nonideal.description.contacts.solids import CylinderContact
 from pin_nonideal.errors import InputError
 from pin_nonideal.types import Array, Table
@@ -62,29 +65,66 @@ def to_joint_frame(shape: Shape, x: float, y: float, z: float) -> tuple[float, f
     return a, b, c
 
 
-def sphere_contact(at: Array, radius: float, frame: str, solid: Shape, options: Table) -> CylinderContact:
-    """Return the contact of a sphere, or of a rounded corner, with a cylinder or cone."""
+def rows_of(points: Array) -> tuple[Vector3, ...]:
+    """Return points as tuples of three numbers."""
+    return tuple((x, y, z) for x, y, z in points.tolist())
+
+
+def sphere_contacts(
+    points: Array, radius: float, frame: str, solid: Shape, options: Table
+) -> list[CylinderContact]:
+    """Return the contacts of spheres, or of rounded corners, with a cylinder or cone."""
+    ends = [(at, None) for at in rows_of(points)]
+    return _alike(ends, radius, frame, solid, options) if ends else []
+
+
+def capsule_contacts(
+    lines: Sequence[Segment], radius: float, frame: str, solid: Shape, options: Table
+) -> list[CylinderContact]:
+    """Return the contacts of capsules, or of rounded edges, with a cylinder or cone."""
+    return _alike(lines, radius, frame, solid, options) if lines else []
+
+
+def _alike(
+    ends: Sequence[tuple[Vector3, Vector3 | None]],
+    radius: float,
+    frame: str,
+    solid: Shape,
+    options: Table,
+) -> list[CylinderContact]:
+    """Return the contacts of capsules, or of spheres without a second end, with a cylinder or cone."""
     assert solid.ends is not None
     half, below, above = solid.ends
-    return CylinderContact(
+    first = CylinderContact(
         frame,
         solid.frame,
         2.0 * half,
         below,
         radius,
         above,
-        offset=tuple(at.tolist()),
+        offset=ends[0][0],
+        end=ends[0][1],
         xyz=tuple(solid.place.translation.tolist()),
         rpy=tuple(pin.rpy.matrixToRpy(solid.place.rotation).tolist()),
         **options,
     )
+    return [similar(first, offset=one, end=other) for one, other in ends]
 
 
-def capsule_contact(
-    line: Segment, radius: float, frame: str, solid: Shape, options: Table
-) -> CylinderContact:
-    """Return the contact of a capsule, or of a rounded edge, with a cylinder or cone."""
-    return replace(sphere_contact(np.array(line[0]), radius, frame, solid, options), end=line[1])
+def capsule_pairs(
+    frame1: str,
+    frame2: str,
+    lines1: Sequence[Segment],
+    lines2: Sequence[Segment],
+    radius1: float,
+    radius2: float,
+    options: Table,
+) -> list[CapsuleContact]:
+    """Return the contacts of each of some capsules with each of other capsules."""
+    if not (lines1 and lines2):
+        return []
+    first = CapsuleContact(frame1, frame2, lines1[0], lines2[0], radius1, radius2, **options)
+    return [similar(first, segment1=one, segment2=other) for one, other in product(lines1, lines2)]
 
 
 def end_coordinates(solid: Shape, inset: float) -> tuple[float, float]:

@@ -9,7 +9,6 @@ between these points support a side on that face. Chords of both faces support t
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 import pinocchio as pin
@@ -23,13 +22,14 @@ from pin_nonideal.validation import Vector3
 from .cylinder import (
     DEFAULT_ROUNDING,
     SIDE_INSET,
-    capsule_contact,
+    capsule_contacts,
+    capsule_pairs,
     end_coordinates,
     face_points,
     faces,
     inset_side,
     section,
-    sphere_contact,
+    sphere_contacts,
     to_joint_frame,
 )
 from .shapes import Shape
@@ -71,25 +71,18 @@ def cylinder_contacts(
     for own, other in ((first, second), (second, first)):
         whole = _core(other, inset)
         contacts += [_pair(rim, whole, inset, options) for rim in _rims(own, inset)]
-        for tip in _core(own, inset).points:
-            contacts.append(replace(sphere_contact(tip, inset, own.frame, whole, options), radius2=inset))
+        rounded = {**options, "radius2": inset}
+        contacts += sphere_contacts(_core(own, inset).points, inset, own.frame, whole, rounded)
         for ring in _rings(own, inset):
-            contacts += [
-                sphere_contact(np.array(at), 0.0, own.frame, whole, {**options, "radius2": inset})
-                for at in ring
-            ]
+            contacts += sphere_contacts(np.array(ring), 0.0, own.frame, whole, rounded)
         side = _core(inset_side(other, inset, SIDE_INSET * inset), inset)
         chords = [chord for ring in _rings(own, inset) for chord in _chords(ring)]
-        contacts += [
-            capsule_contact(chord, 0.0, own.frame, side, {**options, "radius2": inset}) for chord in chords
-        ]
-    lower = [
+        contacts += capsule_contacts(chords, 0.0, own.frame, side, rounded)
+    chords1, chords2 = [
         [chord for ring in _rings(solid, inset, depth) for chord in _chords(ring)]
         for solid, depth in ((first, 0.0), (second, inset))
     ]
-    for line1, line2 in product(*lower):
-        contacts.append(CapsuleContact(first.frame, second.frame, line1, line2, 0.0, inset, **options))
-    return contacts
+    return contacts + capsule_pairs(first.frame, second.frame, chords1, chords2, 0.0, inset, options)
 
 
 def _ball(solid: Shape) -> float:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
-from itertools import combinations, product
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from pin_nonideal.description.contacts import PointContact
+from pin_nonideal.description.contacts.base import similar
 from pin_nonideal.description.contacts.convex_hull import convex_hull, shrunk
 from pin_nonideal.description.contacts.round import BoxContact, CapsuleContact, Segment
 from pin_nonideal.description.contacts.solids import (
@@ -22,20 +22,21 @@ from pin_nonideal.description.contacts.solids import (
 )
 from pin_nonideal.errors import InputError
 from pin_nonideal.types import Array, Table
-from pin_nonideal.validation import Vector3
 
 from .cylinder import (
     DEFAULT_ROUNDING,
     SIDE_INSET,
-    capsule_contact,
+    capsule_contacts,
+    capsule_pairs,
     end_coordinates,
     face_points,
     faces,
     inset_side,
     rim_inset,
     rim_slices,
+    rows_of,
     section,
-    sphere_contact,
+    sphere_contacts,
     to_joint_frame,
 )
 from .cylinder_manifold import cylinder_contacts
@@ -89,7 +90,7 @@ def manifold(
         if second.solid and (first.solid or first.is_round):
             contacts = _solid_manifold(who, first, second, rounding, options)
         elif second.ends is not None and first.kind == "Sphere":
-            contacts = [sphere_contact(first.points[0], first.radius, first.frame, second, options)]
+            contacts = sphere_contacts(first.points[:1], first.radius, first.frame, second, options)
         elif second.ends is not None and (first.solid or first.is_round):
             contacts = _cylinder_manifold(who, first, second, rounding, options)
         elif first.ends is not None and second.ends is not None:
@@ -101,7 +102,7 @@ def manifold(
                 "meshes, cylinders and cones with each other: use PointContact for the places that touch"
             )
     return [
-        replace(c, name=base if len(contacts) == 1 else f"{base} {k + 1}") for k, c in enumerate(contacts)
+        similar(c, name=base if len(contacts) == 1 else f"{base} {k + 1}") for k, c in enumerate(contacts)
     ]
 
 
@@ -153,22 +154,20 @@ def _cylinder_manifold(
     count = len(core) + len(lines) * (1 + len(chords)) + on_faces + len(rings)
     _check_count(who, count, f"{len(lines)} edges by {1 + len(chords)}")
     side = inset_side(solid, inset, SIDE_INSET * (radius if other.solid else inset))
-    contacts: list[ManifoldContact] = [sphere_contact(at, radius, other.frame, solid, options) for at in core]
-    contacts += [capsule_contact(line, radius, other.frame, side, options) for line in lines]
-    for line, chord in product(lines, chords):
-        contacts.append(CapsuleContact(other.frame, solid.frame, line, chord, radius, 0.0, **options))
+    contacts: list[ManifoldContact] = [*sphere_contacts(core, radius, other.frame, solid, options)]
+    contacts += capsule_contacts(lines, radius, other.frame, side, options)
+    contacts += capsule_pairs(other.frame, solid.frame, lines, chords, radius, 0.0, options)
     if not other.solid:
-        rims = rim_slices(solid, inset)
-        return contacts + [
-            capsule_contact(line, radius, other.frame, rim, options) for line in lines for rim in rims
-        ]
-    contacts += [_solid_contact(solid, np.array(at), other, core, 0.0, radius, options) for at in tips]
-    rpy = tuple(pin.rpy.matrixToRpy(solid.place.rotation).tolist())
+        for disk in rim_slices(solid, inset):
+            contacts += capsule_contacts(lines, radius, other.frame, disk, options)
+        return contacts
+    contacts += _solid_contacts(solid, np.array(tips), other, core, 0.0, radius, options)
+    rpy, points = tuple(pin.rpy.matrixToRpy(solid.place.rotation).tolist()), rows_of(core)
     inner = section(solid, *end_coordinates(solid, inset), 1.0)
     for end, rim in faces(inner):
         middle = to_joint_frame(inner, 0.0, 0.0, end)
         contacts.append(
-            RimContact(solid.frame, other.frame, _rows(core), rim, radius, offset=middle, rpy=rpy, **options)
+            RimContact(solid.frame, other.frame, points, rim, radius, offset=middle, rpy=rpy, **options)
         )
     return contacts
 
@@ -189,10 +188,8 @@ def _solid_manifold(
         (solid, cores[1], first, cores[0], r2),
     ):
         if target.solid:
-            contacts += [_solid_contact(ball, at, target, core, radius, r2, options) for at in points]
-    for one, other in product(*lines):
-        contacts.append(CapsuleContact(first.frame, solid.frame, one, other, r1, r2, **options))
-    return contacts
+            contacts += _solid_contacts(ball, points, target, core, radius, r2, options)
+    return contacts + capsule_pairs(first.frame, solid.frame, *lines, r1, r2, options)
 
 
 def _edge_radius(who: str, shapes: list[Shape], rounding: float | None) -> float:
@@ -214,37 +211,28 @@ def _check_count(who: str, count: int, edges: str) -> None:
         )
 
 
-def _rows(points: Array) -> tuple[Vector3, ...]:
-    return tuple((x, y, z) for x, y, z in points.tolist())
-
-
-def _solid_contact(
+def _solid_contacts(
     ball: Shape,
-    at: Array,
+    points: Array,
     target: Shape,
     core: Array,
     radius: float,
     rounding: float,
     options: Table,
-) -> BoxContact | HullContact:
-    """Return the contact of a sphere or a point with a rounded box or mesh with these corners."""
+) -> list[BoxContact | HullContact]:
+    """Return the contacts of spheres or points of a body with a rounded box or mesh with these corners."""
+    offsets = rows_of(points)
+    first: BoxContact | HullContact
     if target.half is not None:
-        return _box_contact(ball, at, target, radius, rounding, options)
-    offset = tuple(at.tolist())
-    return HullContact(ball.frame, target.frame, _rows(core), radius, rounding, offset, **options)
-
-
-def _box_contact(
-    ball: Shape, at: Array, box: Shape, radius: float, rounding: float, options: Table
-) -> BoxContact:
-    assert box.half is not None
-    size = tuple((2.0 * box.half).tolist())
-    rpy = tuple(pin.rpy.matrixToRpy(box.place.rotation).tolist())
-    xyz = tuple(box.place.translation.tolist())
-    offset = tuple(at.tolist())
-    return BoxContact(
-        ball.frame, box.frame, size, radius, rounding, offset=offset, xyz=xyz, rpy=rpy, **options
-    )
+        size = tuple((2.0 * target.half).tolist())
+        rpy = tuple(pin.rpy.matrixToRpy(target.place.rotation).tolist())
+        xyz = tuple(target.place.translation.tolist())
+        first = BoxContact(
+            ball.frame, target.frame, size, radius, rounding, offset=offsets[0], xyz=xyz, rpy=rpy, **options
+        )
+    else:
+        first = HullContact(ball.frame, target.frame, rows_of(core), radius, rounding, offsets[0], **options)
+    return [similar(first, offset=offset) for offset in offsets]
 
 
 def _min_edge(shape: Shape) -> float:

@@ -26,8 +26,8 @@ from pin_nonideal.states.rows import (
     gap_rows,
     holonomic_rows,
     metric_rows,
+    residuals_at,
     row_slices,
-    rows_at,
 )
 from pin_nonideal.trajectory.dense_output import dense_output
 from pin_nonideal.trajectory.fields import with_defaults
@@ -134,7 +134,7 @@ def _open_loop_failure(scene: Scene, trajectory: Trajectory) -> LoopClosureError
     k = int((trajectory.violation > MAX_RESIDUAL).argmax())
     t = float(trajectory.t[k])
     runner = compiled_scene(scene).program.runner()
-    residual = rows_at(runner, trajectory.q[k], trajectory.v[k], t)[2]
+    residual = residuals_at(runner, trajectory.q[k], trajectory.v[k], t)
     left = np.where(gap_rows(compiled_scene(scene).program), np.maximum(-residual, 0.0), np.abs(residual))
     gaps = {key: float(left[rows].max()) for key, rows in scene.constraint_slices.items()}
     stopped = open_loop_error(max(gaps, key=lambda key: gaps[key]), gaps, t, f"; {TRAJECTORY_HINT}")

@@ -9,7 +9,7 @@ from pin_nonideal.errors import InconsistentConstraintsError, InputError, LoopCl
 from pin_nonideal.types import Array
 
 from .loop_closure import CLOSURE_TOLERANCE
-from .rows import row_slices
+from .rows import gap_rows, row_slices
 
 
 def deepest_contact(phi: Array, program: core.Program) -> tuple[str, float]:
@@ -19,10 +19,11 @@ def deepest_contact(phi: Array, program: core.Program) -> tuple[str, float]:
         phi: residuals of all rows, (m,).
         program: the core's program.
     """
-    slices = row_slices(program)
-    depths = {c.name: -float(phi[slices[c.name]].min()) for c in program.constraints[program.first_gap :]}
-    name = max(depths, key=lambda key: depths[key], default="")
-    return name, depths.get(name, 0.0)
+    gaps = phi[program.first_rows[program.first_gap :]]  # one row each
+    if not len(gaps):
+        return "", 0.0
+    deepest = int(gaps.argmin())
+    return program.block_names[program.first_gap + deepest], -float(gaps[deepest])
 
 
 def widest_loop(phi: Array, program: core.Program) -> tuple[str, float]:
@@ -84,12 +85,8 @@ def open_loops(phi: Array, program: core.Program, t: float) -> LoopClosureError:
         program: the core's program.
         t: time [s].
     """
-    slices = row_slices(program)
-    gaps = {c.name: _largest(phi[slices[c.name]]) for c in program.constraints[: program.first_gap]}
-    gaps |= {
-        c.name: _largest(np.minimum(phi[slices[c.name]], 0.0))
-        for c in program.constraints[program.first_gap :]
-    }
+    left = np.where(gap_rows(program), np.minimum(phi, 0.0), phi)
+    gaps = {name: _largest(left[rows]) for name, rows in row_slices(program).items()}
     largest = max(gaps.values())
     left_open = {name: gap for name, gap in gaps.items() if not gap <= min(CLOSURE_TOLERANCE, 0.5 * largest)}
     text = "; ".join(f'loop "{name}" does not close: gap {gap:.2g}' for name, gap in left_open.items())

@@ -30,7 +30,7 @@ from .held import (
 )
 from .loop_closure import CLOSURE_TOLERANCE, FAR_MOVE, Closure
 from .report import ProjectionReport, report_of
-from .rows import gap_rows, holonomic_rows, rows_at
+from .rows import gap_rows, holonomic_rows, residuals_at, rows_at
 from .scales import chain, coordinate, largest_body, slides
 
 # Largest remaining rate of consistent rows, relative to 1 + |v|.
@@ -138,7 +138,7 @@ class Projection:
             )
         self.measure_at(q)
         runner = self.program.runner()
-        phi = rows_at(runner, q, v, t)[2]
+        phi = residuals_at(runner, q, v, t)
         refuse_deep_starts(phi, self.program, MAX_PENETRATION * min(1.0, self.length), t)
         on, v_on, before, after, rate = runner.project(q, v, t, self._reached())
         iterations, nearest, is_closed = 0, True, after <= self._closed
@@ -296,7 +296,7 @@ class Projection:
         The depth of a contact is no length. A start in contact may have no other residual.
         """
         away = pin.difference(self.model, pin.neutral(self.model), q)[self._slides]
-        phi = rows_at(self.program.runner(), q, np.zeros(self.model.nv), 0.0)[2]
+        phi = residuals_at(self.program.runner(), q, np.zeros(self.model.nv), 0.0)
         phi = phi[~(self._gaps & (phi <= PENETRATION_ROUNDING))]
         return max(_largest(away), _largest(phi), largest_body(self.model))
 
@@ -306,7 +306,7 @@ class Projection:
 
     def _residuals(self, runner: core.Runner, q: Array, t: float) -> Array:
         """Return the residuals of all rows, (m,)."""
-        return rows_at(runner, q, np.zeros(self.model.nv), t)[2]
+        return residuals_at(runner, q, np.zeros(self.model.nv), t)
 
     def _is_outside(self, q: Array, phi: Array) -> bool:
         """Check if no contact penetrates by more than rounding."""
@@ -396,7 +396,7 @@ def nearest_closure(
         before = after = np.inf
     if min(before, after) > enough:
         on = projection._search(runner, q, 0.0, None)[0].q
-        before, after = np.inf, _largest(rows_at(runner, on, zero, 0.0)[2])
+        before, after = np.inf, _largest(residuals_at(runner, on, zero, 0.0))
     return (on, after) if after <= before else (q, before)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from pin_nonideal.types import Array
 
 def block_names(program: core.Program) -> list[str]:
     """Return the names of all constraints and contacts, by block of the core."""
-    return [c.name for c in program.constraints]
+    return program.block_names
 
 
 def row_slices(program: core.Program | core.Builder) -> dict[str, slice]:
@@ -22,8 +22,9 @@ def row_slices(program: core.Program | core.Builder) -> dict[str, slice]:
     Args:
         program: the core's program, finished or under construction.
     """
-    blocks = sorted(program.constraints, key=lambda c: c.first)
-    return {c.name: slice(c.first, c.first + c.count) for c in blocks}
+    blocks = sorted(zip(program.first_rows, program.block_names, strict=True))
+    ends = [*(first for first, _ in blocks[1:]), program.rows]
+    return {name: slice(first, end) for (first, name), end in zip(blocks, ends, strict=False)}
 
 
 def holonomic_rows(program: core.Program) -> NDArray[np.bool_]:
@@ -46,25 +47,51 @@ def gap_rows(program: core.Program, immovable_contacts: Collection[str] = ()) ->
         immovable_contacts: names of contacts that no joint moves, which are excluded.
     """
     out = np.zeros(program.rows, dtype=bool)
-    for c in program.constraints[program.first_gap :]:
-        out[c.first : c.first + c.count] = c.name not in immovable_contacts
+    out[program.first_rows[program.first_gap :]] = True  # one row each
+    if immovable_contacts:
+        slices = row_slices(program)
+        for name in immovable_contacts:
+            out[slices[name]] = False
     return out
 
 
-def rows_at(runner: core.Runner, q: Array, v: Array, t: float) -> tuple[Array, Array, Array, Array]:
-    """Compute A (m, nv), b (m,), residual (m,) and rate (m,) of all rows at a state, removed rows included.
+def rows_at(
+    runner: core.Runner, q: Array, v: Array, t: float, blocks: Sequence[int] | None = None
+) -> tuple[Array, Array, Array, Array]:
+    """Compute A (m, nv), b (m,), residual (m,) and rate (m,) of rows at a state, removed rows included.
 
     Args:
         runner: a workspace of the core.
         q: configuration, (nq,).
         v: velocity, (nv,).
         t: time [s].
+        blocks: blocks of constraints and contacts with these rows; None for all, in the order of their rows.
     """
-    A, b, phi, rate = runner.rows(q, v, t)
+    A, b, phi, rate = runner.rows(q, v, t, blocks)
     return A.reshape(len(phi), len(v)), b, phi, rate
 
 
-def row_lengths(runner: core.Runner, q: Array, v: Array, t: float, *, own: bool = False) -> Array:
+def residuals_at(runner: core.Runner, q: Array, v: Array, t: float) -> Array:
+    """Compute the residuals of all rows, removed rows included, (m,).
+
+    Args:
+        runner: a workspace of the core.
+        q: configuration, (nq,).
+        v: velocity, which functions of a user may read, (nv,).
+        t: time [s].
+    """
+    return np.asarray(runner.residuals(q, v, t))
+
+
+def row_lengths(
+    runner: core.Runner,
+    q: Array,
+    v: Array,
+    t: float,
+    *,
+    own: bool = False,
+    blocks: Sequence[int] | None = None,
+) -> Array:
     """Compute the greatest possible lengths of rows at q in the metric of M^-1, or their lengths, (m + d,).
 
     The rows of `rows_at` come first, then the d slip directions of friction elements. The greatest length of
@@ -77,8 +104,9 @@ def row_lengths(runner: core.Runner, q: Array, v: Array, t: float, *, own: bool 
         v: velocity, (nv,).
         t: time [s].
         own: whether to return the lengths of the rows instead of their greatest possible lengths.
+        blocks: blocks of constraints and contacts with these rows; None for all rows and slip directions.
     """
-    return np.asarray(runner.row_lengths(q, v, t, own))
+    return np.asarray(runner.row_lengths(q, v, t, own, blocks))
 
 
 # Singular value of rows over their greatest lengths below which rows are dependent or vanish. Closures and

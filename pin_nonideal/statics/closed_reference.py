@@ -12,7 +12,7 @@ from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.states.errors import widest_loop
 from pin_nonideal.states.held import Held, polish_free
 from pin_nonideal.states.reference_motion import TIME_ROUNDING, ReferenceMotion
-from pin_nonideal.states.rows import MIN_SINGULAR_VALUE, holonomic_rows, rows_at
+from pin_nonideal.states.rows import MIN_SINGULAR_VALUE, holonomic_rows, residuals_at, rows_at
 from pin_nonideal.states.scales import coordinate, slides
 from pin_nonideal.types import Array, Model
 
@@ -137,7 +137,7 @@ class ClosedReference:
             away = np.where(stated, pin.difference(model, now, reference), 0.0)
             if np.abs(away / unit).max(initial=0.0) > LOG_ROUNDING:
                 given = pin.integrate(model, now, away)
-                phi = rows_at(self._runner, given, still, t)[2]
+                phi = residuals_at(self._runner, given, still, t)
                 raise self._open(f"q at t = {t:g} s", "(m or rad)", phi, away, unit)
 
     def _require_rates(
@@ -197,7 +197,7 @@ class ClosedReference:
     def _configuration_on(self, q: Array, t: float) -> Array:
         """Return the configuration on the constraints with the independent coordinates of q, (nq,)."""
         on = polish_free(self._scene.model, self._runner, q, self._free, self._rows, t)
-        phi = rows_at(self._runner, on, np.zeros(len(self._free)), t)[2]
+        phi = residuals_at(self._runner, on, np.zeros(len(self._free)), t)
         if not np.abs(phi[self._rows]).max(initial=0.0) <= self._allowed:
             name, gap = widest_loop(phi, self._program)
             raise InputError(

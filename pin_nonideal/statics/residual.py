@@ -15,6 +15,7 @@ from pin_nonideal.states.rows import (
     gap_rows,
     holonomic_rows,
     minimum_norm,
+    residuals_at,
     row_lengths,
     rows_at,
 )
@@ -91,7 +92,7 @@ class AtRest:
         if not self.open.any():
             return False
         before = self.open
-        self.open = before & (rows_at(self.runner, q, self.still, self.t)[2] > self.touching)
+        self.open = before & (residuals_at(self.runner, q, self.still, self.t) > self.touching)
         return bool((before != self.open).any())
 
     def release(self, rows: NDArray[np.bool_]) -> None:
@@ -108,7 +109,7 @@ class AtRest:
         Args:
             q: configuration, (nq,).
         """
-        return rows_at(self.runner, q, self.still, self.t)[2][self.open]
+        return residuals_at(self.runner, q, self.still, self.t)[self.open]
 
     def forces(self, q: Array) -> Array:
         """Compute applied forces and laws at rest, without dry friction, (nv,).

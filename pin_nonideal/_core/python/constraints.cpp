@@ -1,5 +1,7 @@
 #include "python/constraints.hpp"
 
+#include <algorithm>
+
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
@@ -21,6 +23,30 @@ std::vector<ConstraintRows> constraint_rows(const Program& p) {
         out.push_back(std::move(rows));
     }
     return out;
+}
+
+std::vector<std::string> block_names(const Program& p) {
+    std::vector<std::string> names;
+    for (int i = 0; i < p.constraints; ++i) names.push_back(p.blocks[i].name);
+    return names;
+}
+
+std::vector<int> first_rows(const Program& p) {
+    std::vector<int> rows;
+    for (int i = 0; i < p.constraints; ++i) rows.push_back(p.blocks[i].user_row);
+    return rows;
+}
+
+std::vector<int> free_gaps(const Program& p) {
+    std::vector<int> free;
+    for (int i = p.first_gap; i < p.constraints; ++i) {
+        const std::vector<Block::Entry>& entries = p.blocks[i].entries;
+        const auto floats = [&](const Block::Entry& e) {
+            return p.mechanism.joints[p.mechanism.dof_joint[e.dof]].kind == JointKind::free_flyer;
+        };
+        if (std::any_of(entries.begin(), entries.end(), floats)) free.push_back(i);
+    }
+    return free;
 }
 
 namespace {
@@ -96,7 +122,9 @@ void bind_constraints(nb::module_& m, nb::class_<Builder>& builder) {
         .def_ro("holonomic", &ConstraintRows::holonomic)
         .def_ro("moves_in_time", &ConstraintRows::moves_in_time)
         .def_ro("shown", &ConstraintRows::shown);
-    builder.def_prop_ro("constraints", [](const Builder& b) { return constraint_rows(*b.p); });
+    builder.def_prop_ro("block_names", [](const Builder& b) { return block_names(*b.p); });
+    builder.def_prop_ro("first_rows", [](const Builder& b) { return first_rows(*b.p); });
+    builder.def_prop_ro("rows", [](const Builder& b) { return b.p->user_rows; });
     bind_kinds(builder, static_cast<const Kind*>(nullptr));
 }
 

@@ -17,6 +17,11 @@ struct ConstraintRows {
     DisplayKind shown;                  // display kind in a replay
 };
 std::vector<ConstraintRows> constraint_rows(const Program& p);
+// Names of the blocks of constraints and contacts, and the first row of each among all descriptions.
+std::vector<std::string> block_names(const Program& p);
+std::vector<int> first_rows(const Program& p);
+// Blocks of the gaps that a floating joint of one body alone moves. Their rows vanish nowhere.
+std::vector<int> free_gaps(const Program& p);
 
 void bind_constraints(nb::module_& m, nb::class_<Builder>& builder);
 

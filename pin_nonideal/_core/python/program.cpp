@@ -22,6 +22,9 @@ void bind_program(nb::module_& m) {
             return same_model(p.mechanism.model.get(), model_pointer(model.ptr()));
         }, "model"_a)
         .def_prop_ro("constraints", &constraint_rows)
+        .def_prop_ro("block_names", &block_names)
+        .def_prop_ro("first_rows", &first_rows)
+        .def_prop_ro("free_gaps", &free_gaps)
         .def_prop_ro("rows", [](const Program& p) { return p.user_rows; })
         .def_prop_ro("states", [](const Program& p) { return p.states; })
         .def_prop_ro("framed_contacts", &framed_contacts)

@@ -1,5 +1,6 @@
 #include "python/runner.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <numeric>
 
@@ -26,6 +27,19 @@
 using namespace nanobind::literals;
 
 namespace pn {
+
+namespace {
+
+// Return a block with all rows of its description. `copy` stores it if some rows are not kept.
+const Block& with_all_rows(const Block& block, Block& copy) {
+    if (static_cast<int>(block.kept.size()) == block.total) return block;
+    copy = block;
+    copy.kept.resize(block.total);
+    std::iota(copy.kept.begin(), copy.kept.end(), 0);
+    return copy;
+}
+
+}  // namespace
 
 Runner::Runner(std::shared_ptr<const Program> program)
     : p(std::move(program)), w(std::make_unique<Workspace>(*p)), first(w->state), q(p->mechanism.nq),
@@ -144,25 +158,37 @@ int Runner::constraint_rank() const {
     return rank;
 }
 
-std::tuple<Numbers, Numbers, Numbers, Numbers> Runner::rows(const Array& q_in, const Array& v_in, double t) {
+std::vector<int> Runner::chosen_blocks(const std::optional<std::vector<int>>& blocks) const {
+    if (blocks) {
+        for (const int i : *blocks)
+            if (i < 0 || i >= p->constraints) throw std::invalid_argument("no such block");
+        return *blocks;
+    }
+    std::vector<int> all(p->constraints);
+    std::iota(all.begin(), all.end(), 0);
+    std::sort(all.begin(), all.end(), [&](int i, int j) { return p->blocks[i].user_row < p->blocks[j].user_row; });
+    return all;
+}
+
+std::tuple<Numbers, Numbers, Numbers, Numbers> Runner::rows(const Array& q_in, const Array& v_in, double t,
+                                                            const std::optional<std::vector<int>>& chosen) {
     set(q_in, v_in, {});
     const Mechanism& m = p->mechanism;
     kinematics(m, w->now.terms, q, v);
-    evaluate_rows(*p, *w, t, v);
-    for (int i = 0; i < static_cast<int>(p->gaps.size()); ++i) evaluate_gap(*p, *w, t, v, i);
-    const int nv = m.nv;
-    std::vector<double> A(static_cast<size_t>(p->user_rows) * nv, 0.0), b(p->user_rows), phi = b, rate = b;
-    for (int i = 0; i < p->constraints; ++i) {
-        Block all = p->blocks[i];
-        all.kept.clear();
-        for (int k = 0; k < all.total; ++k) all.kept.push_back(k);
+    const std::vector<int> blocks = chosen_blocks(chosen);
+    size_t count = 0;
+    for (const int i : blocks) count += p->blocks[i].total;
+    std::vector<double> A(count * m.nv, 0.0), b(count), phi = b, rate = b, local;
+    Block copy;
+    size_t row = 0;
+    for (const int i : blocks) {
+        evaluate_block(*p, *w, t, v, i);
+        const Block& all = with_all_rows(p->blocks[i], copy);
         const RowValues& values = w->now.values[i];
-        std::vector<double> local(all.support.size() * all.total);
+        local.assign(all.support.size() * all.total, 0.0);
         fill_A(all, m, w->now.terms, values, local.data());
-        for (int k = 0; k < all.total; ++k) {
-            const int row = all.user_row + k;
-            for (size_t l = 0; l < all.support.size(); ++l)
-                A[static_cast<size_t>(row) * nv + all.support[l]] = local[l * all.total + k];
+        for (int k = 0; k < all.total; ++k, ++row) {
+            for (size_t l = 0; l < all.support.size(); ++l) A[row * m.nv + all.support[l]] = local[l * all.total + k];
             b[row] = -values.drift[k];
             phi[row] = values.residual[k];
             rate[row] = values.rate[k];
@@ -171,23 +197,41 @@ std::tuple<Numbers, Numbers, Numbers, Numbers> Runner::rows(const Array& q_in, c
     return {to_numpy(std::move(A)), to_numpy(std::move(b)), to_numpy(std::move(phi)), to_numpy(std::move(rate))};
 }
 
-Numbers Runner::row_lengths(const Array& q_in, const Array& v_in, double t, bool own) {
+Numbers Runner::residuals(const Array& q_in, const Array& v_in, double t) {
+    set(q_in, v_in, {});
+    kinematics(p->mechanism, w->now.terms, q, v);
+    std::vector<double> phi(p->user_rows);
+    for (int i = 0; i < p->constraints; ++i) {
+        const Block& block = p->blocks[i];
+        if (std::holds_alternative<UserRows>(block.kind) || std::holds_alternative<UserGapRow>(block.kind)) {
+            evaluate_block(*p, *w, t, v, i);
+        } else {
+            const State state{p->mechanism, w->now.terms, w->now.row_time(t), w->now.terms.q, v};
+            evaluate(block.kind, state, Part::residual, w->now.values[i]);
+        }
+        std::copy_n(w->now.values[i].residual.begin(), block.total, phi.begin() + block.user_row);
+    }
+    return to_numpy(std::move(phi));
+}
+
+Numbers Runner::row_lengths(const Array& q_in, const Array& v_in, double t, bool own,
+                            const std::optional<std::vector<int>>& chosen) {
     set(q_in, v_in, {});
     set_modes(*p, *w, std::vector<Mode>(p->frictions.size(), unloaded));  // no joint is locked
     configure(*p, *w, t, q, v);
-    std::vector<double> lengths(p->user_rows);
-    const auto find = [&](int i, double* length) {
+    std::vector<double> lengths;
+    const auto append = [&](int i, int count) {
         const Block& block = p->blocks[i];
         std::vector<int> rows(block.total);
         std::iota(rows.begin(), rows.end(), 0);
         evaluate_block(*p, *w, t, v, i);  // also for open contacts
-        (own ? own_lengths : greatest_lengths)(p->mechanism, w->now.terms, block, rows, w->now.values[i], length);
+        lengths.resize(lengths.size() + count);
+        double* last = lengths.data() + lengths.size() - count;
+        (own ? own_lengths : greatest_lengths)(p->mechanism, w->now.terms, block, rows, w->now.values[i], last);
     };
-    for (int i = 0; i < p->constraints; ++i) find(i, lengths.data() + p->blocks[i].user_row);
-    for (const Friction& f : p->frictions) {
-        lengths.resize(lengths.size() + f.dim);
-        find(f.block, lengths.data() + lengths.size() - f.dim);
-    }
+    for (const int i : chosen_blocks(chosen)) append(i, p->blocks[i].total);
+    if (!chosen)
+        for (const Friction& f : p->frictions) append(f.block, f.dim);
     return to_numpy(std::move(lengths));
 }
 
@@ -321,8 +365,9 @@ nb::class_<Runner> bind_runner(nb::module_& m) {
         .def("acceleration", &Runner::acceleration, "q"_a, "v"_a, "t"_a, "tau"_a.none(), "out"_a)
         .def("solve", &Runner::solve, "q"_a, "v"_a, "t"_a = 0.0, "tau"_a = nb::none(), "modes"_a = nb::none(),
              "frozen"_a = false)
-        .def("rows", &Runner::rows, "q"_a, "v"_a, "t"_a)
-        .def("row_lengths", &Runner::row_lengths, "q"_a, "v"_a, "t"_a, "own"_a = false)
+        .def("rows", &Runner::rows, "q"_a, "v"_a, "t"_a, "blocks"_a = nb::none())
+        .def("residuals", &Runner::residuals, "q"_a, "v"_a, "t"_a)
+        .def("row_lengths", &Runner::row_lengths, "q"_a, "v"_a, "t"_a, "own"_a = false, "blocks"_a = nb::none())
         .def("slip_rows", &Runner::slip_rows, "q"_a, "v"_a, "t"_a)
         .def("terms", &Runner::terms, "q"_a, "v"_a)
         .def("energies", &Runner::energies, "q"_a, "v"_a)

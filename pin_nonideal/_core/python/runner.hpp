@@ -48,11 +48,16 @@ struct Runner {
     Instant solve(const Array& q_in, const Array& v_in, double t, const std::optional<Array>& tau,
                   const std::optional<std::vector<Mode>>& modes, bool frozen);
     int constraint_rank() const;
-    // Return all rows of all constraints, including removed rows: A (by rows), b, residual, rate.
-    std::tuple<Numbers, Numbers, Numbers, Numbers> rows(const Array& q_in, const Array& v_in, double t);
-    // Return the greatest length that each of these rows can have at q, then of each direction of the friction
-    // elements. `own`: return the actual lengths. Lengths use the metric of M^-1.
-    Numbers row_lengths(const Array& q_in, const Array& v_in, double t, bool own);
+    // Return the rows of some blocks, including removed rows: A (by rows), b, residual, rate. Without a choice, return
+    // the rows of all constraints and contacts in the order of their descriptions.
+    std::tuple<Numbers, Numbers, Numbers, Numbers> rows(const Array& q_in, const Array& v_in, double t,
+                                                        const std::optional<std::vector<int>>& chosen);
+    // Return the residuals of all these rows.
+    Numbers residuals(const Array& q_in, const Array& v_in, double t);
+    // Return the greatest length that each row of `rows` can have at q, and without a choice of blocks also that of each
+    // direction of the friction elements. `own`: return the actual lengths. Lengths use the metric of M^-1.
+    Numbers row_lengths(const Array& q_in, const Array& v_in, double t, bool own,
+                        const std::optional<std::vector<int>>& chosen);
     // Return the slip directions of all friction elements as rows, whose rates are slip velocities.
     Numbers slip_rows(const Array& q_in, const Array& v_in, double t);
     // Return M (dense, by rows) and the bias forces.
@@ -74,6 +79,8 @@ private:
 
     // Set the state and the torques. Throw std::invalid_argument if they do not fit the model, which Python explains.
     void set(const Array& q_in, const Array& v_in, const std::optional<Array>& tau);
+    // Return the chosen blocks, or all blocks of constraints and contacts in the order of their rows.
+    std::vector<int> chosen_blocks(const std::optional<std::vector<int>>& blocks) const;
     // Set the modes: the given ones, else by velocity, and at rest by the complementarity problem.
     void choose_modes(double t, const std::optional<std::vector<Mode>>& modes);
     void choose_contacts(double t, const std::optional<std::vector<Mode>>& modes);

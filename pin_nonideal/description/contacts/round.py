@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from pin_nonideal.errors import InputError
-from pin_nonideal.types import Array
 from pin_nonideal.validation import Vector3, array
 
 from .base import check_friction, check_two_frames, check_vectors
@@ -59,7 +56,8 @@ class SphereContact:
         _check(self)
 
 
-Segment = tuple[tuple[float, float, float], tuple[float, float, float]]
+Segment = tuple[Vector3, Vector3]
+CENTER: Segment = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
 @dataclass(frozen=True)
@@ -148,12 +146,10 @@ class BoxContact:
             )
 
 
-def segments(c: SphereContact | CapsuleContact) -> tuple[Array, Array]:
-    """Return both segments in the axes of their frames, (2, 3) each.
+def segments(c: SphereContact | CapsuleContact) -> tuple[Segment, Segment]:
+    """Return the ends of both segments in the axes of their frames.
 
     Args:
         c: the description.
     """
-    if isinstance(c, SphereContact):
-        return np.zeros((2, 3)), np.zeros((2, 3))
-    return np.array(c.segment1), np.array(c.segment2)
+    return (CENTER, CENTER) if isinstance(c, SphereContact) else (c.segment1, c.segment2)
