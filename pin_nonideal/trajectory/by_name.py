@@ -14,6 +14,7 @@ from pin_nonideal.states.kinematics import frame_motion
 from pin_nonideal.types import Array
 from pin_nonideal.validation import choice, text
 
+from .contact_points import is_point_of
 from .fields import RunFields, reactions_of
 from .frame_reaction import carrier_of, frame_reaction
 from .missing_array import NOT_RECORDED, REASONS, missing_array
@@ -57,7 +58,10 @@ def force_of(run: RunFields, name: str) -> Array:
     """Return the force of one constraint or contact; see `Trajectory.force`."""
     name = text("force: name", name)
     if name not in run.rows:
-        raise UnknownNameError(f'no constraint or contact "{name}" in this run{nearest(name, run.rows)}')
+        hint = nearest(name, run.rows)
+        if any(is_point_of(name, key) for key in run.rows):
+            hint = f'; run.contact("{name}").force is the sum of its points'
+        raise UnknownNameError(f'no constraint or contact "{name}" in this run{hint}')
     first, end, contact = run.rows[name]
     if contact:
         force: Array = reaction_of(run, name, "world")[:, :3]

@@ -172,6 +172,35 @@ class JointRecord:
 
 
 @dataclass(frozen=True, eq=False)
+class ContactRecord:
+    """Resultant of one contact over a run, or of all contact points of two shapes.
+
+    Attributes:
+        name: name of the contact or of the `GeometryContact`.
+        points: names of its contact points.
+        bodies: names of the joints of the two bodies; the force acts on the first. "universe" is the world.
+        closed: whether a contact point is closed, (nt,).
+        force: resultant of the normal forces and the friction, in world axes [N], (nt, 3).
+        torque: moment of these forces about `center`, in world axes [N m], (nt, 3). It does not include
+            torsional and rolling resistance.
+        normal_force: sum of the normal forces [N], (nt,).
+        center: center of pressure, the mean of the contact points weighted by their normal forces, in the
+            world [m], (nt, 3); not a number without a normal force.
+        gap: least gap of the points [m], (nt,).
+    """
+
+    name: str
+    points: list[str]
+    bodies: tuple[str, str]
+    closed: NDArray[np.bool_]
+    force: Array
+    torque: Array
+    normal_force: Array
+    center: Array
+    gap: Array
+
+
+@dataclass(frozen=True, eq=False)
 class FrameRecord:
     """Motion of one frame over a run.
 

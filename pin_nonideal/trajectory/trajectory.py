@@ -22,8 +22,9 @@ from pin_nonideal.validation import count as whole_number
 
 from .by_name import force_of, frame_record, joint_record, law_record, reaction_of
 from .columns import columns, units
+from .contact_points import contact_record
 from .fields import RunFields
-from .records import FrameRecord, JointRecord, LawRecord, Sample
+from .records import ContactRecord, FrameRecord, JointRecord, LawRecord, Sample
 from .summary import summary
 
 # A line of the summary: its heading, with a unit or not, and the rest from ": " or the first digit on.
@@ -167,6 +168,24 @@ class Trajectory(RunFields):
             UnknownNameError: there is no such constraint or contact.
         """
         return force_of(self, name)
+
+    def contact(self, name: str) -> ContactRecord:
+        """Return the resultant force, the center of pressure and the gap of one contact or pair of shapes.
+
+        A pair of shapes is named as its `GeometryContact`, by default "SHAPE on OTHER", and comprises all
+        contact points of that name with a number. The run must have recorded "forces".
+
+        Args:
+            name: name of a contact of the scene, or of a pair of shapes.
+
+        Returns:
+            Record of the contact.
+
+        Raises:
+            InputError: the run did not record "forces" or has no scene, or the contact has no contact point.
+            UnknownNameError: there is no such contact.
+        """
+        return contact_record(self, name)
 
     def law(self, name: str) -> LawRecord:
         """Return the record of one law.

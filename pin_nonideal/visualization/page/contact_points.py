@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pin_nonideal.core_loader import core
 from pin_nonideal.scene.scene import compiled_scene
-from pin_nonideal.states.kinematics import frame_on_joint
 from pin_nonideal.trajectory.columns import open_contacts
+from pin_nonideal.trajectory.contact_points import contact_bodies, contact_lines
 from pin_nonideal.types import Array
 
 from .frames import Motion
@@ -68,10 +67,19 @@ def contact_points(run: Trajectory, motion: Motion) -> list[ContactPoint]:
         for k, name in enumerate(names)
         if hasattr(compiled.described[name], "plane") or name in struck or name not in left_out
     ]
-    lines, closed = _action_lines(run, motion, chosen), _closed_mask(run, [names[k] for k in chosen])
+    chosen_names = [names[k] for k in chosen]
+    places, normals = contact_lines(run.scene, motion.q, motion.times, chosen_names)
+    closed = _closed_mask(run, chosen_names)
     return [
-        _contact_point(run, names[k], lines[:, column], closed[motion.before, column])
-        for column, k in enumerate(chosen)
+        ContactPoint(
+            name,
+            compiled.described[name],
+            *contact_bodies(run.scene, name)[:2],
+            places[:, column],
+            normals[:, column],
+            closed[motion.before, column],
+        )
+        for column, name in enumerate(chosen_names)
     ]
 
 
@@ -82,25 +90,6 @@ def _closed_mask(run: Trajectory, names: list[str]) -> NDArray[np.bool_]:
         return np.ones((len(run.t), len(names)), dtype=bool)
     column = {name: k for k, name in enumerate(run.scene.contact_names)}
     return np.asarray(closed)[:, [column[name] for name in names]]
-
-
-def _action_lines(run: Trajectory, motion: Motion, chosen: list[int]) -> Array:
-    """Return a point on the line of action of each contact, and its normal, at each frame, (n, k, 6)."""
-    if not chosen:
-        return np.zeros((len(motion.times), 0, 6))
-    program = compiled_scene(run.scene).program
-    framed = program.framed_contacts
-    lines = core.action_lines(program, motion.q, motion.times, [framed[k] for k in chosen])
-    return lines.reshape(len(motion.times), len(chosen), 6)
-
-
-def _contact_point(run: Trajectory, name: str, line: Array, closed: NDArray[np.bool_]) -> ContactPoint:
-    """Return a contact on its line of action; a radius shifts the contact point from the point of the row."""
-    item: Any = compiled_scene(run.scene).described[name]
-    frames = (item.frame, item.plane) if hasattr(item, "plane") else (item.frame1, item.frame2)
-    joint, other = (0 if frame is None else frame_on_joint(run.scene.model, frame)[0] for frame in frames)
-    radius = getattr(item, "radius1", getattr(item, "radius", 0.0))
-    return ContactPoint(name, item, joint, other, line[:, :3] - radius * line[:, 3:], line[:, 3:], closed)
 
 
 def contact_point_marks(touches: list[ContactPoint], motion: Motion, marks: list[Mark]) -> list[Mark]:
