@@ -95,6 +95,30 @@ bool BlockSolver::unloads(int island, const VecX& f) const {
     });
 }
 
+// Check if the forces of an island add energy at its motion.
+bool BlockSolver::adds_energy(int island, const VecX& f) {
+    double conveyed = 0.0, free = 0.0, own = 0.0;
+    free_rows_.resize(problem.rows);
+    for (int i : islands_[island].elements) {
+        const BlockElement& e = problem.elements[i];
+        problem.respond(e, problem.free, free_rows_);
+        for (int r = e.row; r < e.row + e.dim(); ++r) {
+            free_rows_[r] += problem.offset[r];
+            conveyed += f[r] * (w_[r] - free_rows_[r]);
+            free -= f[r] * free_rows_[r];
+            own += f[r] * f[r] / newton_.stiffness(r);
+        }
+    }
+    return add_energy(conveyed, free, own);
+}
+
+// Compute forces near a solution by sweeps from no forces, which bound the energy. Return their error.
+double BlockSolver::sweep(int island, VecX& f) {
+    for (int i : islands_[island].elements) f.segment(problem.elements[i].row, problem.elements[i].dim()).setZero();
+    newton_.sweep(problem, islands_[island], parameters.last_sweeps, f, x_, w_);
+    return newton_.error(problem, islands_[island], f, x_, w_);
+}
+
 // Solve an island by Newton's method from the guess, else after sweeps, else along the path of compliances. Return the
 // error. A contact that loses its load may do so in one of several solutions: the one with shared loads is preferred.
 double BlockSolver::solve(int island, VecX& f) {
@@ -123,12 +147,19 @@ double BlockSolver::solve(int island, VecX& f) {
     return least_;
 }
 
+// Solve an island. Forces that are far from a solution, or that add energy, are replaced by forces of sweeps.
+double BlockSolver::solve_within_energy(int island, VecX& f) {
+    const double error = solve(island, f);
+    if (error <= parameters.swept_from && !adds_energy(island, f)) return error;
+    return std::max(sweep(island, f), parameters.swept_from);
+}
+
 double BlockSolver::solve(VecX& f) {
     error_ = 0.0;
     miss_ = {};
     guess_ = f;
     for (int i = 0; i < islands_.size(); ++i) {
-        const double error = solve(i, f);
+        const double error = solve_within_energy(i, f);
         if (error > error_) {
             error_ = error;
             newton_.worst(problem, islands_[i], f, w_, miss_.element, miss_.velocity);

@@ -19,6 +19,9 @@ struct BlockSolverParameters {
     int most_stages = 30;                                  // maximum number of compliances on the path
     // Maximum rounds of sweeps, and sweeps of a round.
     int most_sweep_rounds = 8, sweeps_a_round = 50;
+    // Error from which sweeps from no forces replace the best forces found, and the number of these sweeps.
+    double swept_from = 1e-2;
+    int last_sweeps = 400;
 };
 
 class BlockSolver {
@@ -31,8 +34,9 @@ public:
     // Prepare the problem once its nodes and elements are set. Returns false if an inertia is not positive definite.
     bool pose();
     // Solve for the forces f from a guess, usually those of the last step. Return the largest error of an element,
-    // relative to its forces. The contacts of a single node share its load as equally compliant contacts do, so that
-    // their forces depend on the problem alone. Between several nodes shares stay close to the guess.
+    // relative to its forces, and at least `swept_from` for forces of sweeps. The contacts of a single node share its
+    // load as equally compliant contacts do, so that their forces depend on the problem alone. Between several nodes
+    // shares stay close to the guess.
     double solve(VecX& f);
     // Compute the motion under the forces f.
     void move(const VecX& f);
@@ -52,16 +56,19 @@ public:
 
 private:
     double solve(int island, VecX& f);
+    double solve_within_energy(int island, VecX& f);
     bool share(int island, VecX& f);
     void copy(const Island& island, const VecX& from, VecX& to) const;
     bool unloads(int island, const VecX& f) const;
     bool settle(int island, VecX& f);
     bool stiffen(int island, VecX& f);
     bool attempt(int island, VecX& f);
+    bool adds_energy(int island, const VecX& f);
+    double sweep(int island, VecX& f);
     double newton(int island, BlockNewton::Search search, double compliance, VecX& f);
 
     BlockNewton newton_;
-    VecX guess_, best_, on_path_;
+    VecX guess_, best_, on_path_, free_rows_;
     double least_ = 0.0;  // error of best_
     Islands islands_;
     std::vector<BlockFactor> factors_;  // one for each island

@@ -6,6 +6,20 @@
 
 namespace pn {
 
+namespace {
+
+constexpr ConeEnergyParameters energy_parameters{};
+
+}  // namespace
+
+bool add_energy(double conveyed, double free, double own) {
+    return !(conveyed <= energy_parameters.factor * std::max(free, 0.0) + energy_parameters.rounding * own);
+}
+
+bool add_energy(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const VecX>& w0, const Eigen::Ref<const VecX>& f) {
+    return add_energy(f.dot(W * f), -f.dot(w0), W.diagonal().dot(f.cwiseAbs2()));
+}
+
 void add_residuals(const ConeElement& e, const double* f, const double* w, double force, double speed,
                    ConeResiduals& out) {
     constexpr double least = std::numeric_limits<double>::min();

@@ -13,6 +13,18 @@ struct ConeResiduals {
     double dissipation = 0.0;  // error of f_t . w_t = -mu f_n |w_t|, f . w = -limit |w|
 };
 
+struct ConeEnergyParameters {
+    double factor = 2.0;     // accepted excess of the energy that the forces convey
+    double rounding = 1e-9;  // of the same energy if no force acted on other elements than its own
+};
+
+// Check if forces add energy. Forces that solve the laws satisfy f . w <= 0, that is, f^T W f <= -f . w0. `conveyed` is
+// f^T W f, `free` is -f . w0, and `own` the first if W were diagonal. Errors relative to the forces do not show this
+// where the forces themselves are far too large.
+bool add_energy(double conveyed, double free, double own);
+// Check if the forces f of a problem add energy.
+bool add_energy(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const VecX>& w0, const Eigen::Ref<const VecX>& f);
+
 // Add the errors of an element with forces f and velocities w to `out`. `force` and `speed` are their scales.
 void add_residuals(const ConeElement& element, const double* f, const double* w, double force, double speed,
                    ConeResiduals& out);

@@ -119,18 +119,20 @@ void MoreauContacts::sweep(double t, JointDrives::Step& drives, bool first) {
     end_velocity();
 }
 
-// Solve the step again with the forces at the mean velocity. If no motion is found, return false with that of the first
-// sweep.
+// Solve the step again with the forces at the mean velocity. If no motion is found, or only a relaxed one, return false
+// with that of the first sweep.
 bool MoreauContacts::correct(double t, JointDrives::Step& drives) {
+    const bool relaxed_before = forces_.law_miss().block >= 0;
     try {
         sweep(t, drives, false);
-        return true;
+        if (relaxed_before || forces_.law_miss().block < 0) return true;
     } catch (const Failure& failure) {
         if (failure.kind != Failure::Kind::not_converged) throw;
-        mean_.begin(h_, v0_);
-        sweep(t, drives, false);
-        return false;
     }
+    if (!relaxed_before) forces_.clear_miss();
+    mean_.begin(h_, v0_);
+    sweep(t, drives, false);
+    return false;
 }
 
 // Set contacts and modes, with their rows. During most of a flight nothing changes. `flies`: no contact is closed and

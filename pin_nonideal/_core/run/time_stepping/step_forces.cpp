@@ -81,12 +81,13 @@ bool StepForces::solve(double h, const VecX& q0, const VecX& v0) {
     f.head(n) -= middle_.head(n);
     end_rows.head(n) = free_rows_.head(n);
     end_rows.head(n).noalias() += W * middle_.head(n);
-    solver_.search_briefly(error <= parameters.max_relaxed_error);
+    solver_.search_briefly(error < BlockSolver::parameters.swept_from);
     if (!solved)
-        solved = solver_.solve(W, end_rows.head(n), elements_.cones, true, f.head(n), true) == ConeStatus::solved;
+        solved = solver_.solve(W, end_rows.head(n), elements_.cones, true, f.head(n), true) == ConeStatus::solved &&
+                 !add_energy(W, end_rows.head(n), f.head(n));
     if (starts) solved = keep_rest(solved, q0) || solved;
     f.head(n) += middle_.head(n);
-    if (!solved && error <= parameters.max_relaxed_error) {
+    if (!solved && separate_) {
         f.head(n) = best_f_;
         relax(h);
         return true;

@@ -12,9 +12,6 @@
 namespace pn {
 
 struct StepForcesParameters {
-    // Accepted error of the laws, relative to an element's forces, in a step without an exact solution. An event
-    // reports it.
-    double max_relaxed_error = 1e-2;
     // Distance of a force at its limit, relative to the limit.
     double cone_force_rounding = 1e-9;
     // Accepted residual relative to the velocities. A step of a turning body can have no exact solution if corners
