@@ -24,6 +24,6 @@ bool left_planes(const Program& p, Workspace& w, double longest_single);
 // nonnegative and complementary to compressive multipliers. Contacts that do not touch at this position open. If no
 // such position is found, q is only projected onto the constraints, and contacts off their planes open. On return the
 // workspace is configured at q, with independent rows. Return true if rows were chosen.
-bool move_out(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
+bool depenetrate(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
 
 }  // namespace pn

@@ -19,7 +19,7 @@ struct Failure : std::exception {
     std::vector<int> elements;  // dofs, blocks or frictions, depending on the kind
     double value = 0.0;         // residual, gap, determinant, rate or number of steps
     // Solutions of a paradox. Two of several solutions are stored: limits of the elements, and accelerations.
-    enum class Solutions { not_told, none, several } solutions = Solutions::not_told;
+    enum class Solutions { unproven, none, several } solutions = Solutions::unproven;
     std::vector<VecX> limits, accelerations;
     Failure(Kind k, double t, std::vector<int> e = {}, double x = 0.0)
         : kind(k), time(t), elements(std::move(e)), value(x) {}

@@ -21,6 +21,6 @@ struct StickSlipParameters {
 inline constexpr StickSlipParameters stick_slip_parameters{};
 
 // Compute the modes of all elements at rest. The workspace is evaluated with the new modes on return.
-void resolve_modes(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, const ModeQuestion& question);
+void resolve_modes(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, const ModeQuery& query);
 
 }  // namespace pn

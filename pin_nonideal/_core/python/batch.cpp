@@ -99,7 +99,7 @@ std::vector<RunSamples> run_all(const Program& p, const Array2& q, const Array2&
     const size_t parts = std::min(count, draws * static_cast<size_t>(useful));
     RunPrograms programs(p, names, values, useful);
     std::vector<RunSamples> kept(parts);
-    std::vector<Room> rooms(useful);
+    std::vector<ThreadWorkspace> workspaces(useful);
     std::atomic<bool> stopped{false};
     options.tick = [&stopped](double t) {
         if (stopped) throw Failure(Failure::Kind::interrupted, t);
@@ -109,8 +109,8 @@ std::vector<RunSamples> run_all(const Program& p, const Array2& q, const Array2&
         RunSamples mine;
         for (size_t i = part * count / parts; i < (part + 1) * count / parts && !stopped; ++i) {
             const Program& program = programs.of(i, k);
-            rooms[k].carry(program, options, !names.empty(), q_all.row(i), v_all.row(i));
-            mine.add(i, rooms[k].run.out);
+            workspaces[k].run_from(program, options, !names.empty(), q_all.row(i), v_all.row(i));
+            mine.add(i, workspaces[k].run.out);
         }
         kept[part] = std::move(mine);
     });

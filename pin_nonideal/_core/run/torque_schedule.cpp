@@ -27,10 +27,10 @@ void Torques::sample() {
     take_rate_anew();
 }
 
-bool Torques::ask_callback() {
+bool Torques::call_callback() {
     system_.read(progress_.y);
-    const Options::Told told = options_.callback(progress_.t, system_.q, system_.v, w.scratch.work);
-    if (told != Options::Told::torque) return told == Options::Told::go_on;
+    const Options::CallbackResult result = options_.callback(progress_.t, system_.q, system_.v, w.scratch.work);
+    if (result != Options::CallbackResult::torque) return result == Options::CallbackResult::proceed;
     set(w.scratch.work);
     return true;
 }

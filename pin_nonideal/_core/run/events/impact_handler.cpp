@@ -16,7 +16,7 @@ ImpactHandler::ImpactHandler(System& system, Progress& progress, GapWatch& watch
 
 bool ImpactHandler::resolve_impacts(bool starts) {
     int count = 0;
-    while (count < parameters.most_at_once && resolve_one_impact(starts)) ++count;
+    while (count < parameters.max_simultaneous_impacts && resolve_one_impact(starts)) ++count;
     return count > 0;
 }
 
@@ -69,7 +69,7 @@ void ImpactHandler::end_bouncing(double stop) {
 void ImpactHandler::remember_gaps(bool whole_step) {
     if (system_.ng == 0) return;
     system_.read(progress_.y);
-    if (whole_step) watch_.sample_near_gaps(progress_.t);
+    if (whole_step) watch_.sample_monitored(progress_.t);
     else watch_.sample_all(progress_.t);
 }
 

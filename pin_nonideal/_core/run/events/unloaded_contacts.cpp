@@ -13,7 +13,7 @@ namespace {
 
 std::vector<int> contacts_of_bodies(const Program& p, const Workspace& w, int gap) {
     std::vector<int> list;
-    for (int i : w.now.touching)
+    for (int i : w.now.closed_gaps)
         if (same_bodies(p, i, gap) && !is_bare(p, i)) list.push_back(i);
     return list;
 }
@@ -71,11 +71,11 @@ std::vector<int> open_unloaded_contacts(System& system, double t) {
     const Program& p = system.p;
     Workspace& w = system.w;
     std::vector<int> opened_gaps;
-    const std::vector<int> touching = w.now.touching;
-    for (int gap : touching) {
+    const std::vector<int> closed_gaps = w.now.closed_gaps;
+    for (int gap : closed_gaps) {
         if (!w.state.closed[gap] || !is_unloaded(system, t, gap)) continue;
         std::vector<char> closed = w.state.closed;
-        for (int i : touching) {
+        for (int i : closed_gaps) {
             if (!closed[i] || !same_bodies(p, i, gap)) continue;
             closed[i] = 0;
             opened_gaps.push_back(i);

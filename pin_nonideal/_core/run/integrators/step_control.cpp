@@ -16,10 +16,10 @@ double rounding_at(double pivot) { return std::numeric_limits<double>::epsilon()
 
 double StepControl::aim(const Method& method) { return std::pow(parameters.safety, method.order); }
 
-bool StepControl::needs_detour(double least_pivot, double start_pivot, double end_pivot) const {
+bool StepControl::needs_detour(double min_pivot, double start_pivot, double end_pivot) const {
     const double way = std::sqrt(start_pivot) + std::sqrt(end_pivot);
-    return method_.adaptive() && detours_ < parameters.detour_limit &&
-           std::sqrt(least_pivot) < parameters.clearance * way && rounding_at(least_pivot) > rtol_;
+    return method_.adaptive() && detours_ < parameters.max_detours &&
+           std::sqrt(min_pivot) < parameters.clearance * way && rounding_at(min_pivot) > rtol_;
 }
 
 bool StepControl::accepts(std::optional<double> error, double size, bool last, double& h) {

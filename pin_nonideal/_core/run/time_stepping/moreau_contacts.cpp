@@ -34,7 +34,7 @@ double MoreauContacts::allowed(double t, double h, const VecX& y) {
     if (!rounded_) return h;
     bool placed = false;
     double shortest = h;
-    for (int i : watch_.gaps.near_gaps) {
+    for (int i : watch_.gaps.monitored_gaps) {
         if (!(rounded_by_[i] < HUGE_VAL) || w.state.closed[i] || watch_.stays_open_in_step(i)) continue;
         if (!placed) {
             system_.read(y);
@@ -95,7 +95,7 @@ void MoreauContacts::step(double t, double h, VecX& y, double& numerical_energy,
 bool MoreauContacts::project(double t, VecX& y, double& numerical_energy) {
     if (!forces_.is_separate()) return false;
     const bool rests = (v0_.array() == 0.0).all() && (v1_.array() == 0.0).all() && same_bytes(closed_, was_closed_);
-    if (rests || (w.now.touching.empty() && w.now.loaded.empty())) return true;
+    if (rests || (w.now.closed_gaps.empty() && w.now.loaded_elements.empty())) return true;
     system_.read(y);
     if (!projection_.project(p, w, t, system_.q, system_.v)) return false;
     system_.write(y);
@@ -169,20 +169,20 @@ const VecX& MoreauContacts::way_since_last() {
 // if they stay closed.
 void MoreauContacts::find_touching(double t) {
     touching_.clear();
-    for (int i : watch_.come(way_since_last())) {
+    for (int i : watch_.advance(way_since_last())) {
         measure_gap(p, w, t, mean_.value(), i);
         const double width = gap_width(p, w, i);
         const bool touches = was_closed_[i] || (width <= 0.0 && tells_way_out(i, width));
         if (touches) touching_.push_back(i);
         watch_.gaps.width[i] = touches ? 0.0 : width - parameters.width_rounding * scene_size(p, w);  // guaranteed width
     }
-    watch_.leave_far();
+    watch_.skip_wide();
     for (int i : touching_) {
         evaluate_block(p, w, t, mean_.value(), p.gaps[i].block);
         for (int e : p.gaps[i].elements) evaluate_block(p, w, t, mean_.value(), p.frictions[e].block);
     }
     if (touching_.size() > 1)
-        leave_one_of_each_place(p, w, touching_, [&](int i, int other) { return was_closed_[i] && !was_closed_[other]; });
+        remove_coincident(p, w, touching_, [&](int i, int other) { return was_closed_[i] && !was_closed_[other]; });
 }
 
 // Evaluate the contacts that take part at a new mean velocity.
@@ -237,7 +237,7 @@ void MoreauContacts::solve(double t) {
     elements_.begin_passes();
     for (int pass = 0; n > 0; ++pass) {
         if (loads || pass > 0) apply();
-        const double allowed = StepForces::parameters.most_miss * forces_.f.head(n).cwiseAbs().maxCoeff();
+        const double allowed = StepForces::parameters.max_residual * forces_.f.head(n).cwiseAbs().maxCoeff();
         if (elements_.limits_settle(p, w, t, mean_, allowed) && pass > 0) break;
         if (pass == Moreau::parameters.max_load_passes && rest_within_limits(t)) break;
         if (pass == Moreau::parameters.max_load_passes || !forces_.solve(h_, q0_, v0_))
