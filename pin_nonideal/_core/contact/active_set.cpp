@@ -61,12 +61,10 @@ struct Search {
     std::optional<Choice> improved_choice(const Choice& choice) {
         tried.push_back(choice);
         set_closed(p, w, choice);
-        try {
-            const bool applies = joint_motion && (joint_motion->is_initial_guess || joint_motion->closed == choice);
-            find_modes(applies ? joint_motion : nullptr);
-        } catch (const Failure& thrown) {
-            if (thrown.kind == Failure::Kind::interrupted || thrown.kind == Failure::Kind::not_finite) throw;
-            if (!failure) failure = thrown;
+        const bool applies = joint_motion && (joint_motion->is_initial_guess || joint_motion->closed == choice);
+        if (const auto no_motion = attempt([&] { find_modes(applies ? joint_motion : nullptr); })) {
+            if (no_motion->kind == Failure::Kind::not_finite) throw *no_motion;
+            if (!failure) failure = no_motion;
             return std::nullopt;
         }
         if (needs_opposed_friction && !slip_opposes_friction(p, w, v)) return std::nullopt;
@@ -248,22 +246,22 @@ void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, con
         if (joint_motion && joint_motion->shared && joint_motion->slides() && seek_from_joint_motion(*joint_motion)) return;
         if (joint_motion && joint_motion->shared) return close(joint_motion->closed, &*joint_motion);
     }
-    try {
+    const auto unsolved = attempt({Failure::Kind::not_converged, Failure::Kind::paradox}, [&] {
         close(query.rest, nullptr);
         // Multipliers of redundant rows do not show if friction at rest is within its cones. Sliding friction follows
         // the minimum-norm loads, unlike the solution of the cone problem.
         if (query.prescribed || !w.now.rows.redundant || !w.state.sticks_anywhere() || slides_anywhere(p, w, v))
             return;
         if (!joint_motion) joint_motion = solve_jointly();
-        if (joint_motion) return close(joint_motion->closed, &*joint_motion);
-        return close(query.rest, nullptr);
-    } catch (const Failure& failure) {
-        const bool undecided = failure.kind == Failure::Kind::not_converged;
-        if (!undecided && !(many && failure.kind == Failure::Kind::paradox)) throw;
-        joint_motion = solve_jointly();
-        if (!joint_motion || !(undecided || joint_motion->shared)) throw;
-        close(joint_motion->closed, &*joint_motion);
-    }
+        if (joint_motion) close(joint_motion->closed, &*joint_motion);
+        else close(query.rest, nullptr);
+    });
+    if (!unsolved) return;
+    const bool undecided = unsolved->kind == Failure::Kind::not_converged;
+    if (!undecided && !many) throw *unsolved;
+    joint_motion = solve_jointly();
+    if (!joint_motion || !(undecided || joint_motion->shared)) throw *unsolved;
+    close(joint_motion->closed, &*joint_motion);
 }
 
 }  // namespace pn

@@ -45,7 +45,7 @@ bool left_planes(const Program& p, Workspace& w, double longest_single) {
         widest = std::max(widest, longest_single / w.now.rows.scale[p.blocks[p.gaps[i].block].row]);
     }
     return widest > allowed &&
-           !(closing_distance(p, w) <= depenetration_parameters.max_joint_move_ratio * longest_single);
+           !(closing_distance(p, w) <= depenetration_parameters.max_move_ratio * longest_single);
 }
 
 bool depenetrate(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {

@@ -8,7 +8,7 @@ namespace pn {
 
 struct DepenetrationParameters {
     // Moves longer than this many times the longest single-contact move do not resolve all penetrations.
-    double max_joint_move_ratio = 10.0;
+    double max_move_ratio = 10.0;
     int max_steps = 20;  // Newton-like steps, each much shorter than the last one
 };
 

@@ -63,7 +63,7 @@ bool with_problem(const Program& p, Workspace& w, double t, const VecX& q, const
         else modes[e] = slip_velocity(w.now, p.frictions[e])[0] > 0.0 ? slip_plus : slip_minus;
     }
     bool found = false;
-    try {
+    attempt([&] {  // the caller's own evaluation reports failures of other rows
         release_contacts(p, w, t, q, v, query.rest, modes);
         if (rests_at_once(p, w, v, query, gaps, others)) {
             rest(others);
@@ -72,9 +72,7 @@ bool with_problem(const Program& p, Workspace& w, double t, const VecX& q, const
             RestingProblem problem(p, w, v, gaps, others, query, before);
             found = act(problem);
         }
-    } catch (const Failure& failure) {  // the caller's own evaluation reports failures of other rows
-        if (failure.kind == Failure::Kind::interrupted) throw;
-    }
+    });
     set_closed(p, w, before.closed);
     set_modes(p, w, before.mode);
     w.state = before;

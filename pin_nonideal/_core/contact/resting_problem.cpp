@@ -201,7 +201,7 @@ bool RestingProblem::alternate(const VecX& free) {
         const VecX before = f;
         w0 = free + dragging * before;
         if (!solve_cones(true, shared)) return false;
-        if ((dragging * (f - before)).cwiseAbs().maxCoeff() <= parameters.load_change_tol * acceleration_scale())
+        if ((dragging * (f - before)).cwiseAbs().maxCoeff() <= parameters.load_tolerance * acceleration_scale())
             return true;
     }
     return false;

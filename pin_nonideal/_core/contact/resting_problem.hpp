@@ -46,7 +46,7 @@ struct RestingProblemParameters {
     double at_limit_reduction = 1e-6;     // relative reduction of the limit of elements that just reached it
     int max_releases = 4;                 // rounds that set kinetic limits of slipping contacts
     int max_load_iterations = 100;        // maximum iterations of loads and their friction
-    double load_change_tol = 1e-13;       // rounding of the loads' change, relative to the largest acceleration
+    double load_tolerance = 1e-13;        // rounding of the loads' change, relative to the largest acceleration
 };
 
 class RestingProblem {

@@ -106,7 +106,7 @@ static void place_wrenches(const Program& p, Workspace& w) {
 }
 
 void assemble_forces(const Program& p, Workspace& w, double t, const VecX& v) {
-    if (++w.counters.evaluations % evaluation_parameters.evaluations_a_watch == 0 && w.watch) w.watch(t);
+    if (++w.counters.evaluations % evaluation_parameters.evaluations_per_watch == 0 && w.watch) w.watch(t);
     move_bodies(p.mechanism, w.now.terms, v);
     bias_forces(p.mechanism, w.now.terms);
     w.now.F = -w.now.terms.nle;
@@ -137,7 +137,7 @@ static bool is_balanced(const Program& p, Workspace& w) {
 }
 
 // Set the results of the laws if no law acts.
-static void leave_laws(Workspace& w) {
+static void reset_laws(Workspace& w) {
     std::fill_n(w.now.C.data(), w.now.C.size(), 0.0);
     std::fill_n(w.now.C_smooth.data(), w.now.C_smooth.size(), 0.0);
     w.now.determinant = 1.0;
@@ -152,7 +152,7 @@ void solve_dynamics(const Program& p, Workspace& w, double t, const VecX& v) {
     }
     if (!laws_act(p, w)) {
         solve_motion(p, w, false);
-        if (p.has_laws()) leave_laws(w);
+        if (p.has_laws()) reset_laws(w);
     } else {
         find_known_forces(p, w, t, w.now.terms.q, v);
         solve_with_laws(p, w, t, w.now.terms.q, v, w.now.C_smooth);

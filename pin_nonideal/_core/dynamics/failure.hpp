@@ -1,7 +1,10 @@
 // Reason why an evaluation or a run failed. The bindings convert it to the exceptions of the package.
 #pragma once
 
+#include <algorithm>
 #include <exception>
+#include <initializer_list>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -25,9 +28,33 @@ struct Failure : std::exception {
         : kind(k), time(t), elements(std::move(e)), value(x) {}
 };
 
-// Failure that ends a run whatever the search in which it occurs. No search may catch it.
+// Failure that ends a run whatever the search in which it occurs: an interrupt, or the limit of the wall time.
 struct EndOfRun {
     Failure failure;
 };
+
+// Call act() and return its failure, if any. Searches test this status. Only whole runs and the bindings catch failures.
+// An EndOfRun passes through.
+template <class Act>
+std::optional<Failure> attempt(const Act& act) {
+    try {
+        act();
+    } catch (const Failure& failure) {
+        return failure;
+    }
+    return std::nullopt;
+}
+
+// Do the same for failures of these kinds. Other failures pass through.
+template <class Act>
+std::optional<Failure> attempt(std::initializer_list<Failure::Kind> kinds, const Act& act) {
+    try {
+        act();
+    } catch (const Failure& failure) {
+        if (std::find(kinds.begin(), kinds.end(), failure.kind) == kinds.end()) throw;
+        return failure;
+    }
+    return std::nullopt;
+}
 
 }  // namespace pn

@@ -42,31 +42,36 @@ struct Implicit : Unknowns {
         return true;
     }
 
-    // Solve for one zero-load set after the other until a solution is consistent with its own set. The step to another
-    // solution is damped until the error decreases, because two sets could alternate forever.
+    // Solve for one zero-load set after the other until a solution is consistent with its own set. Other sets are searched
+    // if none is found, or if a set has no solution.
     void solve_zero_load_sets(VecX& y) {
         VecX g(n);
         const VecX start = y;
-        try {
-            image(y, g);
-            double error = (g - y).norm();
-            for (int turn = 0; turn < implicit_friction_parameters.max_zero_load_sets; ++turn) {
-                const VecX from = y;
-                {
-                    const FrozenZeroLoads frozen(p, w);
-                    solve_bearings(y);
-                }
-                if (is_motion(y)) return;
-                if (!backtrack(from, error, y, g)) break;
-            }
-        } catch (const Failure& failure) {
-            if (failure.kind != Failure::Kind::paradox || failure.solutions == Failure::Solutions::several) throw;
-            decide_over_zero_load_sets(*this, start, y, failure);
-            image(y, g);
-            return;
-        }
-        decide_over_zero_load_sets(*this, start, y, Failure(Failure::Kind::not_converged, t, elements()));
+        bool is_consistent = false;
+        const auto failure =
+            attempt({Failure::Kind::paradox}, [&] { is_consistent = alternate_zero_load_sets(y, g); });
+        if (is_consistent) return;
+        if (failure && failure->solutions == Failure::Solutions::several) throw *failure;
+        decide_over_zero_load_sets(*this, start, y,
+                                   failure.value_or(Failure(Failure::Kind::not_converged, t, elements())));
         image(y, g);
+    }
+
+    // Return false if no solution is consistent with its own set. The step to another solution is damped until the error
+    // decreases, because two sets could alternate forever.
+    bool alternate_zero_load_sets(VecX& y, VecX& g) {
+        image(y, g);
+        double error = (g - y).norm();
+        for (int turn = 0; turn < implicit_friction_parameters.max_zero_load_sets; ++turn) {
+            const VecX from = y;
+            {
+                const FrozenZeroLoads frozen(p, w);
+                solve_bearings(y);
+            }
+            if (is_motion(y)) return true;
+            if (!backtrack(from, error, y, g)) break;
+        }
+        return false;
     }
 
     // Backtrack from y toward `from` until the error is smaller than before. Return false if no point has a smaller

@@ -240,22 +240,23 @@ void each_mixture(const Unknowns& u, const MatX& J, const Visit& visit) {
 
 // Check if Newton's method from `start` converges to a solution other than y. If so, `start` is that solution.
 bool leads_elsewhere(Unknowns& u, const VecX& y, VecX& start, double size) {
-    VecX g(u.n);
-    MatX J;
-    try {
+    bool is_other = false;
+    attempt({Failure::Kind::not_finite, Failure::Kind::not_converged}, [&] {
+        VecX g(u.n);
+        MatX J;
         for (int it = 0; it < Unknowns::parameters.max_newton; ++it) {
             u.image(start, g);
             const VecX residual = g - start;
             const double scale = std::max({size, start.cwiseAbs().maxCoeff(), g.cwiseAbs().maxCoeff()});
-            if (residual.cwiseAbs().maxCoeff() <= uniqueness_parameters.same_solution * scale)
-                return (start - y).cwiseAbs().maxCoeff() > uniqueness_parameters.other_solution * scale;
+            if (residual.cwiseAbs().maxCoeff() <= uniqueness_parameters.same_solution * scale) {
+                is_other = (start - y).cwiseAbs().maxCoeff() > uniqueness_parameters.other_solution * scale;
+                return;
+            }
             differentiate(u, start, g, scale, J);
             start += solve(MatX::Identity(u.n, u.n) - J, residual);
         }
-    } catch (const Failure& failure) {
-        if (failure.kind != Failure::Kind::not_finite && failure.kind != Failure::Kind::not_converged) throw;
-    }
-    return false;
+    });
+    return is_other;
 }
 
 }  // namespace

@@ -62,11 +62,9 @@ struct ModeEnumeration {
         const int choices = static_cast<int>(std::lround(std::pow(3.0, query.at_rest.size())));
         for (int number = 0; number < choices; ++number) {
             if (!choose(number, modes)) continue;
-            try {
-                move(modes);
-            } catch (const Failure& failure) {
-                shown &= failure.solutions == Failure::Solutions::none;
-                if (failure.kind == Failure::Kind::paradox) determinant = std::min(determinant, failure.value);
+            if (const auto failure = attempt([&] { move(modes); })) {
+                shown &= failure->solutions == Failure::Solutions::none;
+                if (failure->kind == Failure::Kind::paradox) determinant = std::min(determinant, failure->value);
                 continue;
             }
             if (keeps_conditions()) motions.push_back(modes);

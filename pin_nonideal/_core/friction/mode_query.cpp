@@ -6,12 +6,12 @@
 
 namespace pn {
 
-static bool hardly_slips(const Program& p, const Workspace& w, int e, const VecX& v) {
+static bool has_negligible_slip(const Program& p, const Workspace& w, int e, const VecX& v) {
     return slip_velocity(w.now, p.frictions[e]).norm() <= rest_speed * (1.0 + v.cwiseAbs().maxCoeff());
 }
 
 bool at_rest(const Program& p, const Workspace& w, int e, const VecX& v) {
-    return w.state.mode[e] == sticking || hardly_slips(p, w, e, v);
+    return w.state.mode[e] == sticking || has_negligible_slip(p, w, e, v);
 }
 
 void follow_velocity(const Program& p, Workspace& w, int e, ModeQuery& query) {
@@ -42,7 +42,7 @@ ModeQuery make_first_mode_query(const Program& p, Workspace& w, double t, const 
     for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
         if (is_open(p, w, e)) continue;
         mode_query.modes[e] = sticking;
-        if (hardly_slips(p, w, e, v)) mode_query.at_rest.push_back(e);
+        if (has_negligible_slip(p, w, e, v)) mode_query.at_rest.push_back(e);
         else follow_velocity(p, w, e, mode_query);
     }
     return mode_query;

@@ -43,18 +43,16 @@ bool try_previous_modes(const Program& p, Workspace& w, double t, VecX& q, VecX&
     for (int e : query.at_rest) modes[e] = sticking;
     if (breaks) modes[element] = holding_force(p, w, element, t, q, v).force[0] < 0.0 ? slip_plus : slip_minus;
     const VecX q_before = q, v_before = v;
+    const double max_change = mode_update_parameters.min_velocity_change * (1.0 + v_before.cwiseAbs().maxCoeff());
     for (int round = 0; round < mode_update_parameters.max_rounds; ++round) {
         set_modes(p, w, modes);
-        try {
+        bool keeps_velocity = false;
+        const auto failure = attempt({Failure::Kind::inconsistent}, [&] {
             project_into_modes(p, w, t, q, v);
-            if ((v - v_before).cwiseAbs().maxCoeff() >
-                mode_update_parameters.min_velocity_change * (1.0 + v_before.cwiseAbs().maxCoeff()))
-                break;
-            begin_step(p, w, t, q, v);
-        } catch (const Failure& failure) {
-            if (failure.kind != Failure::Kind::inconsistent) throw;
-            break;
-        }
+            keeps_velocity = !((v - v_before).cwiseAbs().maxCoeff() > max_change);
+            if (keeps_velocity) begin_step(p, w, t, q, v);
+        });
+        if (failure || !keeps_velocity) break;
         const std::optional<int> changed = change_modes(p, w, t, q, v, query.at_rest, modes);
         if (changed == 0) return true;
         if (!changed) break;

@@ -60,12 +60,8 @@ struct Search {
     // limit depends on the load. On return the workspace is evaluated at this motion.
     bool keeps_suggestion() {
         if (p.needs_reactions || !query.at_limit.empty()) return false;
-        try {
-            apply(query.modes, false);
-        } catch (const Failure& failure) {  // driven elements do not stick
-            if (failure.kind != Failure::Kind::inconsistent) throw;
-            return false;
-        }
+        // Driven elements do not stick.
+        if (attempt({Failure::Kind::inconsistent}, [&] { apply(query.modes, false); })) return false;
         const double size = w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm();
         return std::all_of(list.begin(), list.end(), [&](int e) {
             if (w.state.mode[e] == sticking)
@@ -182,13 +178,11 @@ struct Search {
         std::vector<Mode> modes = query.modes;
         for (int e : list) modes[e] = unloaded;
         bool found = false;
-        try {
+        attempt({Failure::Kind::paradox}, [&] {  // elements at rest do not have their final forces here
             unload(false);
             found = alternate(modes);
             loads_are_feasible = !found || reactions(p, w).loads_are_feasible;
-        } catch (const Failure& failure) {  // elements at rest do not have their final forces here
-            if (failure.kind != Failure::Kind::paradox) throw;
-        }
+        });
         if (p.needs_reactions && search_further(found, modes)) return;
         if (found) return apply(modes, false);
         if (!enumerate_modes(p, w, t, q, v, query)) throw Failure(Failure::Kind::not_converged, t, list);

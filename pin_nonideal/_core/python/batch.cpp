@@ -102,7 +102,7 @@ std::vector<RunSamples> run_all(const Program& p, const Array2& q, const Array2&
     std::vector<ThreadWorkspace> workspaces(useful);
     std::atomic<bool> stopped{false};
     options.tick = [&stopped](double t) {
-        if (stopped) throw Failure(Failure::Kind::interrupted, t);
+        if (stopped) throw EndOfRun{Failure(Failure::Kind::interrupted, t)};
     };
     const auto q_all = map(q), v_all = map(v);
     parallel_for(parts, threads, stopped, [&](size_t part, int k) {

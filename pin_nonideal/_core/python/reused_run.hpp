@@ -6,6 +6,7 @@
 
 #include "python/reused_workspace.hpp"
 #include "run/stepped_run.hpp"
+#include "run/whole_run.hpp"
 
 namespace pn {
 
@@ -18,15 +19,11 @@ public:
                   const VecX& v0) {
         clear_samples();
         clear(p, w, first);
-        try {
+        record_end(out, [&] {
             if (!run_) run_ = std::make_unique<SteppedRun>(p, w, options, out);
             run_->begin(q0, v0, options.duration, true);
             run_->run();
-        } catch (const Failure& failure) {
-            out.failure = failure;
-        } catch (...) {
-            out.error = std::current_exception();
-        }
+        });
         if (out.failure || out.error) reset();  // a stopped run cannot continue
     }
 

@@ -183,7 +183,7 @@ static nb::typed<nb::list, std::optional<Outcome>> rollout(const Program& p, con
     std::vector<std::optional<Outcome>> outcomes(count);
     std::atomic<bool> stopped{false};
     const auto stop = [&stopped](double t) {
-        if (stopped) throw Failure(Failure::Kind::interrupted, t);
+        if (stopped) throw EndOfRun{Failure(Failure::Kind::interrupted, t)};
     };
     Options own = options;  // options of the caller's thread, which receives Python's signals
     watch(own, {});

@@ -19,7 +19,7 @@ bool RunLimits::is_late() const {
 // Runs are saved only here, because the state between two steps is all that the next step needs.
 void RunLimits::check() {
     try {
-        if (options_.tick && ++ticks_ % parameters.steps_a_tick == 0) options_.tick(progress_.t);
+        if (options_.tick && ++ticks_ % parameters.steps_per_tick == 0) options_.tick(progress_.t);
     } catch (...) {
         save();
         throw;

@@ -81,11 +81,12 @@ void Simulation::run() {
             continue;
         }
         Proposal proposal;
-        try {
+        const auto failure = attempt([&] {
             proposal = propose();
             while (!control_error(proposal, integrate(proposal)) || !locate_event(proposal)) proposal = propose();
-        } catch (const Failure& failure) {
-            if (!recover(failure)) throw;
+        });
+        if (failure) {
+            if (!recover(*failure)) throw *failure;
             continue;
         }
         accept(proposal, event);
@@ -186,20 +187,17 @@ std::optional<double> Simulation::integrate(const Proposal& proposal) {
     stepper.y0.head(system.ns) = progress.y.head(system.ns);
     stepper.y0.segment(system.ns, active - system.ns).setZero();  // watch entries integrate over one step only
     stepper.start_rate().head(active) = progress.rate.head(active);
-    try {
-        return try_step(proposal);
-    } catch (const Failure& failure) {
-        // A stage can leave the domain if the step is too long. A shorter step shows if the motion itself fails. If the
-        // motion diverges, no step is short enough, and the step-size failure is reported.
-        const double tiny = tiny_step_at(progress.t);
-        const bool runs_away = tiny * system.velocity(progress.rate).norm() > system.velocity(progress.y).norm();
-        if (!options.method.adaptive() || (proposal.size < tiny && !runs_away) ||
-            failure.kind == Failure::Kind::interrupted)
-            throw;
-        if (failure.kind == Failure::Kind::closure) open_loop = failure;
-        back_to_start();  // rows and warm starts of the failed step do not serve the next trial
-        return failed_error;
-    }
+    std::optional<double> error;
+    const auto failure = attempt([&] { error = try_step(proposal); });
+    if (!failure) return error;
+    // A stage can leave the domain if the step is too long. A shorter step shows if the motion itself fails. If the motion
+    // diverges, no step is short enough, and the step-size failure is reported.
+    const double tiny = tiny_step_at(progress.t);
+    const bool runs_away = tiny * system.velocity(progress.rate).norm() > system.velocity(progress.y).norm();
+    if (!options.method.adaptive() || (proposal.size < tiny && !runs_away)) throw *failure;
+    if (failure->kind == Failure::Kind::closure) open_loop = failure;
+    back_to_start();  // rows and warm starts of the failed step do not serve the next trial
+    return failed_error;
 }
 
 // Take one step. If its error is accepted, project and evaluate its end.
@@ -267,14 +265,10 @@ void Simulation::find_event() {
 bool Simulation::locate_event(const Proposal& proposal) {
     stiffness.check_step();
     floor.check_step();
-    try {
-        find_event();
-        return true;
-    } catch (const Failure& failure) {
-        // The repeated step failed although the whole step did not, so the step is too long.
-        const double tiny = tiny_step_at(progress.t);
-        if (!options.method.adaptive() || proposal.size < tiny || failure.kind == Failure::Kind::interrupted) throw;
-    }
+    const auto failure = attempt([&] { find_event(); });
+    if (!failure) return true;
+    // The repeated step failed although the whole step did not, so the step is too long.
+    if (!options.method.adaptive() || proposal.size < tiny_step_at(progress.t)) throw *failure;
     ++out.rejected;
     progress.may_hand_over = true;
     progress.h = parameters.shortened * proposal.size;
@@ -298,13 +292,12 @@ bool Simulation::recover(const Failure& failure) {
     const bool of_hand_over = at_hand_over && ModeChanges::is_of_closed_contacts(failure);
     const bool is_recoverable = of_hand_over || ModeChanges::is_recoverable(failure);
     if (!can_switch_modes && !is_recoverable) return false;
-    try {
+    bool has_switched = false;
+    attempt([&] {  // a failure means that the current modes have no motion at the step's start
         back_to_start();
-        if (can_switch_modes && modes.force_switch()) return true;
-    } catch (const Failure& at_start) {  // the current modes have no motion at the step's start
-        if (at_start.kind == Failure::Kind::interrupted) throw;
-    }
-    return is_recoverable && modes.bridge_with_time_stepping(failure, of_hand_over);
+        has_switched = can_switch_modes && modes.force_switch();
+    });
+    return has_switched || modes.bridge_with_time_stepping(failure, of_hand_over);
 }
 
 // Restore the modes and the dependent rows and forces of the step's start.

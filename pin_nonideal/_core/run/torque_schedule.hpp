@@ -31,7 +31,7 @@ public:
     double next_stop(double after, double t_end) const;
 
 private:
-    void take_rate_anew();
+    void recompute_rate();
 
     const Program& p;
     Workspace& w;

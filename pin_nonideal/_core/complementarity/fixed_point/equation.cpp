@@ -68,7 +68,7 @@ bool ReactionNewton::solve(const ReactionEquation& equation, VecX& y) {
         residual = image - y;
         const double error = residual.cwiseAbs().maxCoeff(), size = y.cwiseAbs().maxCoeff();
         if (!std::isfinite(error)) return false;
-        if (error <= parameters.rounding * size || (error >= last && error <= parameters.stall_tolerance * size))
+        if (error <= parameters.tolerance * size || (error >= last && error <= parameters.stall_tolerance * size))
             return true;
         last = error;
         factorize(equation, y);

@@ -44,7 +44,7 @@ struct ReactionEquation {
 };
 
 struct ReactionNewtonParameters {
-    double rounding = 1e-15;         // residual relative to the solution
+    double tolerance = 1e-15;        // residual relative to the solution
     double stall_tolerance = 1e-12;  // the same for worse rounding, if the residual no longer falls
     // Maximum number of steps of Newton's method for a solution of the equation.
     int max_steps = 30;

@@ -17,7 +17,7 @@ namespace pn {
 
 namespace {
 
-bool hardly_moves(const System& system, int e) {
+bool has_negligible_speed(const System& system, int e) {
     const double slip = slip_velocity(system.w.now, system.p.frictions[e]).norm();
     return slip <= EventCandidates::parameters.raised_rest_speed * (1.0 + system.v.cwiseAbs().maxCoeff());
 }
@@ -36,7 +36,7 @@ void resolve_together(System& system, double t, ModeQuery& mode_query, bool stri
         begin_step(p, w, t, system.q, system.v);
         // Nearly redundant sticking elements can leave a slipping element a velocity that opposes its mode.
         const auto moving = std::stable_partition(resting.begin(), resting.end(), [&](int e) {
-            return hardly_moves(system, e) || slip_along_mode(p, w, e) >= 0.0;
+            return has_negligible_speed(system, e) || slip_along_mode(p, w, e) >= 0.0;
         });
         if (moving == resting.end()) return;
         std::for_each(moving, resting.end(), [&](int e) { follow_velocity(p, w, e, mode_query); });
@@ -255,7 +255,7 @@ void remember_directions(System& system, std::vector<double>& slip, int stopped_
                                      : std::max(event_handling_parameters.directed_slip, velocity(stopped_element).norm());
     for (int e : w.now.loaded_elements) {
         const Friction& f = system.p.frictions[e];
-        if (w.state.is_sticking_deferred[e] && !hardly_moves(system, e)) w.state.is_sticking_deferred[e] = 0;
+        if (w.state.is_sticking_deferred[e] && !has_negligible_speed(system, e)) w.state.is_sticking_deferred[e] = 0;
         if (!slips(w.state.mode[e]) || f.dim == 1) continue;
         const Vec3 u = velocity(e);
         slip[e] = u.norm();

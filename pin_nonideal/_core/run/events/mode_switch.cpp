@@ -31,17 +31,18 @@ void ModeChanges::change(FoundEvent event) {
     bool has_impact = false;
     std::vector<int> let_go;
     event.in_vain = event.kind == FoundEvent::Kind::touch && event.index >= 0 && has_let_go(event.index);
-    try {
+    const auto failure = attempt([&] {
         if (contacts_land(system_, progress_.t, progress_.y)) event = {FoundEvent::Kind::touch, -1, progress_.t};
         has_impact = event.kind == FoundEvent::Kind::touch && impacts_.resolve_impacts(false);
         for (const Event& found : switch_modes(system_, progress_.t, progress_.y, progress_.rate, event, &let_go)) {
             out_.events.push_back(found);
             if (!has_impact) chatter_.count();
         }
-    } catch (const Failure& failure) {
+    });
+    if (failure) {
         restore_last(before, has_impact);
-        const bool of_hand_over = event.of_hand_over && !has_impact && is_of_closed_contacts(failure);
-        if (!(of_hand_over || is_recoverable(failure)) || !bridge_with_time_stepping(failure, of_hand_over)) throw;
+        const bool of_hand_over = event.of_hand_over && !has_impact && is_of_closed_contacts(*failure);
+        if (!bridge_with_time_stepping(*failure, of_hand_over)) throw *failure;
         return;
     }
     chatter_.remember();
@@ -66,11 +67,8 @@ bool ModeChanges::has_let_go(int gap) const {
 
 // End the bouncing. If the motion of a low flight is not found, bridge it by time stepping if possible.
 void ModeChanges::end_bouncing() {
-    try {
-        impacts_.end_bouncing(torques_.next_stop(progress_.t, options_.end()));
-    } catch (const Failure& failure) {
-        if (!is_recoverable(failure) || !bridge_with_time_stepping(failure)) throw;
-    }
+    const auto failure = attempt([&] { impacts_.end_bouncing(torques_.next_stop(progress_.t, options_.end())); });
+    if (failure && !bridge_with_time_stepping(*failure)) throw *failure;
 }
 
 // A proof of no motion, or of several motions, is reported to the user.
@@ -88,11 +86,9 @@ bool ModeChanges::can_switch_modes(const Failure& failure) const {
 bool ModeChanges::force_switch() {
     const double t = progress_.t, ahead = tiny_step_at(t);
     const VecX y = progress_.y;
-    try {
-        progress_.y.noalias() += ahead * progress_.rate;
-        progress_.t += ahead;
-        change(FoundEvent{FoundEvent::Kind::lift, -1, progress_.t});
-    } catch (const Failure&) {
+    progress_.y.noalias() += ahead * progress_.rate;
+    progress_.t += ahead;
+    if (attempt([&] { change(FoundEvent{FoundEvent::Kind::lift, -1, progress_.t}); })) {
         progress_.t = t;
         progress_.y = y;
         return false;
@@ -116,18 +112,17 @@ bool ModeChanges::is_of_closed_contacts(const Failure& failure) {
 }
 
 bool ModeChanges::bridge_with_time_stepping(const Failure& failure, bool of_hand_over) {
+    if (!of_hand_over && !is_recoverable(failure)) return false;
     if (options_.method.outside() || !(system_.ne > 0 || system_.ng > 0)) return false;
     const bool of_elements = system_.ne > 0 && is_of_modes(failure) && !failure.elements.empty();
     const int element = of_elements ? failure.elements.front() : 0;
     if (!(of_hand_over || is_undecided(failure) || chatter_.is_zeno() || is_creeping())) return false;
     for (;;) {
         chatter_.bridge_stretch(element, options_.end());
-        try {
-            select_new_modes();
-            return true;
-        } catch (const Failure& again) {  // the solver fails again a little later
-            if (system_.ng == 0 || !is_of_modes(again) || !is_recoverable(again)) throw;
-        }
+        const auto again = attempt([&] { select_new_modes(); });
+        if (!again) return true;
+        // The solver fails again a little later.
+        if (system_.ng == 0 || !is_of_modes(*again) || !is_recoverable(*again)) throw *again;
         if (progress_.t >= options_.end()) return true;
     }
 }
@@ -154,12 +149,11 @@ void ModeChanges::restore_last(const RunState& before, bool has_impact) {
     w.state = before;
     if (has_impact) return;
     system_.read(progress_.y);
-    try {
+    attempt([&] {  // if this fails too, the previous sample is the last, and the first failure is reported
         begin_step(p, w, progress_.t, system_.q, system_.v);
         evaluate(p, w, progress_.t, system_.q, system_.v);
         output_.now();
-    } catch (const Failure&) {  // the previous sample is the last, and the first failure is reported
-    }
+    });
 }
 
 }  // namespace pn

@@ -24,25 +24,21 @@ std::optional<double> ReleaseLocator::release_rate(double t, const VecX& y, cons
     for (int e = 0; e < system_.ne; ++e)
         if (!is_open(p, w, e) && at_rest(p, w, e, system_.v)) mode_query.at_rest.push_back(e);
     double rate = 0.0;
-    std::optional<Failure> paradox;
-    try {
+    const auto failure = attempt({Failure::Kind::paradox, Failure::Kind::not_converged}, [&] {
         resolve_modes(p, w, t, system_.q, system_.v, mode_query);
         for (int e : mode_query.at_rest)
             if (modes[e] == sticking && w.state.mode[e] != sticking)
                 rate = std::max(rate, std::abs(slip_rate_along_mode(p, w, e)));
-    } catch (const Failure& failure) {  // sticking fails: unilateral contacts change together with the elements
-        const bool is_paradox = failure.kind == Failure::Kind::paradox;
-        if (p.gaps.empty() || (!is_paradox && failure.kind != Failure::Kind::not_converged)) throw;
-        if (is_paradox) paradox = failure;
-        rate = HUGE_VAL;
-    }
+    });
+    if (failure && p.gaps.empty()) throw *failure;
+    if (failure) rate = HUGE_VAL;  // sticking fails: unilateral contacts change together with the elements
     const double noise = relative_acceleration_rounding * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
     set_modes(p, w, modes);
     w.state.slip_direction = directions;
     w.state.last_direction = last_directions;
     // Contacts hold as long as any forces within their cones do, not only those of minimum norm.
     const bool hold = rate > noise && !p.gaps.empty() && closed_contacts_hold(p, w, t, system_.q, system_.v);
-    if (paradox && !hold) throw *paradox;
+    if (failure && failure->kind == Failure::Kind::paradox && !hold) throw *failure;
     begin_step(p, w, t, system_.q, system_.v);
     if (rate <= noise || hold) return std::nullopt;  // an element held by others does not move, whatever its force
     return rate;
@@ -65,7 +61,7 @@ bool ReleaseLocator::all_press() {
 std::optional<FoundEvent> ReleaseLocator::lift_together() {
     if (p.gaps.empty() || !w.now.rows.redundant || all_press()) return std::nullopt;
     double low = 0.0, high = stepper_.h;
-    while (high - low > parameters.width * std::max(std::abs(stepper_.t0), stepper_.h)) {
+    while (high - low > parameters.time_tolerance * std::max(std::abs(stepper_.t0), stepper_.h)) {
         const double mid = 0.5 * (low + high);
         stepper_.end_at(mid);
         (all_press() ? low : high) = mid;
@@ -82,7 +78,7 @@ std::optional<FoundEvent> ReleaseLocator::lift_together() {
 // at the step's end. The search approaches the instant from later times. It uses secants of the acceleration, which
 // falls to zero toward the instant if limits do not jump, and bisection otherwise.
 double ReleaseLocator::release_part(double rate, const std::vector<Mode>& modes, ModeQuery& mode_query) {
-    const double full = stepper_.h, width = parameters.width * std::max(std::abs(stepper_.t0) / full, 1.0);
+    const double full = stepper_.h, width = parameters.time_tolerance * std::max(std::abs(stepper_.t0) / full, 1.0);
     double low = 0.0, high = 1.0, beyond = 0.0, rate_beyond = 0.0;
     bool falls = false;  // the rate falls toward the instant
     VecX y(system_.ny);

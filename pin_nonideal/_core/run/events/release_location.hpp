@@ -12,9 +12,9 @@
 namespace pn {
 
 struct ReleaseLocationParameters {
-    double width = 1e-12;         // tolerance of the instant, relative to the step or the time
-    double max_rate_ratio = 0.7;  // maximum ratio of two rates for which their secant is used
-    double short_of_root = 1e-2;  // distance kept from the root of the secant, relative to the distance to it
+    double time_tolerance = 1e-12;  // tolerance of the instant, relative to the step or the time
+    double max_rate_ratio = 0.7;    // maximum ratio of two rates for which their secant is used
+    double short_of_root = 1e-2;    // distance kept from the root of the secant, relative to the distance to it
     // Extension of a repeated step that does not show the release of its interpolant. The first extension is relative
     // to the step, and each further one is longer by a factor.
     double min_extension = 1e-11, further_part = 10.0;

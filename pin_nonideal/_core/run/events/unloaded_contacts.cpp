@@ -42,13 +42,11 @@ bool moves_without(System& system, double t, const std::vector<int>& contacts) {
     std::vector<char> closed = before.closed;
     for (int i : contacts) closed[i] = 0;
     bool same = false;
-    try {
+    attempt([&] {  // a failure means that there is no motion without these contacts
         set_closed(p, w, closed);
         begin_step(p, w, t, system.q, system.v);
         same = needs_no_force(system, t, contacts, held);
-    } catch (const Failure& failure) {  // no motion without these contacts
-        if (failure.kind == Failure::Kind::interrupted) throw;
-    }
+    });
     set_contacts(p, w, before.closed, before.mode);
     w.state = before;
     begin_step(p, w, t, system.q, system.v);

@@ -81,7 +81,7 @@ double ValueEvents::first_crossing(int k) {
 }
 
 void ValueEvents::end_step_at(double size) {
-    stepper_.take_again(size);
+    stepper_.repeat(size);
     system_.project_and_evaluate(stepper_.t0 + size, stepper_.y1, stepper_.end_rate());
 }
 
@@ -122,7 +122,7 @@ void ValueEvents::count(int k) {
 }
 
 // Count events that coincide with the event at the step's end, and store the signs of all other values.
-void ValueEvents::take_signs() {
+void ValueEvents::store_signs() {
     for (int k = 0; k < size(); ++k) {
         const double here = sign(value(k, stepper_.t0 + stepper_.h, stepper_.y1));
         if (here == 0 || here == side_[k] || std::count(found_.begin(), found_.end(), k) > 0) continue;
@@ -155,7 +155,7 @@ bool ValueEvents::locate(bool ends_at_event) {
         system_.read_law_states(stepper_.y1);
         evaluate(system_.p, system_.w, stepper_.t0 + stepper_.h, system_.q, system_.v);
     }
-    take_signs();
+    store_signs();
     return first >= 0 && !at_end;
 }
 

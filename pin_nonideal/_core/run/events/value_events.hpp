@@ -57,7 +57,7 @@ private:
     double first_crossing(int k);
     void end_step_at(double size);
     void step_onto(int k, double part);
-    void take_signs();
+    void store_signs();
     void count(int k);
 
     const std::vector<UserEvent>& events_;

@@ -81,7 +81,7 @@ void Collocation::extrapolate_straight() {
     }
 }
 
-void Collocation::take_directions(int stage) const {
+void Collocation::set_directions(int stage) const {
     for (const Element& e : elements_)
         for (int k = 0; k < e.dim; ++k) system_.w.state.last_direction[e.index][k] = n_[stage][e.row + k];
 }
@@ -90,7 +90,7 @@ void Collocation::evaluate_stages(bool first) {
     const Program& p = system_.p;
     Workspace& w = system_.w;
     for (int i = 0; i < stages; ++i) {
-        take_directions(i);
+        set_directions(i);
         system_.derivative(step_.t0 + points[i] * step_.h, Y_[i], F_[i]);
         A_[i].setZero();
         for (size_t at = 0; at < elements_.size(); ++at) {
@@ -260,7 +260,7 @@ void Collocation::advance() {
     measure_stiffness();
     step_.y1 = Y_[stages - 1];
     system_.normalize(step_.y1);
-    take_directions(stages - 1);
+    set_directions(stages - 1);
 }
 
 double Collocation::error() {
@@ -292,7 +292,7 @@ void Collocation::interpolate(double part, VecX& y) const {
     with_weights(part, [&](int k, double weight) {
         state += weight * (k == 0 ? step_.y0 : k == stages ? step_.y1 : Y_[k - 1]).head(step_.states);
     });
-    take_directions_at(part);
+    set_directions_at(part);
 }
 
 double Collocation::interpolated(double part, int index) const {
@@ -315,7 +315,7 @@ double Collocation::interpolated_rate(double part, int index) const {
     return rate / sum;
 }
 
-void Collocation::take_directions_at(double part) const {
+void Collocation::set_directions_at(double part) const {
     for (const Element& e : elements_) {
         Vec3 n = Vec3::Zero();
         with_weights(part, [&](int k, double weight) {

@@ -55,7 +55,7 @@ public:
     void interpolate(double part, VecX& y) const;
     double interpolated(double part, int index) const;
     double interpolated_rate(double part, int index) const;
-    void take_directions_at(double part) const;
+    void set_directions_at(double part) const;
 
 private:
     struct Element {
@@ -65,7 +65,7 @@ private:
     void gather();
     void stretch();
     void extrapolate_straight();
-    void take_directions(int stage) const;
+    void set_directions(int stage) const;
     void evaluate_stages(bool first);
     void find_response();
     void correct();

@@ -31,15 +31,15 @@ bool StepControl::accepts(std::optional<double> error, double size, bool last, d
     }
     if (!(*error <= 1.0)) {
         last_rejected_ = true;
-        h = size * std::max(parameters.shrink_limit,
+        h = size * std::max(parameters.min_step_ratio,
                             std::isfinite(*error) ? parameters.retry_safety * std::pow(*error, power) : 0.0);
         return false;
     }
     if (method_.adaptive()) {
-        double factor = parameters.growth_limit;
+        double factor = parameters.max_step_ratio;
         if (*error > 0.0) factor = std::min(factor, parameters.safety * std::pow(*error, power));
         if (last_rejected_) factor = std::min(1.0, factor);
-        if (!(last && factor * size < h)) h = size * std::max(factor, parameters.shrink_limit);
+        if (!(last && factor * size < h)) h = size * std::max(factor, parameters.min_step_ratio);
     }
     last_rejected_ = false;
     detours_ = 0;

@@ -16,7 +16,7 @@ struct StepControlParameters {
     // With 0.9 a third of the steps fails, and smooth motions need a sixth more evaluations for the same error. The
     // error of a retried step is given, so it aims closer.
     double safety = 0.65, retry_safety = 0.9;
-    double shrink_limit = 0.2, growth_limit = 10.0;  // least and largest ratio of two successive steps
+    double min_step_ratio = 0.2, max_step_ratio = 10.0;  // least and largest ratio of two successive steps
     // A step is shortened by `detour` if an evaluation is nearer to a singular position than `clearance` times the
     // length of the step's path. Its evaluations are then at other positions.
     double clearance = 0.04, detour = 0.85;

@@ -58,13 +58,13 @@ void Stepper::stand() {
     if (!rows.blocks.empty()) system_.smallest_pivot = std::min(system_.smallest_pivot, rows.distance);
 }
 
-void Stepper::take_again(double size) {
+void Stepper::repeat(double size) {
     take(t0, size);
     if (collocates_ && !collocation_.is_solved()) throw Failure(Failure::Kind::not_converged, t0);
 }
 
 void Stepper::end_at(double size) {
-    take_again(size);
+    repeat(size);
     system_.project_and_evaluate(t0 + size, y1, end_rate());
 }
 

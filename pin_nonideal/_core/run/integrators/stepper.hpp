@@ -22,7 +22,7 @@ public:
     // interpolant is discarded.
     void move_end(double dt);
     // Repeat the step with another length. Throw a Failure if it is not solved.
-    void take_again(double size);
+    void repeat(double size);
     // Do the same, then project and evaluate its end.
     void end_at(double size);
     // Follow a step from t that an outside integrator has taken, and evaluate the rates inside.
@@ -50,7 +50,7 @@ public:
     double stiffness() const;
     // Restore the directions of the step's end after samples inside the step. `reset_warm_start` discards the warm start
     // for the next step.
-    void end_directions() const { if (collocates_) collocation_.take_directions_at(1.0); }
+    void end_directions() const { if (collocates_) collocation_.set_directions_at(1.0); }
     void reset_warm_start() { collocation_.reset_warm_start(); }
 
     // Rates of the step just taken, in order of time: at its start, at stages before its end, and at its end.

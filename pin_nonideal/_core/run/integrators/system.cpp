@@ -118,41 +118,37 @@ void System::project_and_evaluate(double t, VecX& y, VecX& dy) {
         kinetic_energy(p.mechanism, w.now.terms, v) + potential_energy(p.mechanism, w.now.terms) - before;
 }
 
-// Call `act` at the end of a time step whose modes may allow no motion. If they allow none and the run `goes_through`,
-// the friction of the step determines the motion. In other runs it does so only if the solver found no motion of
-// contacts, which proves nothing. Return false if the friction of the step determines the motion.
+// Call `act` at the end of a time step whose modes may allow no motion. If they allow none, the friction of the step
+// determines the motion: always with `may_lack_motion`, else only if the solver found no motion of contacts, which proves
+// nothing. Return false if the friction of the step determines the motion.
 template <class Act>
-bool System::go_through(double t, bool goes_through, const Act& act) {
-    try {
-        act();
-        return true;
-    } catch (const Failure& failure) {
-        const bool is_of_modes = failure.kind == Failure::Kind::paradox || failure.kind == Failure::Kind::not_converged;
-        const bool undecided = failure.solutions == Failure::Solutions::unproven && ng > 0;
-        if (!is_of_modes || !(goes_through || undecided)) throw;
-        if (goes_through) {
-            w.now.no_motion = true;
-            w.now.several_element = failure.elements.empty() ? 0 : failure.elements.front();
-        }
-        solve_with_step_friction(p, w, t, q, v);
-        return false;
+bool System::attempt_motion(double t, bool may_lack_motion, const Act& act) {
+    const auto failure = attempt({Failure::Kind::paradox, Failure::Kind::not_converged}, act);
+    if (!failure) return true;
+    const bool undecided = failure->solutions == Failure::Solutions::unproven && ng > 0;
+    if (!(may_lack_motion || undecided)) throw *failure;
+    if (may_lack_motion) {
+        w.now.no_motion = true;
+        w.now.several_element = failure->elements.empty() ? 0 : failure->elements.front();
     }
+    solve_with_step_friction(p, w, t, q, v);
+    return false;
 }
 
-void System::evaluate_step_end(double t, const VecX& y, VecX& dy, bool goes_through) {
+void System::evaluate_step_end(double t, const VecX& y, VecX& dy, bool may_lack_motion) {
     read(y);
     read_law_states(y);
     w.now.no_motion = false;
     begin_rows(p, w, t, q, v);
     // Closed contacts that others hold apart may contradict each other.
-    const bool found = go_through(t, goes_through, [&] {
+    const bool found = attempt_motion(t, may_lack_motion, [&] {
         assemble_forces(p, w, t, v);
         solve_dynamics(p, w, t, v);
     });
-    write_rate(t, dy, found && !goes_through);
+    write_rate(t, dy, found && !may_lack_motion);
 }
 
-void System::settle(double t, VecX& y, VecX& dy, bool evaluates, bool goes_through) {
+void System::settle(double t, VecX& y, VecX& dy, bool evaluates, bool may_lack_motion) {
     read(y);
     read_law_states(y);
     numerical_energy = 0.0;
@@ -182,10 +178,10 @@ void System::settle(double t, VecX& y, VecX& dy, bool evaluates, bool goes_throu
     if (past_sticking || (moved && evaluates)) chosen = configure_step(p, w);
     moved |= past_sticking;
     const bool found =
-        go_through(t, goes_through, [&] { moved |= begin_step_on_rates(p, w, t, v, chosen, evaluates); });
+        attempt_motion(t, may_lack_motion, [&] { moved |= begin_step_on_rates(p, w, t, v, chosen, evaluates); });
     moved |= !found;
     write(y);
-    if (evaluates) write_rate(t, dy, found && !goes_through);
+    if (evaluates) write_rate(t, dy, found && !may_lack_motion);
     if (moved && energy) numerical_energy = total() - before;
 }
 

@@ -63,11 +63,11 @@ struct System {
     // Project a step's end onto the constraints, and evaluate the projected state for the next step.
     void project_and_evaluate(double t, VecX& y, VecX& dy);
     // Project the end of a step of time stepping, whose modes have just been set. Evaluate only if `evaluates`.
-    // `goes_through`: the run locates no events, and if these modes have no motion, slipping elements keep the friction of
-    // the step.
-    void settle(double t, VecX& y, VecX& dy, bool evaluates, bool goes_through);
+    // `may_lack_motion`: the run locates no events, and if these modes have no motion, slipping elements keep the
+    // friction of the step.
+    void settle(double t, VecX& y, VecX& dy, bool evaluates, bool may_lack_motion);
     // Evaluate the projected end of such a step.
-    void evaluate_step_end(double t, const VecX& y, VecX& dy, bool goes_through);
+    void evaluate_step_end(double t, const VecX& y, VecX& dy, bool may_lack_motion);
     // Check if y needs no projection. The quantities of a sample at y are then evaluated.
     bool is_on_constraints(double t, const VecX& y);
     void normalize(VecX& y) const;
@@ -80,7 +80,7 @@ private:
     void watch_loads(VecX& dy);
     double energy_at(const VecX& y);
     template <class Act>
-    bool go_through(double t, bool goes_through, const Act& act);
+    bool attempt_motion(double t, bool may_lack_motion, const Act& act);
 
     VecX q_before_;
 };

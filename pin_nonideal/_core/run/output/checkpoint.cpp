@@ -143,11 +143,8 @@ void from_bytes(const std::string& bytes, System& system, Progress& progress, Re
         a.require(static_cast<size_t>(e.kind) < std::size(event_kinds) && e.element >= 0 && e.element < known);
     }
     a.require(progress.samples >= 0 && progress.next_period >= 0);
-    try {
-        evaluate_anew(system, progress);
-    } catch (const Failure&) {
-        a.require(false);  // no run has been in such a state
-    }
+    const auto failure = attempt([&] { evaluate_anew(system, progress); });
+    a.require(!failure);  // no run has been in a state that cannot be evaluated
 }
 
 std::string state_layout() {

@@ -50,7 +50,7 @@ static void hold(const Program& p, Workspace& w, const InsideStates& inside, siz
 }
 
 // Set the slip directions of a state: from the step's polynomial if the step solved for them, else from the slip.
-static void take_directions(const Program& p, Workspace& w, const System& system, const InsideStates& inside, size_t k) {
+static void set_directions(const Program& p, Workspace& w, const System& system, const InsideStates& inside, size_t k) {
     RunState& state = w.state;
     state.solves_directions = false;
     reset_slip_directions(w);
@@ -79,7 +79,7 @@ void sample_inside(const Program& p, Workspace& w, const InsideStates& inside, c
         enter_stretch(p, w, inside.t[k], inside.end);
         hold(p, w, inside, k);
         system.read(y);
-        take_directions(p, w, system, inside, k);
+        set_directions(p, w, system, inside, k);
         system.read_law_states(y);
         configure(p, w, inside.t[k], system.q, system.v);
         choose_rows_near(p, w, inside.t[k], system.q, system.v);

@@ -70,7 +70,7 @@ bool TimeStepping::needs_forces(double end, double t_end) const {
 }
 
 // Take as much of a step to `end` as approaching edges allow, in a scene with unilateral contacts.
-void TimeStepping::take_part(double end, double t_end, double least) {
+void TimeStepping::step_part(double end, double t_end, double least) {
     double& t = progress_.t;
     const double left = end - t, h = std::max(moreau_contacts_.allowed(t, left, progress_.y), least);
     const bool whole = h >= (1.0 - parameters.min_remainder) * left;
@@ -92,7 +92,7 @@ void TimeStepping::take_part(double end, double t_end, double least) {
 }
 
 // A step that starts and ends at rest with the same contacts and modes leaves the state unchanged.
-void TimeStepping::take_with_contacts(double end, double t_end) {
+void TimeStepping::step_with_contacts(double end, double t_end) {
     const double least = parameters.min_cut * (end - progress_.t);
     const bool may_stand = is_autonomous_ && (system_.velocity(progress_.y).array() == 0.0).all();
     if (may_stand) {
@@ -100,14 +100,14 @@ void TimeStepping::take_with_contacts(double end, double t_end) {
         before_step_ = w.state.mode;
         closed_before_step_ = w.state.closed;
     }
-    while (progress_.t < end) take_part(end, t_end, least);
+    while (progress_.t < end) step_part(end, t_end, least);
     progress_.is_stationary = may_stand && !misses_laws_ && progress_.y == y_from_ &&
                               same_bytes<Mode>(before_step_, w.state.mode) &&
                               same_bytes(closed_before_step_, w.state.closed);
 }
 
 void TimeStepping::take(double end, double t_end) {
-    if (system_.ng > 0) return take_with_contacts(end, t_end);
+    if (system_.ng > 0) return step_with_contacts(end, t_end);
     double& t = progress_.t;
     VecX &y = progress_.y, &y_from = y_from_;
     const bool was_at_rest = rests();

@@ -33,8 +33,8 @@ public:
 private:
     bool rests() const;
     void take(double end, double t_end);
-    void take_with_contacts(double end, double t_end);
-    void take_part(double end, double t_end, double least);
+    void step_with_contacts(double end, double t_end);
+    void step_part(double end, double t_end, double least);
     bool needs_forces(double end, double t_end) const;
     double end_of_step(double size, double stop, double t_end) const;
 

@@ -122,15 +122,10 @@ void MoreauContacts::sweep(double t, JointDrives::Step& drives, bool first) {
 // Solve the step again with the forces at the mean velocity. If no motion is found, return false with that of the first
 // sweep.
 bool MoreauContacts::correct(double t, JointDrives::Step& drives) {
-    try {
-        sweep(t, drives, false);
-        return true;
-    } catch (const Failure& failure) {
-        if (failure.kind != Failure::Kind::not_converged) throw;
-        mean_.begin(h_, v0_);
-        sweep(t, drives, false);
-        return false;
-    }
+    if (!attempt({Failure::Kind::not_converged}, [&] { sweep(t, drives, false); })) return true;
+    mean_.begin(h_, v0_);
+    sweep(t, drives, false);
+    return false;
 }
 
 // Set contacts and modes, with their rows. During most of a flight nothing changes. `flies`: no contact is closed and
@@ -275,7 +270,7 @@ void MoreauContacts::end_velocity() {
     }
     if (n == 0) return;
     const EndModes rule(v1_);
-    const double clear = StepForces::parameters.cone_force_rounding * f.head(n).cwiseAbs().maxCoeff();
+    const double clear = StepForces::parameters.limit_rounding * f.head(n).cwiseAbs().maxCoeff();
     end.head(n) *= h_;
     for (size_t e = 0, at = 0; e < parts.size(); at += cones[e].dim, ++e) {
         const StepElements::Part& part = parts[e];

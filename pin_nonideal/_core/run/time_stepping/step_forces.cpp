@@ -113,7 +113,7 @@ bool StepForces::moves() {
     measure_end();
     if (separate_) return !trees_.rests(a_);
     return end_rows.head(n).cwiseAbs().maxCoeff() >
-           parameters.cone_force_rounding * free_rows_.head(n).cwiseAbs().maxCoeff();
+           parameters.rest_rounding * free_rows_.head(n).cwiseAbs().maxCoeff();
 }
 
 // Check if forces within all cones hold the bodies at rest, and set f to such forces. The rows without forces are in
@@ -122,7 +122,7 @@ bool StepForces::keep_rest(bool solved, const VecX& q0) {
     const int n = static_cast<int>(elements_.rows.size());
     const auto W = responses_.matrix(n);
     const bool moves = (end_rows.head(n) + W * f.head(n)).cwiseAbs().maxCoeff() >
-                       parameters.cone_force_rounding * end_rows.head(n).cwiseAbs().maxCoeff();
+                       parameters.rest_rounding * end_rows.head(n).cwiseAbs().maxCoeff();
     if (solved && !moves) return false;
     const bool holds = solver_.hold(W, end_rows.head(n), elements_.cones, f.head(n));
     if (!holds) q_without_rest_ = q0;  // the next sweeps and the step after the start skip this check

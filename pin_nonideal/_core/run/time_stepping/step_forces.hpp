@@ -15,8 +15,10 @@ struct StepForcesParameters {
     // Accepted error of the laws, relative to an element's forces, in a step without an exact solution. An event
     // reports it.
     double max_relaxed_error = 1e-2;
-    // Distance of a force at its limit, relative to the limit.
-    double cone_force_rounding = 1e-9;
+    // Distance of a force at its limit, relative to the largest force.
+    double limit_rounding = 1e-9;
+    // Rows at the step's end that count as rest, relative to the rows without the forces.
+    double rest_rounding = 1e-9;
     // Accepted residual relative to the velocities. A step of a turning body can have no exact solution if corners
     // share its load. Also the accepted error of a limit, relative to the forces. The statistics report both.
     double max_residual = 1e-7;
