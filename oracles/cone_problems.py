@@ -27,14 +27,14 @@ class ConeProblem:
     dim: int
 
 
-def random_problem(rng, *, planar=False, most_contacts=8, driven=False):
+def random_problem(rng, *, planar=False, max_contacts=8, driven=False):
     """Return a problem of one to four bodies that touch each other and the ground at random points.
 
     Masses are 1 to 1e6.  W = H M^-1 H^T is rank-deficient if it has more rows than degrees of freedom.  A
     solution exists for w0 = H v, unless the surfaces are `driven` against each other.
     """
     dim, dof = (2, 3) if planar else (3, 6)
-    bodies, contacts = int(rng.integers(1, 5)), int(rng.integers(1, most_contacts + 1))
+    bodies, contacts = int(rng.integers(1, 5)), int(rng.integers(1, max_contacts + 1))
     mass = 10.0 ** (rng.uniform(0.0, 6.0, bodies) * rng.integers(0, 2))
     inertia = (
         mass[:, None] * rng.uniform(0.05, 0.5, (bodies, 1)) ** 2 * rng.uniform(0.3, 1.0, (bodies, dof - dim))

@@ -249,7 +249,7 @@ class Conditions:
 
 
 def shares(A, b, dims, most, slipping):
-    """Return x = (f, lam) with A x = b, |f_e| <= most_e and free multipliers lam, or None.
+    """Return x = (f, lam) with A x = b, |f_e| <= most[e] and free multipliers lam, or None.
 
     Args:
         A: matrix of full row rank.

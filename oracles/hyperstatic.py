@@ -14,7 +14,7 @@ from .solutions import kkt_acceleration
 HELD = 1e-9  # rank tolerance of A, relative to the largest singular value
 
 
-def least_norm(A, force):
+def minimum_norm(A, force):
     """Return lam of minimum norm with A^T lam = force, for all rows including duplicates."""
     return np.linalg.lstsq(A.T, force, rcond=HELD)[0]
 
@@ -41,7 +41,7 @@ def constraint_force(scene, q, v, t):
 
 def largest_least_load(A, force, pressing):
     """Return the largest s such that all `pressing` rows can carry at least s, by a linear program."""
-    lam = least_norm(A, force)
+    lam = minimum_norm(A, force)
     _, s, Vt = np.linalg.svd(A.T)
     Z = Vt[np.count_nonzero(s > HELD * s[0]) :].T
     size = np.abs(lam).max()

@@ -66,7 +66,7 @@ def lower_actuation(
     _write(_sum([part for part, _ in lowered], drives, model), out)
     limits = effort_limits(u, model, [acts for _, acts in lowered])
     if limits is not None:
-        out.limit_effort(least=limits[0], most=limits[1])
+        out.limit_effort(min_effort=limits[0], max_effort=limits[1])
     parts = [part for part, _ in lowered]
     return [part.prepare for part in parts if isinstance(part, TorqueFunction) and part.prepare is not None]
 

@@ -154,7 +154,7 @@ def _(c: PrescribedMotion, name: str, out: core.Builder, resolver: Resolver) -> 
 def _(c: KnifeEdge, name: str, out: core.Builder, resolver: Resolver) -> None:
     who = words(c, name)
     frame = resolver.frame(c.frame, who)
-    out.add_knife(name, frame, axis=unit_axis(who, c.axis))
+    out.add_knife_edge(name, frame, axis=unit_axis(who, c.axis))
 
 
 @lower_constraint.register

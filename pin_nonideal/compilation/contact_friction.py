@@ -74,20 +74,20 @@ def _round_slip(c: Any, name: str, out: core.Builder, resolver: Resolver) -> lis
         f1, f2, solid, half1 = resolver.cylinder(c, who)
         if half1 == 0.0:
             return [(name, out.add_revolved_slip(name, f1, f2, solid=solid, radius1=c.radius1), c.mu)]
-        block = out.add_line_slip(name, f1, f2, solid=solid, half1=half1, radius1=c.radius1)
+        block = out.add_capsule_cylinder_slip(name, f1, f2, solid=solid, half1=half1, radius1=c.radius1)
         return [(name, block, c.mu)]
     if isinstance(c, RimContact):
         f1, f2, hull = resolver.rim(c, who)
-        return [(name, out.add_rim_slip(name, f1, f2, solid=hull, rim=c.rim), c.mu)]
+        return [(name, out.add_disk_hull_slip(name, f1, f2, solid=hull, rim=c.rim), c.mu)]
     if isinstance(c, RevolvedContact):
         f1, f2, one, other = resolver.rims(c, who)
         radii = {"radius1": c.radius1, "radius2": c.radius2}
-        return [(name, out.add_rims_slip(name, f1, f2, first=one, second=other, **radii), c.mu)]
+        return [(name, out.add_cylinder_cylinder_slip(name, f1, f2, first=one, second=other, **radii), c.mu)]
     if isinstance(c, BoxContact):
         f1, f2, half = resolver.box(c, who)
-        return [(name, out.add_box_slip(name, f1, f2, half=half, radius1=c.radius1), c.mu)]
+        return [(name, out.add_point_box_slip(name, f1, f2, half=half, radius1=c.radius1), c.mu)]
     f1, f2, half1, half2 = resolver.capsules(c, who)
-    block = out.add_capsules_slip(name, f1, f2, half1=half1, half2=half2, radius1=c.radius1)
+    block = out.add_capsule_capsule_slip(name, f1, f2, half1=half1, half2=half2, radius1=c.radius1)
     return [(name, block, c.mu)]
 
 
@@ -117,15 +117,15 @@ def _flat_slip(c: Any, name: str, out: core.Builder, resolver: Resolver) -> list
     f1, f2, (t1, t2, n) = resolver.contact(c, words(c, name))
     if isinstance(c, EllipsoidContact):
         body, along = rotated_frame(f1, c.rpy), {"tangent1": t1, "tangent2": t2, "normal": n}
-        return [(name, out.add_ellipsoid_slip(name, body, f2, semiaxes=c.semiaxes, **along), c.mu)]
+        return [(name, out.add_plane_ellipsoid_slip(name, body, f2, semiaxes=c.semiaxes, **along), c.mu)]
     level, sliding = _rotated_frame(f2, np.column_stack([t1, t2, n])), getattr(c, "mu", 0.0)
     elements = []
     if sliding:
-        block = out.add_contact_slip(name, f1, f2, radius=c.radius, tangent1=t1, tangent2=t2, normal=n)
+        block = out.add_plane_point_slip(name, f1, f2, radius=c.radius, tangent1=t1, tangent2=t2, normal=n)
         elements.append((name, block, sliding))
     for part, coefficient, axes in (("torsional", c.torsional, [2]), ("rolling", c.rolling, [0, 1])):
         if coefficient:
-            block = out.add_turn_slip(f"{name} {part}", f1, level, axes=axes)
+            block = out.add_spin_slip(f"{name} {part}", f1, level, axes=axes)
             elements.append((f"{name} {part}", block, coefficient))
     return elements
 

@@ -95,17 +95,17 @@ def lower_gaps(c: Contact, name: str, out: core.Builder, resolver: Resolver) -> 
     if isinstance(c, EllipsoidContact):
         f1, f2, (_, _, normal) = resolver.contact(c, who)
         axes = rotated_frame(f1, c.rpy)
-        block = out.add_ellipsoid(name, axes, f2, normal=normal, semiaxes=c.semiaxes)
+        block = out.add_plane_ellipsoid(name, axes, f2, normal=normal, semiaxes=c.semiaxes)
     elif isinstance(c, CylinderContact):
         f1, f2, solid, half1 = resolver.cylinder(c, who)
         if half1 == 0.0:
             block = out.add_revolved(name, f1, f2, solid=solid, radius=c.radius1 + c.radius2)
         else:
             radius = c.radius1 + c.radius2
-            block = out.add_line(name, f1, f2, solid=solid, half1=half1, radius=radius)
+            block = out.add_capsule_cylinder(name, f1, f2, solid=solid, half1=half1, radius=radius)
     elif isinstance(c, RimContact):
         f1, f2, hull = resolver.rim(c, who)
-        block = out.add_rim(name, f1, f2, solid=hull, rim=c.rim, radius=c.radius2)
+        block = out.add_disk_hull(name, f1, f2, solid=hull, rim=c.rim, radius=c.radius2)
     else:
         block = _round_gap(c, name, who, out, resolver)
     out.set_unilateral(restitution=c.restitution)
@@ -120,17 +120,17 @@ def _round_gap(c: RoundContact, name: str, who: str, out: core.Builder, resolver
         return out.add_hull(name, f1, f2, solid=hull, radius=radius)
     if isinstance(c, BoxContact):
         f1, f2, half = resolver.box(c, who)
-        return out.add_box(name, f1, f2, half=half, radius=radius)
+        return out.add_point_box(name, f1, f2, half=half, radius=radius)
     if isinstance(c, RevolvedContact):
         f1, f2, one, other = resolver.rims(c, who)
-        return out.add_rims(name, f1, f2, first=one, second=other, radius=radius)
+        return out.add_cylinder_cylinder(name, f1, f2, first=one, second=other, radius=radius)
     f1, f2, half1, half2 = resolver.capsules(c, who)
-    return out.add_capsules(name, f1, f2, half1=half1, half2=half2, radius=radius)
+    return out.add_capsule_capsule(name, f1, f2, half1=half1, half2=half2, radius=radius)
 
 
 def _on_plane(c: PointContact, name: str, out: core.Builder, resolver: Resolver) -> int:
     f1, f2, (_, _, normal) = resolver.contact(c, words(c, name))
-    block = out.add_contact(name, f1, f2, normal=normal, radius=c.radius)
+    block = out.add_plane_point(name, f1, f2, normal=normal, radius=c.radius)
     if c.unilateral:
         out.set_unilateral(restitution=c.restitution)
     return block

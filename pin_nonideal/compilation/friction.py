@@ -187,7 +187,7 @@ def _in_constraint(
             'acts in a HingeAnchor, in a PointAnchor with axes="xyz" and on a JointCoupling'
         )
     _check_radius(law, who, core.Load.spherical)
-    block = out.add_turn_slip(name, *frames_of(c, resolver, who), axes=[0, 1, 2])
+    block = out.add_spin_slip(name, *frames_of(c, resolver, who), axes=[0, 1, 2])
     return [FrictionSite(core.Load.spherical, block=block, anchor=anchor)]
 
 

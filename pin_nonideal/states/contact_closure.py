@@ -107,7 +107,7 @@ class UnilateralClosure(Search):
             weight = max(weight, 2.0 * step.pull)
             before, slope = self._merit(iterate, weight), self._slope_of_merit(iterate, step.x, weight)
             for k in range(HALVINGS):
-                trial = self._place(self._go(iterate, step.x, 0.5**k))
+                trial = self._place(self._displace(iterate, step.x, 0.5**k))
                 if self._merit(trial, weight) <= before + MIN_DECREASE * 0.5**k * slope:
                     break
             else:
@@ -122,7 +122,7 @@ class UnilateralClosure(Search):
             step = self._least(iterate, np.zeros_like(iterate.move)) if lacking > 0.0 else None
             if step is None:
                 break
-            trial = self._place(self._go(iterate, step.x))
+            trial = self._place(self._displace(iterate, step.x))
             if not self._lacking(trial) < lacking:
                 break
             iterate = trial

@@ -226,7 +226,7 @@ class Search:
     def _distance(iterate: Iterate) -> float:
         return float(np.linalg.norm(iterate.move))
 
-    def _go(self, iterate: Iterate, x: Array, part: float = 1.0) -> Array:
+    def _displace(self, iterate: Iterate, x: Array, part: float = 1.0) -> Array:
         """Return the configuration after a displacement x, which is cut to one unit per coordinate."""
         dq = np.linalg.solve(iterate.half, x)
         longest = float((np.abs(dq) / self.unit).max(initial=0.0))
@@ -260,7 +260,7 @@ class Search:
             G = iterate.B @ iterate.B.T
             scale = max(float(np.trace(G)) / len(G), MIN_NUMBER)
             x = -iterate.B.T @ np.linalg.solve(G + damping * scale * np.eye(len(G)), iterate.phi)
-            trial = self._place(self._go(iterate, x))
+            trial = self._place(self._displace(iterate, x))
             if np.linalg.norm(trial.phi) < np.linalg.norm(iterate.phi):
                 iterate, damping = trial, max(0.2 * damping, MIN_DAMPING)
                 if np.linalg.norm(x) < ROUNDING * ROUNDING * self.size:
@@ -279,7 +279,7 @@ class Search:
             if gap <= ROUNDING:
                 break
             U, s, Vt = row_singular_values(iterate.B)
-            trial = self._place(self._go(iterate, -Vt.T @ ((U.T @ iterate.phi) / s)))
+            trial = self._place(self._displace(iterate, -Vt.T @ ((U.T @ iterate.phi) / s)))
             if not trial.gap < gap:
                 break
             iterate = trial
@@ -328,7 +328,8 @@ class Search:
         slope = iterate.move - Vt.T @ (Vt @ iterate.move)
         x = NEAR_CORNER * self._unit_length(iterate, slope) * slope
         there = [
-            self._place(self._go(iterate, side * x)).phi - side * (iterate.B @ x) for side in (1.0, -1.0)
+            self._place(self._displace(iterate, side * x)).phi - side * (iterate.B @ x)
+            for side in (1.0, -1.0)
         ]
         return bool(max(np.abs(phi - iterate.phi).max(initial=0.0) for phi in there) > CORNER * NEAR_CORNER)
 
@@ -340,7 +341,7 @@ class Search:
         """Backtrack along x until the distance falls, or, if it changes by rounding only, the slope falls."""
         distance = self._distance(iterate)
         for k in range(HALVINGS):
-            trial = self._retract(self._go(iterate, x, 0.5**k))
+            trial = self._retract(self._displace(iterate, x, 0.5**k))
             if trial is None:
                 continue
             now = self._distance(trial)
@@ -364,7 +365,7 @@ class Search:
         for k in range(n):
             x = open_directions[:, k]
             h = DIFFERENCE_STEP * self._unit_length(iterate, x)
-            there = self._gradient(self._place(self._go(iterate, h * x)), lam)
+            there = self._gradient(self._place(self._displace(iterate, h * x)), lam)
             H[:, k] = open_directions.T @ np.linalg.solve(iterate.half.T, (there - here) / h)
         values, vectors = np.linalg.eigh(0.5 * (H + H.T))
         return values, open_directions @ vectors

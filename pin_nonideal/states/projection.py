@@ -268,7 +268,7 @@ class Projection:
         self.measure_at(q[0])
         names, values = numbers
         found_q, found_v, after, rate = core.nearest_states(
-            self.program, q, v, t=t, far=self._reached(), threads=threads, names=names, values=values
+            self.program, q, v, t=t, max_residual=self._reached(), threads=threads, names=names, values=values
         )
         on, v_on = found_q.reshape(q.shape), found_v.reshape(v.shape)
         met = rate <= RATE_TOLERANCE * min(1.0, self.length) * (1.0 + np.abs(v_on).max(axis=1, initial=0.0))

@@ -177,7 +177,9 @@ class _Search:
 
     def reason(self) -> str:
         """Return the reason of a failed search: a drive that exceeds all resistance, or unbalanced forces."""
-        rubs = "; dry friction is ignored here, and `rest` includes it" * bool(self.rest.scene.element_names)
+        friction_note = "; dry friction is ignored here, and `rest` includes it" * bool(
+            self.rest.scene.element_names
+        )
         now = self.rest.balance(self.nearest)
         way = now.free @ now.left
         way /= np.linalg.norm(way) or 1.0
@@ -187,7 +189,7 @@ class _Search:
         if along <= max(held, 0.0):
             return (
                 f"along motions that the constraints allow, forces of {self.least:.2g} (N or N m) remain; "
-                f"start nearer, or hold the bodies that fall freely{rubs}"
+                f"start nearer, or hold the bodies that fall freely{friction_note}"
             )
         dof = int(power.argmax())
         ends = [i + n for i, n in zip(self.model.idx_vs, self.model.nvs, strict=True)]
@@ -196,7 +198,7 @@ class _Search:
         return (
             f'the drive of joint "{joint}", {drive[dof]:.4g} (N or N m), exceeds all resistance: at the '
             f"smallest unbalanced force the drives push with {along:.2g} along a motion that the constraints "
-            f"allow, and {others}; drive less, or hold more{rubs}"
+            f"allow, and {others}; drive less, or hold more{friction_note}"
         )
 
     def in_play(self, now: Balance, inertia: Array) -> Array:

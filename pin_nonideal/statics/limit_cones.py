@@ -190,12 +190,12 @@ class LimitCones:
             cuts.append((row, constant))
             elements.append(e)
         violations = self._least_violations(cuts, elements, pressing=True)
-        rubs = {
+        missing_friction = {
             e: float(x) * self.unit / float(self.lengths[self.parts[e].start])
             for e, x in enumerate(violations)
             if x > AT_LIMIT
         }
-        return {}, rubs
+        return {}, missing_friction
 
     def _least_violations(
         self, bounds: list[tuple[Array, float]], owners: list[int], *, pressing: bool
@@ -302,7 +302,7 @@ class LimitCones:
             return np.inf, np.zeros(0 if sign else self.count)
         return float(optimum.x[-1]), np.asarray(optimum.x[:-1])
 
-    def least_factor(self) -> float:
+    def min_factor(self) -> float:
         """Return the least factor of all limits for which forces balance, by bisection, or infinity."""
         low, high = 0.0, MAX_FACTOR / (1.0 + MAX_FACTOR)
         if self.solve(0.0)[0] <= CUT:

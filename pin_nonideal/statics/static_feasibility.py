@@ -96,7 +96,7 @@ def rest(scene: Scene, q: State | None = None, tau: State | None = None, *, t: f
     at_rest = AtRest(scene, torque, time, at)
     drives = at_rest.forces(at) - at_rest.undriven(at)
     cones = LimitCones(scene, at_rest, at)
-    factor = cones.least_factor()
+    factor = cones.min_factor()
     holding = partial(holding_torques, scene, at, drives, time, at_rest.open)
     if factor > MAX_FACTOR:
         reason = _unheld(scene, at_rest, at, cones)
@@ -127,7 +127,7 @@ def _unheld(scene: Scene, at_rest: AtRest, q: Array, cones: LimitCones) -> str:
             f'nothing holds the motion of joint "{_joint_of(scene.model, dof)}": {at_joint:.4g} (N or N m) '
             "is left on it, and no constraint, contact or friction acts along this motion"
         )
-    pulls, rubs = cones.missing()
+    pulls, missing_friction = cones.missing()
     rows = {first: name for name, (first, _, contact) in compiled_scene(scene).rows.items() if contact}
     parts = []
     if pulls:
@@ -135,9 +135,9 @@ def _unheld(scene: Scene, at_rest: AtRest, q: Array, cones: LimitCones) -> str:
         parts.append(
             f"contacts would have to pull, with up to {most:.4g} N: {_quote([rows[k] for k in pulls])}"
         )
-    if rubs:
-        names = _quote([scene.element_names[e] for e in rubs])
-        most = max(rubs.values())
+    if missing_friction:
+        names = _quote([scene.element_names[e] for e in missing_friction])
+        most = max(missing_friction.values())
         parts.append(f"friction without a load would have to hold up to {most:.4g} (N or N m): {names}")
     return "; ".join(parts) or "no forces balance the scene"
 

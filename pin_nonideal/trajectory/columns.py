@@ -29,7 +29,9 @@ KINDS = (
     ("JointModelH", ("rad",), ("rad",)),
     ("JointModelP", ("m",), ("m",)),
 )
-Place = tuple[str, int, int, list[str]]  # name of a joint, first dof, nv, units of its generalized forces
+JointEntry = tuple[
+    str, int, int, list[str]
+]  # name of a joint, first dof, nv, units of its generalized forces
 FORCE_OF = {"m": "N", "rad": "N m"}  # unit of a force by that of the motion on which it does work
 RATES = {"v": "/s", "a": "/s^2"}
 EITHER_FORCE = (
@@ -164,7 +166,7 @@ def _of_dofs(values: Array, dofs: Sequence[int], first: int, nv: int) -> Array:
     return part
 
 
-def _among(places: Sequence[Place], dofs: Collection[int]) -> Iterator[Place]:
+def _among(places: Sequence[JointEntry], dofs: Collection[int]) -> Iterator[JointEntry]:
     """Yield the joints with one of some degrees of freedom."""
     ends = [first + nv for _, first, nv, _ in places]
     for k in sorted({bisect_right(ends, dof) for dof in dofs}):

@@ -166,7 +166,7 @@ def test_bricks_that_slide_over_edges(seed):
 BRICK = CUBE * [0.3, 0.4, 0.2]
 
 
-def least_edge(*clouds):
+def min_edge(*clouds):
     hulls = [convex_hull(points, "hull") for points in clouds]
     return min(np.linalg.norm(h.points[e[0]] - h.points[e[1]]) for h in hulls for e in h.edges)
 
@@ -176,8 +176,8 @@ THROWN = {
     "capsule at mesh": (coal.Capsule(0.04, 0.3), convex(MESH), 0.0),
     "sphere at cylinder": (coal.Sphere(0.05), coal.Cylinder(0.15, 0.3), 0.0),
     "sphere at cone": (coal.Sphere(0.05), coal.Cone(0.2, 0.4), 0.0),
-    "box at mesh": (BRICK, MESH, DEFAULT_ROUNDING * least_edge(BRICK, MESH)),
-    "mesh at mesh": (STONE, MESH, DEFAULT_ROUNDING * least_edge(STONE, MESH)),
+    "box at mesh": (BRICK, MESH, DEFAULT_ROUNDING * min_edge(BRICK, MESH)),
+    "mesh at mesh": (STONE, MESH, DEFAULT_ROUNDING * min_edge(STONE, MESH)),
 }
 
 

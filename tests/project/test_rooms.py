@@ -124,6 +124,27 @@ def test_stub_is_the_core(tmp_path: Path) -> None:
     assert generated.read_text(encoding="utf-8") == (PACKAGE / "_core.pyi").read_text(encoding="utf-8")
 
 
+def test_only_whole_runs_and_bindings_catch_failures() -> None:
+    """Inner code tests the status that `attempt` of dynamics/failure.hpp returns."""
+    core = PACKAGE / "_core"
+    catching = [
+        unit_name(path)
+        for path in sorted(core.rglob("*.[ch]pp"))
+        if "catch (const Failure" in path.read_text(encoding="utf-8")
+    ]
+    assert catching == ["dynamics/failure", "python/failures", "run/whole_run"]
+
+
+def test_folders_of_tests_mirror_the_rooms() -> None:
+    tests = ROOT / "tests"
+    others = {"core", "project", "scenarios", "stress", "support"}
+    folders = {path.parent for path in tests.rglob("test_*.py")} - {tests}
+    of_core = {path.relative_to(tests / "core") for path in folders if tests / "core" in path.parents}
+    assert [path for path in sorted(of_core) if not (PACKAGE / "_core" / path).is_dir()] == []
+    of_package = {path.relative_to(tests).parts[0] for path in folders} - others
+    assert of_package <= set(ROOMS["package"])
+
+
 def test_lines_of_the_core_fit_a_screen() -> None:
     long = [
         f"{path.relative_to(PACKAGE)}:{number}"

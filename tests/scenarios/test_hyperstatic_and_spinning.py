@@ -29,7 +29,7 @@ def table(legs, mass, inertia):
     return model
 
 
-def least_loads(legs, x, y):
+def minimum_norm_loads(legs, x, y):
     """Least-norm loads that press, of a unit weight at (x, y), by trying every set of legs that bear none."""
     n = len(legs)
     A, b = np.vstack([np.ones(n), np.transpose(legs)]), np.array([1.0, x, y])
@@ -61,7 +61,7 @@ def test_a_load_moves_over_a_table(draw):
     total = weight + mass * GRAVITY
     for t, loads in zip(run.t, run.lam, strict=True):
         part = t * weight / total
-        assert loads / total == pytest.approx(least_loads(legs, part * x, part * y), abs=LOADS)
+        assert loads / total == pytest.approx(minimum_norm_loads(legs, part * x, part * y), abs=LOADS)
     assert run.lam.min() >= 0.0
     assert np.abs(run.a).max() < STILL
     assert not run.events

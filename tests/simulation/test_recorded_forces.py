@@ -12,7 +12,7 @@ import pin_nonideal as pn
 from oracles.reactions import CutTree
 from pin_nonideal.errors import InputError, UnknownNameError
 
-from ..friction.test_stiff_friction import sledge
+from ..core.friction.test_stiff_friction import sledge
 from ..support.mechanisms import body, empty, frame
 from ..support.refusals import refuses
 from ..support.same_run import assert_same_run

@@ -88,7 +88,7 @@ void BoxProgram::start(const VecX& s, const VecX* initial) {
     f_.setZero(n);
     is_free_.assign(n, 1);
     for (int i = 0; i < n; ++i) {
-        is_free_[i] = s[i] > 0.0 && (!initial || std::abs((*initial)[i]) < s[i] * (1.0 - parameters.limit_tolerance));
+        is_free_[i] = s[i] > 0.0 && (!initial || std::abs((*initial)[i]) < s[i] * (1.0 - parameters.limit_rounding));
         if (initial && s[i] > 0.0) f_[i] = is_free_[i] ? (*initial)[i] : (*initial)[i] > 0.0 ? s[i] : -s[i];
     }
 }
@@ -109,7 +109,7 @@ void BoxProgram::descend(const MatX& W, const VecX& alpha0, const VecX& s) {
         bool endless = false;
         for (int i = 0; i < n; ++i) {
             if (!is_free_[i]) left_[i] = 0.0;
-            endless |= std::abs(left_[i]) > parameters.met * size_[i] + noise_;
+            endless |= std::abs(left_[i]) > parameters.zero_acceleration * size_[i] + noise_;
         }
         if (endless) x_ = -left_;
         double length = endless ? HUGE_VAL : 1.0;
@@ -144,7 +144,7 @@ void BoxProgram::descend(const MatX& W, const VecX& alpha0, const VecX& s) {
 // elements cannot all stick, or if pivoting does not end.
 bool BoxProgram::pivot_blocks(const MatX& W, const VecX& alpha0, const VecX& s) {
     const int n = static_cast<int>(s.size());
-    int fewest = n + 1, patience = parameters.most_patience;
+    int fewest = n + 1, patience = parameters.max_stalled_rounds;
     for (int it = 0; it < 200 + 50 * n; ++it) {
         for (int i = 0; i < n; ++i)
             if (is_free_[i]) f_[i] = 0.0;
@@ -157,7 +157,7 @@ bool BoxProgram::pivot_blocks(const MatX& W, const VecX& alpha0, const VecX& s) 
         measure(W, alpha0, f_);
         wrong_.clear();
         for (int i = 0; i < n; ++i) {
-            if (is_free_[i] && std::abs(alpha_[i]) > parameters.met * size_[i] + noise_) return false;
+            if (is_free_[i] && std::abs(alpha_[i]) > parameters.zero_acceleration * size_[i] + noise_) return false;
             const bool outside = is_free_[i] && std::abs(f_[i]) > s[i] * (1.0 + parameters.rounding);
             const bool drives =
                 !is_free_[i] && alpha_[i] * f_[i] > (parameters.rounding * size_[i] + noise_) * std::abs(f_[i]);
@@ -166,7 +166,7 @@ bool BoxProgram::pivot_blocks(const MatX& W, const VecX& alpha0, const VecX& s) 
         if (wrong_.empty()) return true;
         if (static_cast<int>(wrong_.size()) < fewest) {
             fewest = static_cast<int>(wrong_.size());
-            patience = parameters.most_patience;
+            patience = parameters.max_stalled_rounds;
         } else if (--patience < 0) {
             wrong_.assign(1, wrong_.back());
         }
@@ -187,7 +187,7 @@ void BoxProgram::solve(const MatX& W, const VecX& alpha0, const VecX& s, const V
     f_.setZero(n);
     is_free_.assign(n, 1);
     for (int i = 0; initial && i < n; ++i) {
-        is_free_[i] = std::abs(initial_[i]) < s[i] * (1.0 - parameters.limit_tolerance);
+        is_free_[i] = std::abs(initial_[i]) < s[i] * (1.0 - parameters.limit_rounding);
         if (!is_free_[i]) f_[i] = initial_[i] > 0.0 ? s[i] : -s[i];
     }
     if (!pivot_blocks(W, alpha0, s)) {
@@ -204,7 +204,7 @@ void BoxProgram::solve_all(const MatX& W, const VecX& r, VecX& x) {
     x = x_;
 }
 
-VecX least_norm_solution(const MatX& W, const VecX& r) {
+VecX minimum_norm_solution(const MatX& W, const VecX& r) {
     VecX x;
     BoxProgram().solve_all(W, r, x);
     return x;

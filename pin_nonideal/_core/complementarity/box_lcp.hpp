@@ -12,14 +12,14 @@ namespace pn {
 constexpr double response_rank_threshold = 1e-13;
 
 struct BoxLcpParameters {
-    double met = 1e-9;               // part of the acceleration scale that counts as zero
-    double limit_tolerance = 1e-12;  // relative distance to the limit at which a force is at it
-    double rounding = 1e-13;         // rounding, relative to a limit or to the acceleration scale
-    double noise_of_others = 1e-14;  // rounding of other elements, relative to the largest acceleration
+    double zero_acceleration = 1e-9;  // part of the acceleration scale that counts as zero
+    double limit_rounding = 1e-12;    // relative distance to the limit at which a force is at it
+    double rounding = 1e-13;          // rounding, relative to a limit or to the acceleration scale
+    double noise_of_others = 1e-14;   // rounding of other elements, relative to the largest acceleration
     // Smallest root of a pivot of W, scaled to a unit diagonal, for which the Cholesky factor is as good as an
     // orthogonal one.
     double min_pivot = 1e-3;
-    int most_patience = 10;  // rounds of block pivoting without progress
+    int max_stalled_rounds = 10;  // rounds of block pivoting without progress
 };
 
 // Solver with persistent buffers: a program no larger than an earlier one allocates no memory.
@@ -52,7 +52,7 @@ private:
     DenseSolver solver_;
 };
 
-VecX least_norm_solution(const MatX& W, const VecX& r);
+VecX minimum_norm_solution(const MatX& W, const VecX& r);
 VecX box_program(const MatX& W, const VecX& alpha0, const VecX& s, const VecX* initial = nullptr);
 
 }  // namespace pn

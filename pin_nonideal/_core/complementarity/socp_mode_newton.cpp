@@ -160,14 +160,14 @@ struct ConeProgram {
             }
             const double error = residual.cwiseAbs().maxCoeff();
             const bool done =
-                error <= socp_parameters.mode_newton_tolerance || (error < socp_parameters.condition && error >= last);
+                error <= socp_parameters.mode_newton_tolerance || (error < socp_parameters.condition_slack && error >= last);
             last = error;
             if (done) break;
             const VecX step = least_squares(J, residual, response_rank_threshold);
             there -= step.head(n);
             m -= step.tail(elements);
         }
-        return last < socp_parameters.condition;
+        return last < socp_parameters.condition_slack;
     }
 
     // Find the modes from the end of the path. An element slips if its acceleration exceeds the distance of its force
@@ -181,8 +181,8 @@ struct ConeProgram {
             int changed = 0, nearest = -1;
             if (solve_modes(slides, there, m)) {
                 for (int e = 0; e < elements; ++e) {
-                    const bool wrong = slides[e] ? m[e] < -socp_parameters.condition
-                                                 : tail(there, e).norm() > 1.0 + socp_parameters.condition;
+                    const bool wrong = slides[e] ? m[e] < -socp_parameters.condition_slack
+                                                 : tail(there, e).norm() > 1.0 + socp_parameters.condition_slack;
                     if (!wrong) continue;
                     slides[e] = !slides[e];
                     ++changed;
@@ -206,7 +206,7 @@ struct ConeProgram {
         const bool found = find_modes();
         for (int e = 0; e < elements; ++e) {  // slipping forces are exactly at their limits
             const double length = tail(x, e).norm();
-            if (found ? length > 1.0 - socp_parameters.condition : y[e].head > 1.0 - length)
+            if (found ? length > 1.0 - socp_parameters.condition_slack : y[e].head > 1.0 - length)
                 x.segment(at[e], dims[e]) /= length;
         }
         return scale.cwiseProduct(x);

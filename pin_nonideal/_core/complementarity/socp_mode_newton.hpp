@@ -16,7 +16,7 @@ struct SocpParameters {
     // Largest z . y of a solution, relative to the acceleration scale. Rounding may end the iteration before.
     double gap_tolerance = 1e-17;
     double mode_newton_tolerance = 4e-16;  // relative error of the forces: two units of roundoff
-    double condition = 1e-12;              // violation of a mode's condition that is rounding, relative to a limit
+    double condition_slack = 1e-12;        // violation of a mode's condition that is rounding, relative to a limit
 };
 
 inline constexpr SocpParameters socp_parameters{};

@@ -69,7 +69,7 @@ struct PointMotion {
     template <class Out>
     PN_INLINE void row(Out& out, int k, const Vec& e) const {
         out.rate[k] = e.dot(u);
-        out.drift[k] = e.dot(du);
+        out.bias[k] = e.dot(du);
     }
 };
 
@@ -81,7 +81,7 @@ PN_INLINE void sliding_row(const Sides<Pose>& s, Out& out, int k, const Vec& e, 
     const Vec du = s.a.acceleration(c) + s.a.omega().cross(c_rate - va) - s.b.acceleration(c) -
                     s.b.omega().cross(c_rate - vb) - s.b.omega().cross(u);
     out.rate[k] = e.dot(u);
-    out.drift[k] = e.dot(du);
+    out.bias[k] = e.dot(du);
 }
 
 }  // namespace pn

@@ -17,7 +17,7 @@ struct LoadSharing {
     std::vector<int> dependent;  // required rows that depend on the active rows
     MatX W;                      // their coefficients: A_dependent = W A_active
     MatX taken;                  // multipliers of minimum norm of the dependent rows, per multiplier of the rows in use
-    MatX free;                   // basis of multipliers that exert no force, once asked for
+    MatX free;                   // basis of multipliers that exert no force, computed at first use
     bool has_free = false;
 };
 

@@ -36,7 +36,7 @@ MatX dependence(const std::vector<Block>& blocks, const std::vector<double>& B, 
     const VecX least = redundancy_parameters.rounding * rest.colwise().norm().transpose();
     MatX W = MatX::Zero(rest.cols(), used.cols()), weights(used.cols(), rest.cols());
     VecX product = VecX::Zero(s.scale.size()), weight = product;
-    for (int pass = 0; pass < redundancy_parameters.most_passes; ++pass) {
+    for (int pass = 0; pass < redundancy_parameters.max_passes; ++pass) {
         if ((rest.colwise().norm().transpose().array() <= least.array()).all()) break;
         weights.noalias() = used.transpose() * rest;
         for (Eigen::Index k = 0; k < rest.cols(); ++k) {

@@ -11,7 +11,7 @@ struct RedundancyParameters {
     // rows square the condition number. A second pass therefore repeats the solution for the remainder of the row.
     // [Bjorck: Stability analysis of the method of seminormal equations, 1987.]
     double rounding = 1e-14;  // remainder that counts as rounding, relative to the row
-    int most_passes = 2;      // maximum passes
+    int max_passes = 2;       // maximum passes
 };
 
 inline constexpr RedundancyParameters redundancy_parameters{};

@@ -92,7 +92,7 @@ void RowValues::resize(const Kind& kind, int nv) {
     geometric = frames(kind).first != nullptr;
     constant_A = has_constant_A(kind);
     wrench.assign(geometric ? rows : 0, Wrench{Vec3::Zero(), Vec3::Zero(), Vec3::Zero()});
-    for (std::vector<double>* x : {&drift, &residual, &rate, &phi_t, &phi_tt}) x->assign(rows, 0.0);
+    for (std::vector<double>* x : {&bias, &residual, &rate, &phi_t, &phi_tt}) x->assign(rows, 0.0);
     if (geometric) return;
     A = MatX::Zero(rows, nv);
     b = VecX::Zero(rows);

@@ -56,7 +56,7 @@ struct RowValues {
     int rows = 0;
     bool geometric = false;  // rows are wrenches between two bodies
     std::vector<Wrench> wrench;
-    std::vector<double> drift, residual, rate;
+    std::vector<double> bias, residual, rate;
     std::vector<double> phi_t, phi_tt;  // explicit time derivatives of the residual
     MatX A;  // rows x nv, when not geometric
     bool constant_A = false, has_A = false;  // a constant A is written once

@@ -51,7 +51,7 @@ struct Search {
     const VecX& v;
     const Choice& rest;
     const std::function<void(const RestingMotion*)>& find_modes;
-    const RestingMotion* together = nullptr;
+    const RestingMotion* joint_motion = nullptr;
     bool needs_opposed_friction = false;  // slip onset must oppose friction
     std::vector<Choice> tried;
     std::optional<Failure> failure;  // failure of the first active set without a motion
@@ -61,15 +61,14 @@ struct Search {
     std::optional<Choice> improved_choice(const Choice& choice) {
         tried.push_back(choice);
         set_closed(p, w, choice);
-        try {
-            find_modes(together && (together->is_initial_guess || together->closed == choice) ? together : nullptr);
-        } catch (const Failure& thrown) {
-            if (thrown.kind == Failure::Kind::interrupted || thrown.kind == Failure::Kind::not_finite) throw;
-            if (!failure) failure = thrown;
+        const bool applies = joint_motion && (joint_motion->is_initial_guess || joint_motion->closed == choice);
+        if (const auto no_motion = attempt([&] { find_modes(applies ? joint_motion : nullptr); })) {
+            if (no_motion->kind == Failure::Kind::not_finite) throw *no_motion;
+            if (!failure) failure = no_motion;
             return std::nullopt;
         }
         if (needs_opposed_friction && !slip_opposes_friction(p, w, v)) return std::nullopt;
-        if (together && together->slides() && all_stay()) return std::nullopt;
+        if (joint_motion && joint_motion->slides() && all_stay()) return std::nullopt;
         Choice next = choice;
         int change = pulling_contact(p, w);
         if (change < 0) change = fastest_approaching(choice);
@@ -164,7 +163,7 @@ TouchingContacts touching_contacts(const Program& p, Workspace& w, double t, con
     if (list.size() > 1) {
         for (int i : list)
             if (p.gaps[i].sliding >= 0) evaluate_block(p, w, t, v, p.frictions[p.gaps[i].sliding].block);
-        leave_one_of_each_place(p, w, list, [&](int i, int other) {
+        remove_coincident(p, w, list, [&](int i, int other) {
             if (opens_later(p, w, i, other) || opens_later(p, w, other, i)) return opens_later(p, w, i, other);
             return w.state.closed[i] && !w.state.closed[other];
         });
@@ -182,9 +181,9 @@ TouchingContacts touching_contacts(const Program& p, Workspace& w, double t, con
 
 const TouchingContacts& TouchingCache::at(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
                                           bool starts) {
-    const bool same = known_ && t == t_ && starts == starts_ && q == q_ && v == v_ && same_bytes(closed_, w.state.closed);
+    const bool same = is_set_ && t == t_ && starts == starts_ && q == q_ && v == v_ && same_bytes(closed_, w.state.closed);
     if (same) return found_;
-    known_ = true;
+    is_set_ = true;
     t_ = t;
     starts_ = starts;
     q_ = q;
@@ -197,25 +196,25 @@ const TouchingContacts& TouchingCache::at(const Program& p, Workspace& w, double
 // Contacts that share a load are decided together. Other contacts are decided one by one, which tests uniqueness, and
 // together if this does not converge.
 void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
-                    const ClosingQuestion& question, const std::function<void(const RestingMotion*)>& find_modes) {
+                    const OnsetQuery& query, const std::function<void(const RestingMotion*)>& find_modes) {
     const RunState before = w.state;
-    const auto together = [&] {
+    const auto solve_jointly = [&] {
         set_closed(p, w, before.closed);
         set_modes(p, w, before.mode);
         w.state = before;
-        return resting_motion(p, w, t, q, v, question);
+        return resting_motion(p, w, t, q, v, query);
     };
     std::optional<Failure> failure;  // of the first active set without a motion
-    const auto seek = [&](const Choice& start, const RestingMotion* answer, bool needs_opposed_friction) {
+    const auto seek = [&](const Choice& start, const RestingMotion* joint_motion, bool needs_opposed_friction) {
         Choice first = start;
-        if (question.opening_gap >= 0) first[question.opening_gap] = 0;
-        Search search{p, w, t, v, question.rest, find_modes, answer, needs_opposed_friction, {}, {}};
+        if (query.opening_gap >= 0) first[query.opening_gap] = 0;
+        Search search{p, w, t, v, query.rest, find_modes, joint_motion, needs_opposed_friction, {}, {}};
         if (search.pivot(first) || search.enumerate()) return true;
         if (!failure) failure = search.failure;
         return false;
     };
-    const auto close = [&](const Choice& start, const RestingMotion* answer) {
-        if (seek(start, answer, true) || seek(start, answer, false)) return;
+    const auto close = [&](const Choice& start, const RestingMotion* joint_motion) {
+        if (seek(start, joint_motion, true) || seek(start, joint_motion, false)) return;
         if (failure) throw *failure;
         throw Failure(Failure::Kind::not_converged, t);
     };
@@ -227,41 +226,42 @@ void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, con
     };
     // Load shares of slipping contacts follow friction, unlike those of the cone problem. If friction of unloaded
     // contacts spoils the shares, the loaded contacts alone determine the motion.
-    const auto decides_alone = [&](RestingMotion near) {
-        near.is_initial_guess = true;
-        if (seek(near.closed, &near, true)) return true;
+    const auto seek_from_joint_motion = [&](RestingMotion guess) {
+        guess.is_initial_guess = true;
+        if (seek(guess.closed, &guess, true)) return true;
         restart();
-        if (near.loaded == near.closed) return false;
-        near.is_initial_guess = false;
-        near.closed = near.loaded;
-        if (seek(near.closed, &near, true)) return true;
+        if (guess.loaded == guess.closed) return false;
+        guess.is_initial_guess = false;
+        guess.closed = guess.loaded;
+        if (seek(guess.closed, &guess, true)) return true;
         restart();
         return false;
     };
-    const bool many = std::count(question.rest.begin(), question.rest.end(), char(1)) >= active_set_parameters.may_share;
-    std::optional<RestingMotion> answer;
-    if (many && question.breaking.empty()) {
-        answer = together();
-        if (answer && answer->closed == question.rest && !answer->slides()) return close(answer->closed, &*answer);
-        if (answer && answer->shared && answer->slides() && decides_alone(*answer)) return;
-        if (answer && answer->shared) return close(answer->closed, &*answer);
+    const bool many = std::count(query.rest.begin(), query.rest.end(), char(1)) >= active_set_parameters.may_share;
+    std::optional<RestingMotion> joint_motion;
+    if (many && query.at_limit.empty()) {
+        joint_motion = solve_jointly();
+        if (joint_motion && joint_motion->closed == query.rest && !joint_motion->slides())
+            return close(joint_motion->closed, &*joint_motion);
+        if (joint_motion && joint_motion->shared && joint_motion->slides() && seek_from_joint_motion(*joint_motion)) return;
+        if (joint_motion && joint_motion->shared) return close(joint_motion->closed, &*joint_motion);
     }
-    try {
-        close(question.rest, nullptr);
+    const auto unsolved = attempt({Failure::Kind::not_converged, Failure::Kind::paradox}, [&] {
+        close(query.rest, nullptr);
         // Multipliers of redundant rows do not show if friction at rest is within its cones. Sliding friction follows
         // the minimum-norm loads, unlike the solution of the cone problem.
-        if (question.prescribed || !w.now.rows.redundant || !w.state.sticks_anywhere() || slides_anywhere(p, w, v))
+        if (query.prescribed || !w.now.rows.redundant || !w.state.sticks_anywhere() || slides_anywhere(p, w, v))
             return;
-        if (!answer) answer = together();
-        if (answer) return close(answer->closed, &*answer);
-        return close(question.rest, nullptr);
-    } catch (const Failure& failure) {
-        const bool undecided = failure.kind == Failure::Kind::not_converged;
-        if (!undecided && !(many && failure.kind == Failure::Kind::paradox)) throw;
-        answer = together();
-        if (!answer || !(undecided || answer->shared)) throw;
-        close(answer->closed, &*answer);
-    }
+        if (!joint_motion) joint_motion = solve_jointly();
+        if (joint_motion) close(joint_motion->closed, &*joint_motion);
+        else close(query.rest, nullptr);
+    });
+    if (!unsolved) return;
+    const bool undecided = unsolved->kind == Failure::Kind::not_converged;
+    if (!undecided && !many) throw *unsolved;
+    joint_motion = solve_jointly();
+    if (!joint_motion || !(undecided || joint_motion->shared)) throw *unsolved;
+    close(joint_motion->closed, &*joint_motion);
 }
 
 }  // namespace pn

@@ -45,7 +45,7 @@ public:
     const TouchingContacts& at(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, bool starts);
 
 private:
-    bool known_ = false, starts_ = false;
+    bool is_set_ = false, starts_ = false;
     double t_ = 0.0;
     VecX q_, v_;
     std::vector<char> closed_;
@@ -60,6 +60,6 @@ bool slip_opposes_friction(const Program& p, Workspace& w, const VecX& v);
 // contacts, or takes them from the joint motion of all contacts if given. On return the workspace holds the motion at
 // v. If no consistent solution exists, some slip directions are not consistent yet, and integration corrects them.
 void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
-                    const ClosingQuestion& question, const std::function<void(const RestingMotion*)>& find_modes);
+                    const OnsetQuery& query, const std::function<void(const RestingMotion*)>& find_modes);
 
 }  // namespace pn

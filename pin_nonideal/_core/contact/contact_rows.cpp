@@ -15,7 +15,7 @@ static void free_contacts(const Program& p, Workspace& w, const std::vector<char
     for (const Gap& gap : p.gaps)
         for (size_t k = 0; k < p.blocks[gap.block].kept.size(); ++k)
             w.now.rows.required[p.blocks[gap.block].row + k] = 0;
-    w.now.rows.use_required(p.layout, p.blocks, w.now.awake);
+    w.now.rows.use_required(p.layout, p.blocks, w.now.active_blocks);
 }
 
 void free_contacts(const Program& p, Workspace& w, const std::vector<char>& touching) {
@@ -57,8 +57,8 @@ ContactRows::ContactRows(const Program& program, Workspace& workspace, const std
 
 void ContactRows::respond() {
     const int nv = p.mechanism.nv;
-    const VecX no_drift = VecX::Zero(p.layout.rows);
-    VecX unit = no_drift, lam = no_drift, force(nv), answer(nv);
+    const VecX no_bias = VecX::Zero(p.layout.rows);
+    VecX unit = no_bias, lam = no_bias, force(nv), motion(nv);
     each_row([&](int at, int block, int k) {
         const Block& own = p.blocks[block];
         velocity[at] = w.now.values[block].rate[own.kept[k]];
@@ -66,8 +66,8 @@ void ContactRows::respond() {
         unit[own.row + k] = 1.0;
         add_transpose(own, w.now.A, unit, force);
         unit[own.row + k] = 0.0;
-        solve_acceleration(p, w, force, no_drift, answer, lam);
-        response.col(at) = answer;
+        solve_acceleration(p, w, force, no_bias, motion, lam);
+        response.col(at) = motion;
     });
     for (int column = 0; column < W.cols(); ++column) W.col(column) = change(response.col(column));
     W = (0.5 * (W + W.transpose())).eval();

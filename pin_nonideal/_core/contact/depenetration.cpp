@@ -30,7 +30,7 @@ VecX widths(const Program& p, Workspace& w, double t, const VecX& v, const std::
 
 double longest_single_move(const Program& p, const Workspace& w) {
     double longest = 0.0;
-    for (int i : w.now.touching) {
+    for (int i : w.now.closed_gaps) {
         const Block& block = p.blocks[p.gaps[i].block];
         if (!block.kept.empty()) longest = std::max(longest, std::abs(gap_width(p, w, i)) * w.now.rows.scale[block.row]);
     }
@@ -40,20 +40,20 @@ double longest_single_move(const Program& p, const Workspace& w) {
 bool left_planes(const Program& p, Workspace& w, double longest_single) {
     const double allowed = max_projected_gap * scene_size(p, w);
     double widest = 0.0;
-    for (int i : w.now.touching) {
+    for (int i : w.now.closed_gaps) {
         if (opening(p, w, p.gaps[i].block, allowed) != 0.0) return true;
         widest = std::max(widest, longest_single / w.now.rows.scale[p.blocks[p.gaps[i].block].row]);
     }
     return widest > allowed &&
-           !(closing_distance(p, w) <= depenetration_parameters.max_joint_move_ratio * longest_single);
+           !(closing_distance(p, w) <= depenetration_parameters.max_move_ratio * longest_single);
 }
 
-bool move_out(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
+bool depenetrate(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
     const std::vector<char> closed = w.state.closed;
     const std::vector<Mode> modes = w.state.mode;
     const VecX start = q;
     std::vector<int> gaps;
-    for (int i : w.now.touching)
+    for (int i : w.now.closed_gaps)
         if (!is_bare(p, i)) gaps.push_back(i);
     free_contacts(p, w, closed);
     const double rounding = touching_width * scene_size(p, w);

@@ -8,7 +8,7 @@ namespace pn {
 
 struct DepenetrationParameters {
     // Moves longer than this many times the longest single-contact move do not resolve all penetrations.
-    double max_joint_move_ratio = 10.0;
+    double max_move_ratio = 10.0;
     int max_steps = 20;  // Newton-like steps, each much shorter than the last one
 };
 
@@ -24,6 +24,6 @@ bool left_planes(const Program& p, Workspace& w, double longest_single);
 // nonnegative and complementary to compressive multipliers. Contacts that do not touch at this position open. If no
 // such position is found, q is only projected onto the constraints, and contacts off their planes open. On return the
 // workspace is configured at q, with independent rows. Return true if rows were chosen.
-bool move_out(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
+bool depenetrate(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
 
 }  // namespace pn

@@ -28,9 +28,9 @@ bool fits(const Program& p) {
 }
 
 // Check if all contacts rest, and forces of the laws at rest hold them. Small problems need no help of this kind.
-bool rests_at_once(const Program& p, Workspace& w, const VecX& v, const ClosingQuestion& question,
+bool rests_at_once(const Program& p, Workspace& w, const VecX& v, const OnsetQuery& query,
                    const std::vector<int>& gaps, const std::vector<int>& others) {
-    if (static_cast<int>(gaps.size()) < many || !question.breaking.empty() || p.moves_in_time) return false;
+    if (static_cast<int>(gaps.size()) < many || !query.at_limit.empty() || p.moves_in_time) return false;
     if ((v.array() != 0.0).any()) return false;
     std::vector<ConeElement> cones;
     for (int gap : gaps) {
@@ -43,38 +43,36 @@ bool rests_at_once(const Program& p, Workspace& w, const VecX& v, const ClosingQ
     return rest_on_trees(p, w, gaps, others, cones);
 }
 
-// Call act(problem) with the contacts of `question.rest` and the other elements at rest as a cone problem, or
+// Call act(problem) with the contacts of `query.rest` and the other elements at rest as a cone problem, or
 // rest(elements) if they rest at once. The workspace is unchanged afterwards. Return false if they are no cone problem,
 // or if other rows admit no motion.
 template <class Rest, class Act>
-bool with_problem(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, const ClosingQuestion& question,
+bool with_problem(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, const OnsetQuery& query,
                   const Rest& rest, const Act& act) {
     std::vector<int> gaps;
     for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i)
-        if (question.rest[i]) gaps.push_back(i);
+        if (query.rest[i]) gaps.push_back(i);
     if (gaps.empty() || !fits(p)) return false;
     const RunState before = w.state;
     std::vector<int> others;  // at rest
     std::vector<Mode> modes(p.frictions.size(), unloaded);
     for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
         if (p.frictions[e].gap >= 0) continue;
-        if (is_at_rest(p, w, v, question, before, e)) others.push_back(e);
+        if (is_at_rest(p, w, v, query, before, e)) others.push_back(e);
         else if (p.frictions[e].dim > 1) return false;
         else modes[e] = slip_velocity(w.now, p.frictions[e])[0] > 0.0 ? slip_plus : slip_minus;
     }
     bool found = false;
-    try {
-        release_contacts(p, w, t, q, v, question.rest, modes);
-        if (rests_at_once(p, w, v, question, gaps, others)) {
+    attempt([&] {  // the caller's own evaluation reports failures of other rows
+        release_contacts(p, w, t, q, v, query.rest, modes);
+        if (rests_at_once(p, w, v, query, gaps, others)) {
             rest(others);
             found = true;
         } else {
-            RestingProblem problem(p, w, v, gaps, others, question, before);
+            RestingProblem problem(p, w, v, gaps, others, query, before);
             found = act(problem);
         }
-    } catch (const Failure& failure) {  // the caller's own evaluation reports failures of other rows
-        if (failure.kind == Failure::Kind::interrupted) throw;
-    }
+    });
     set_closed(p, w, before.closed);
     set_modes(p, w, before.mode);
     w.state = before;
@@ -84,19 +82,19 @@ bool with_problem(const Program& p, Workspace& w, double t, const VecX& q, const
 }  // namespace
 
 std::optional<RestingMotion> resting_motion(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
-                                            const ClosingQuestion& question) {
+                                            const OnsetQuery& query) {
     const std::vector<char> open(p.gaps.size(), 0);
     RestingMotion out{open, open, std::vector<Mode>(p.frictions.size(), unloaded),
                       std::vector<Vec3>(p.frictions.size(), Vec3::Zero()), {}};
     out.friction = out.direction;
     const auto rest = [&](const std::vector<int>& others) {
-        out.closed = out.loaded = question.rest;
+        out.closed = out.loaded = query.rest;
         for (size_t i = 0; i < p.gaps.size(); ++i)
-            if (question.rest[i] && p.gaps[i].sliding >= 0) out.modes[p.gaps[i].sliding] = sticking;
+            if (query.rest[i] && p.gaps[i].sliding >= 0) out.modes[p.gaps[i].sliding] = sticking;
         for (int e : others) out.modes[e] = sticking;
         out.shared = true;
     };
-    const bool found = with_problem(p, w, t, q, v, question, rest, [&](RestingProblem& problem) {
+    const bool found = with_problem(p, w, t, q, v, query, rest, [&](RestingProblem& problem) {
         if (!problem.solve(out.shared)) return false;
         problem.read(out);
         out.several = problem.several;
@@ -107,9 +105,9 @@ std::optional<RestingMotion> resting_motion(const Program& p, Workspace& w, doub
 }
 
 bool closed_contacts_hold(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
-    ClosingQuestion question;
-    question.rest = w.state.closed;
-    return with_problem(p, w, t, q, v, question, [](const std::vector<int>&) {}, [](RestingProblem& problem) {
+    OnsetQuery query;
+    query.rest = w.state.closed;
+    return with_problem(p, w, t, q, v, query, [](const std::vector<int>&) {}, [](RestingProblem& problem) {
         ConeComplementarity solver;
         return problem.hold(solver);
     });

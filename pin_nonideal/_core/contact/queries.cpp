@@ -12,8 +12,8 @@ namespace pn {
 // Gap acceleration, and the sum of the magnitudes of its terms.
 static std::pair<double, double> rate_of_rate(const Program& p, const Workspace& w, int gap) {
     const Block& block = p.blocks[p.gaps[gap].block];
-    const double drift = w.now.values[p.gaps[gap].block].drift[block.kept[0]];
-    double sum = drift, size = std::abs(drift);
+    const double bias = w.now.values[p.gaps[gap].block].bias[block.kept[0]];
+    double sum = bias, size = std::abs(bias);
     const double* A = w.now.A.data() + block.offset;
     for (size_t l = 0; l < block.support.size(); ++l) {
         const double term = A[l] * w.now.a[block.support[l]];
@@ -61,27 +61,28 @@ bool same_bodies(const Program& p, int gap, int other) {
     return bodies(p.blocks[p.gaps[gap].block]) == bodies(p.blocks[p.gaps[other].block]);
 }
 
-bool are_copies(const Program& p, int gap, int other) {
+bool are_duplicates(const Program& p, int gap, int other) {
     const Gap &a = p.gaps[gap], &b = p.gaps[other];
-    return a.alike == b.alike && (gap == other || rub_and_bounce_the_same(p, a, b));
+    return a.same_geometry_as == b.same_geometry_as && (gap == other || rub_and_bounce_the_same(p, a, b));
 }
 
 bool coincide(const Program& p, const Workspace& w, int gap, int other) {
     const Gap &a = p.gaps[gap], &b = p.gaps[other];
-    if (are_copies(p, gap, other)) return true;
+    if (are_duplicates(p, gap, other)) return true;
     if (!w.now.values[a.block].geometric || !w.now.values[b.block].geometric) return false;
     if (bodies(p.blocks[a.block]) != bodies(p.blocks[b.block]) || !rub_and_bounce_the_same(p, a, b)) return false;
     const Line one = line_of(p, w, a.block, 0), two = line_of(p, w, b.block, 0);
     const double size = 1.0 + one.point.norm();
-    if ((one.along - two.along).norm() > contact_query_parameters.one_place) return false;
-    if ((one.point - two.point).cross(one.along).norm() > contact_query_parameters.one_place * size) return false;
+    const double tolerance = contact_query_parameters.coincidence_tolerance;
+    if ((one.along - two.along).norm() > tolerance) return false;
+    if ((one.point - two.point).cross(one.along).norm() > tolerance * size) return false;
     if (a.sliding < 0) return true;
     const Friction &rubs = p.frictions[a.sliding], &rubs_too = p.frictions[b.sliding];
     const Vec3 apart = w.now.values[rubs.block].wrench[0].point - w.now.values[rubs_too.block].wrench[0].point;
-    return apart.norm() <= contact_query_parameters.one_place * size;
+    return apart.norm() <= tolerance * size;
 }
 
-void leave_one_of_each_place(const Program& p, const Workspace& w, std::vector<int>& list, const Precedence& precedes) {
+void remove_coincident(const Program& p, const Workspace& w, std::vector<int>& list, const Precedence& precedes) {
     size_t left = 0;
     for (int gap : list) {
         const auto end = list.begin() + static_cast<std::ptrdiff_t>(left);
@@ -94,7 +95,7 @@ void leave_one_of_each_place(const Program& p, const Workspace& w, std::vector<i
 }
 
 bool opens_later(const Program& p, const Workspace& w, int gap, int other) {
-    const auto bias = [&](int i) { return w.now.values[p.gaps[i].block].drift[p.blocks[p.gaps[i].block].kept[0]]; };
+    const auto bias = [&](int i) { return w.now.values[p.gaps[i].block].bias[p.blocks[p.gaps[i].block].kept[0]]; };
     const double scale = std::abs(bias(gap)) + std::abs(bias(other)) + p.mechanism.gravity.norm();
     return bias(gap) < bias(other) - min_bias_jump * scale;
 }

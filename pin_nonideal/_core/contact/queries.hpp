@@ -12,7 +12,7 @@ struct ContactQueryParameters {
     // Rounding of a sum, relative to the sum of the magnitudes of its terms.
     double sum_rounding = 1e-12;
     // Tolerance of coincident lines and points: relative distance from the origin, or sine of an angle.
-    double one_place = 1e-12;
+    double coincidence_tolerance = 1e-12;
 };
 
 inline constexpr ContactQueryParameters contact_query_parameters{};
@@ -34,13 +34,13 @@ double acceleration_rounding(const Program& p, const Workspace& w, int gap);
 // Check if two gaps are between the same two bodies.
 bool same_bodies(const Program& p, int gap, int other);
 // Check if two gaps are duplicate declarations.
-bool are_copies(const Program& p, int gap, int other);
+bool are_duplicates(const Program& p, int gap, int other);
 // Check if two gaps coincide up to rounding: same bodies, same line of action, same friction point and same laws. Their
 // rows and the rows of their sliding must be evaluated.
 bool coincide(const Program& p, const Workspace& w, int gap, int other);
 // Reduce a list of touching gaps to one gap per place: the one that precedes the others, in sorted order.
 using Precedence = std::function<bool(int gap, int other)>;
-void leave_one_of_each_place(const Program& p, const Workspace& w, std::vector<int>& list, const Precedence& precedes);
+void remove_coincident(const Program& p, const Workspace& w, std::vector<int>& list, const Precedence& precedes);
 // Check if a gap has a lower bias than another gap, which coincides with it. Their accelerations differ by their biases
 // only, so that a load on the first gap keeps the other open.
 bool opens_later(const Program& p, const Workspace& w, int gap, int other);

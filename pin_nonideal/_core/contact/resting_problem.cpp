@@ -15,10 +15,10 @@ double strength(const Friction& f) { return f.gap >= 0 ? f.mu : f.constant; }
 
 }  // namespace
 
-bool is_at_rest(const Program& p, const Workspace& w, const VecX& v, const ClosingQuestion& question,
+bool is_at_rest(const Program& p, const Workspace& w, const VecX& v, const OnsetQuery& query,
                 const RunState& before, int e) {
     const bool known = before.mode[e] == sticking || before.is_sticking_deferred[e];
-    return e == question.arrived_element || (known && !question.after_impact) ||
+    return e == query.arrived_element || (known && !query.after_impact) ||
            slip_velocity(w.now, p.frictions[e]).norm() <= rest_speed * (1.0 + v.cwiseAbs().maxCoeff());
 }
 
@@ -26,24 +26,24 @@ bool RestingMotion::slides() const {
     return std::any_of(modes.begin(), modes.end(), [](Mode mode) { return slips(mode); });
 }
 
-void RestingMotion::answer(const Program& p, Workspace& w, ModeQuestion& question) const {
+void RestingMotion::to_modes(const Program& p, Workspace& w, ModeQuery& query) const {
     if (is_initial_guess) {
-        question.near = friction;
+        query.nearby_friction = friction;
         return;
     }
-    for (int e : question.at_rest) {
-        question.modes[e] = modes[e];
+    for (int e : query.at_rest) {
+        query.modes[e] = modes[e];
         if (p.frictions[e].dim > 1 && slips(modes[e]))
             w.state.slip_direction[e] = w.state.last_direction[e] = direction[e];
     }
-    question.is_solved_jointly = true;
-    question.several = several;
+    query.is_solved_jointly = true;
+    query.several = several;
 }
 
 RestingProblem::RestingProblem(const Program& program, Workspace& workspace, const VecX& velocity,
                                const std::vector<int>& gaps, const std::vector<int>& others,
-                               const ClosingQuestion& asked, const RunState& state)
-    : p(program), w(workspace), v(velocity), question(asked), before(state),
+                               const OnsetQuery& onset_query, const RunState& state)
+    : p(program), w(workspace), v(velocity), query(onset_query), before(state),
       rows(program, workspace, gaps, true, others) {
     const int all = static_cast<int>(rows.W.rows());
     int n = 0;
@@ -51,7 +51,7 @@ RestingProblem::RestingProblem(const Program& program, Workspace& workspace, con
     drag = share;
     for (size_t i = 0; i < gaps.size(); ++i) {
         const int e = p.gaps[gaps[i]].sliding, at = rows.first[i], dim = rows.cones[i].dim;
-        const bool slips = e >= 0 && dim > 1 && !is_at_rest(p, w, v, question, before, e);
+        const bool slips = e >= 0 && dim > 1 && !is_at_rest(p, w, v, query, before, e);
         slides.push_back(slips);
         first.push_back(n);
         share(at, n) = 1.0;
@@ -90,9 +90,9 @@ MatX RestingProblem::chosen(const MatX& of_all) const {
 }
 
 double RestingProblem::limit(int e) const {
-    const std::vector<int>& list = question.breaking;
+    const std::vector<int>& list = query.at_limit;
     const bool breaks = std::find(list.begin(), list.end(), e) != list.end();
-    return p.frictions[e].holding_limit(strength(p.frictions[e])) * (breaks ? 1.0 - parameters.breaking_by : 1.0);
+    return p.frictions[e].holding_limit(strength(p.frictions[e])) * (breaks ? 1.0 - parameters.at_limit_reduction : 1.0);
 }
 
 // Accelerations of the rows without contact forces.
@@ -100,7 +100,7 @@ VecX RestingProblem::accelerations() {
     VecX out = VecX::Zero(rows.W.rows());
     rows.each_row([&](int at, int block, int k) {
         multiply(p.blocks[block], w.now.A, w.now.a, w.scratch.r);
-        out[at] = w.scratch.r[p.blocks[block].row + k] + w.now.values[block].drift[p.blocks[block].kept[k]];
+        out[at] = w.scratch.r[p.blocks[block].row + k] + w.now.values[block].bias[p.blocks[block].kept[k]];
     });
     return out;
 }
@@ -116,13 +116,13 @@ double RestingProblem::acceleration_scale(int row, int count) const {
 }
 
 double RestingProblem::rounding(int row, int count) const {
-    return parameters.none * acceleration_scale(row, count) + parameters.common_slip_rounding * acceleration_scale();
+    return parameters.rounding * acceleration_scale(row, count) + parameters.common_slip_rounding * acceleration_scale();
 }
 
 // Check if friction is at its limit. A contact that shares a load may have a load of rounding only.
 bool RestingProblem::at_its_limit(size_t i) const {
     const double most = cones[i].bound * (head(i) ? f[first[i]] : 1.0),
-                 rounding = parameters.none * f.cwiseAbs().maxCoeff();
+                 rounding = parameters.rounding * f.cwiseAbs().maxCoeff();
     return tail_of(f, i).norm() >= most * (1.0 - parameters.limit_rounding) - rounding;
 }
 
@@ -176,7 +176,7 @@ bool RestingProblem::hold(ConeComplementarity& solver) {
 
 bool RestingProblem::solve_cones(bool warm, bool& shared) {
     ConeComplementarity solver;
-    for (int round = 0; round < parameters.most_releases; ++round) {
+    for (int round = 0; round < parameters.max_releases; ++round) {
         const bool solved = solver.solve(W, w0, cones, warm || round > 0, f) == ConeStatus::solved;
         if (round == 0 && !warm && (!solved || moves())) {
             const bool another =
@@ -201,7 +201,7 @@ bool RestingProblem::alternate(const VecX& free) {
         const VecX before = f;
         w0 = free + dragging * before;
         if (!solve_cones(true, shared)) return false;
-        if ((dragging * (f - before)).cwiseAbs().maxCoeff() <= parameters.load_change_tol * acceleration_scale())
+        if ((dragging * (f - before)).cwiseAbs().maxCoeff() <= parameters.load_tolerance * acceleration_scale())
             return true;
     }
     return false;
@@ -213,8 +213,8 @@ void RestingProblem::read(RestingMotion& out) const {
         const int e = rows.element(i);
         if (i < rows.gaps.size()) {
             const int gap = rows.gaps[i];
-            out.closed[gap] = a[first[i]] <= parameters.none * acceleration_scale();
-            out.loaded[gap] = out.closed[gap] && f[first[i]] > parameters.none * f.cwiseAbs().maxCoeff();
+            out.closed[gap] = a[first[i]] <= parameters.rounding * acceleration_scale();
+            out.loaded[gap] = out.closed[gap] && f[first[i]] > parameters.rounding * f.cwiseAbs().maxCoeff();
             if (e < 0 || !out.closed[gap]) continue;
             if (slides[i]) {
                 const Vec3 u = slip_velocity(w.now, p.frictions[e]);
@@ -228,10 +228,10 @@ void RestingProblem::read(RestingMotion& out) const {
         for (int k = 0; k < tail(i); ++k) out.friction[e][k] = friction[k];
         if (tail(i) == 0 || !at_its_limit(i) || !(slip.norm() > slip_rounding(i))) continue;
         // At a slow slip onset the force defines the direction more accurately than the acceleration.
-        const bool tells = friction.norm() > parameters.none * f.cwiseAbs().maxCoeff();
-        const VecX way = tells ? VecX(-friction.normalized()) : VecX(slip.normalized());
-        for (int k = 0; k < slip.size(); ++k) out.direction[e][k] = way[k];
-        out.modes[e] = p.frictions[e].dim > 1 || way[0] > 0.0 ? slip_plus : slip_minus;
+        const bool by_force = friction.norm() > parameters.rounding * f.cwiseAbs().maxCoeff();
+        const VecX direction = by_force ? VecX(-friction.normalized()) : VecX(slip.normalized());
+        for (int k = 0; k < slip.size(); ++k) out.direction[e][k] = direction[k];
+        out.modes[e] = p.frictions[e].dim > 1 || direction[0] > 0.0 ? slip_plus : slip_minus;
     }
 }
 

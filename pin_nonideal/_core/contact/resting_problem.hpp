@@ -23,30 +23,30 @@ struct RestingMotion {
 
     bool slides() const;  // some contact slips or begins to slip
     // Set the modes of elements at rest and their slip directions at onset. An initial guess sets its friction only.
-    void answer(const Program& p, Workspace& w, ModeQuestion& question) const;
+    void to_modes(const Program& p, Workspace& w, ModeQuery& query) const;
 };
 
-struct ClosingQuestion {
+struct OnsetQuery {
     std::vector<char> rest;     // contacts at rest on each other
     int opening_gap = -1;  // contact of `rest` whose load just reached zero
     int arrived_element = -1;  // element that just came to rest or reached its limit
-    std::vector<int> breaking;  // elements that stuck and just reached their limit: they slip
+    std::vector<int> at_limit;  // elements that stuck and just reached their limit: they slip
     bool prescribed = false;    // the caller sets the modes
     bool after_impact = false;  // after an impact the velocity decides if a sticking element slips
 };
-// Check if an element rests in the question, with the run state before it.
-bool is_at_rest(const Program& p, const Workspace& w, const VecX& v, const ClosingQuestion& question,
+// Check if an element rests under the query, with the run state before it.
+bool is_at_rest(const Program& p, const Workspace& w, const VecX& v, const OnsetQuery& query,
                 const RunState& before, int element);
 
 struct RestingProblemParameters {
-    double none = 1e-12;                  // rounding relative to the scale of accelerations
+    double rounding = 1e-12;              // rounding relative to the scale of accelerations
     double common_slip_rounding = 1e-14;  // rounding of a slip without own terms, relative to all accelerations
     double min_other_motion = 1e-6;       // motion that differs from rest, relative to the scale of accelerations
     double limit_rounding = 1e-9;         // rounding relative to the limit of a force
-    double breaking_by = 1e-6;            // relative reduction of the limit of elements that just reached it
-    int most_releases = 4;                // rounds that set kinetic limits of slipping contacts
+    double at_limit_reduction = 1e-6;     // relative reduction of the limit of elements that just reached it
+    int max_releases = 4;                 // rounds that set kinetic limits of slipping contacts
     int max_load_iterations = 100;        // maximum iterations of loads and their friction
-    double load_change_tol = 1e-13;       // rounding of the loads' change, relative to the largest acceleration
+    double load_tolerance = 1e-13;        // rounding of the loads' change, relative to the largest acceleration
 };
 
 class RestingProblem {
@@ -59,7 +59,7 @@ public:
     // Set up the problem of the closed contacts `gaps` and of other friction elements at rest. The workspace must hold
     // the motion without their forces.
     RestingProblem(const Program& program, Workspace& workspace, const VecX& velocity, const std::vector<int>& gaps,
-                   const std::vector<int>& others, const ClosingQuestion& asked, const RunState& state);
+                   const std::vector<int>& others, const OnsetQuery& onset_query, const RunState& state);
 
     // Solve for the forces. Return false if no motion was found. `shared`: contacts are hyperstatic.
     bool solve(bool& shared);
@@ -92,7 +92,7 @@ private:
     const Program& p;
     Workspace& w;
     const VecX& v;
-    const ClosingQuestion& question;
+    const OnsetQuery& query;
     const RunState& before;
     ContactRows rows;
     std::vector<char> slides;            // contacts with a known slip direction

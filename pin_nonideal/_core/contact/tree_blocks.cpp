@@ -5,7 +5,7 @@
 namespace pn {
 
 // Ratio of the pivots of one tree beyond which the forces on its bodies lose too many digits.
-constexpr double most_pivot_ratio = 1e6;
+constexpr double max_pivot_ratio = 1e6;
 
 TreeBlocks::TreeBlocks(const Program& p) : size_(p.mechanism.nv, 0), node_(p.mechanism.nv, -1) {
     const Mechanism& m = p.mechanism;
@@ -26,7 +26,7 @@ TreeBlocks::TreeBlocks(const Program& p) : size_(p.mechanism.nv, 0), node_(p.mec
 // Check the ratio of the pivots of a tree. Pivots of different trees may differ by any factor.
 bool TreeBlocks::is_well_conditioned(const Workspace& w, int root) const {
     const auto pivots = w.now.terms.D.segment(root, size_[root]);
-    return pivots.maxCoeff() <= most_pivot_ratio * pivots.minCoeff();
+    return pivots.maxCoeff() <= max_pivot_ratio * pivots.minCoeff();
 }
 
 int TreeBlocks::node_of(const Program& p, const Workspace& w, int root, BlockProblem& problem) {

@@ -42,7 +42,7 @@ void require_closed(const Program& p, const Workspace& w, double t) {
     const double allowed = max_projected_gap * scene_size(p, w);
     double largest = 0.0;
     int worst = -1;
-    for (int i : w.now.awake) {
+    for (int i : w.now.active_blocks) {
         const double gap = i < p.constraints ? opening(p, w, i, allowed) : 0.0;
         if (gap == 0.0 || gap < largest) continue;
         largest = gap;

@@ -23,15 +23,15 @@ static void factor_mass(const Program& p, Workspace& w, double t) {
 void evaluate_residuals(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
     place_bodies(p.mechanism, w.now.terms, q, p.constrained_joints, p.constrained_angles);
     const State state{p.mechanism, w.now.terms, w.now.row_time(t), w.now.terms.q, v};
-    for (int i : w.now.awake)
+    for (int i : w.now.active_blocks)
         if (i < p.constraints) evaluate(p.blocks[i].kind, state, Part::residual, w.now.values[i]);
 }
 
 // Compute residuals and A, Eq. (3), and users' own b.
 void place_rows(const Program& p, Workspace& w, double t, const VecX& v) {
-    if (w.now.awake.empty()) return;
+    if (w.now.active_blocks.empty()) return;
     const State state{p.mechanism, w.now.terms, w.now.row_time(t), w.now.terms.q, v};
-    for (int i : w.now.awake) {
+    for (int i : w.now.active_blocks) {
         const Block& block = p.blocks[i];
         RowValues& values = w.now.values[i];
         evaluate(block.kind, state, Part::place, values);
@@ -43,14 +43,14 @@ void place_rows(const Program& p, Workspace& w, double t, const VecX& v) {
 
 // Compute rates and b, Eq. (3).
 static void move_rows(const Program& p, Workspace& w, double t, const VecX& v) {
-    if (w.now.awake.empty()) return;
+    if (w.now.active_blocks.empty()) return;
     const State state{p.mechanism, w.now.terms, w.now.row_time(t), w.now.terms.q, v};
-    for (int i : w.now.awake) {
+    for (int i : w.now.active_blocks) {
         const Block& block = p.blocks[i];
         RowValues& values = w.now.values[i];
         evaluate(block.kind, state, Part::motion, values);
         for (size_t k = 0; k < block.kept.size(); ++k)
-            w.now.b[block.row + k] = w.now.frozen ? 0.0 : -values.drift[block.kept[k]];  // Eq. (3)
+            w.now.b[block.row + k] = w.now.frozen ? 0.0 : -values.bias[block.kept[k]];  // Eq. (3)
     }
 }
 
@@ -106,7 +106,7 @@ static void place_wrenches(const Program& p, Workspace& w) {
 }
 
 void assemble_forces(const Program& p, Workspace& w, double t, const VecX& v) {
-    if (++w.counters.evaluations % evaluation_parameters.evaluations_a_watch == 0 && w.watch) w.watch(t);
+    if (++w.counters.evaluations % evaluation_parameters.evaluations_per_watch == 0 && w.watch) w.watch(t);
     move_bodies(p.mechanism, w.now.terms, v);
     bias_forces(p.mechanism, w.now.terms);
     w.now.F = -w.now.terms.nle;
@@ -122,7 +122,7 @@ void assemble_forces(const Program& p, Workspace& w, double t, const VecX& v) {
 // Check if closed contacts balance the load. The acceleration a is then rounding: M a is below the rounding of the
 // summed forces.
 static bool is_balanced(const Program& p, Workspace& w) {
-    if (w.now.touching.empty() || p.moves_in_time) return false;
+    if (w.now.closed_gaps.empty() || p.moves_in_time) return false;
     if (w.now.a.cwiseAbs().maxCoeff() <= evaluation_parameters.balance_rounding * p.mechanism.gravity.norm()) return true;
     VecX &left = w.scratch.work, &size = w.scratch.trial;
     multiply_M(p.mechanism, w.now.terms, w.now.a, left);
@@ -137,7 +137,7 @@ static bool is_balanced(const Program& p, Workspace& w) {
 }
 
 // Set the results of the laws if no law acts.
-static void leave_laws(Workspace& w) {
+static void reset_laws(Workspace& w) {
     std::fill_n(w.now.C.data(), w.now.C.size(), 0.0);
     std::fill_n(w.now.C_smooth.data(), w.now.C_smooth.size(), 0.0);
     w.now.determinant = 1.0;
@@ -152,7 +152,7 @@ void solve_dynamics(const Program& p, Workspace& w, double t, const VecX& v) {
     }
     if (!laws_act(p, w)) {
         solve_motion(p, w, false);
-        if (p.has_laws()) leave_laws(w);
+        if (p.has_laws()) reset_laws(w);
     } else {
         find_known_forces(p, w, t, w.now.terms.q, v);
         solve_with_laws(p, w, t, w.now.terms.q, v, w.now.C_smooth);

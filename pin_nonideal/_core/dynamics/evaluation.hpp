@@ -16,7 +16,7 @@ struct EvaluationParameters {
     // Rounding of a sum, relative to the sum of the magnitudes of its terms.
     double residual_sum_rounding = 1e-13;
     // Evaluations between two checks of signals and wall time. One evaluation of a large scene takes milliseconds.
-    long evaluations_a_watch = 16;
+    long evaluations_per_watch = 16;
 };
 
 inline constexpr EvaluationParameters evaluation_parameters{};

@@ -1,7 +1,10 @@
 // Reason why an evaluation or a run failed. The bindings convert it to the exceptions of the package.
 #pragma once
 
+#include <algorithm>
 #include <exception>
+#include <initializer_list>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -19,15 +22,39 @@ struct Failure : std::exception {
     std::vector<int> elements;  // dofs, blocks or frictions, depending on the kind
     double value = 0.0;         // residual, gap, determinant, rate or number of steps
     // Solutions of a paradox. Two of several solutions are stored: limits of the elements, and accelerations.
-    enum class Solutions { not_told, none, several } solutions = Solutions::not_told;
+    enum class Solutions { unproven, none, several } solutions = Solutions::unproven;
     std::vector<VecX> limits, accelerations;
     Failure(Kind k, double t, std::vector<int> e = {}, double x = 0.0)
         : kind(k), time(t), elements(std::move(e)), value(x) {}
 };
 
-// Failure that ends a run whatever the search in which it occurs. No search may catch it.
+// Failure that ends a run whatever the search in which it occurs: an interrupt, or the limit of the wall time.
 struct EndOfRun {
     Failure failure;
 };
+
+// Call act() and return its failure, if any. Searches test this status. Only whole runs and the bindings catch failures.
+// An EndOfRun passes through.
+template <class Act>
+std::optional<Failure> attempt(const Act& act) {
+    try {
+        act();
+    } catch (const Failure& failure) {
+        return failure;
+    }
+    return std::nullopt;
+}
+
+// Do the same for failures of these kinds. Other failures pass through.
+template <class Act>
+std::optional<Failure> attempt(std::initializer_list<Failure::Kind> kinds, const Act& act) {
+    try {
+        act();
+    } catch (const Failure& failure) {
+        if (std::find(kinds.begin(), kinds.end(), failure.kind) == kinds.end()) throw;
+        return failure;
+    }
+    return std::nullopt;
+}
 
 }  // namespace pn

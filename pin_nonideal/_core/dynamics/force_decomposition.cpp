@@ -17,7 +17,7 @@ IdealMotion::IdealMotion(const Program& program, Workspace& workspace) : p(progr
         w.now.rows.refine = own.refine;
         if (!w.state.has_ideal_row_choice) {
             for (int r = 0; r < p.layout.rows; ++r) w.now.rows.required[r] = own.required[r] && r < p.constraint_rows();
-            w.now.rows.use_required(p.layout, p.blocks, w.now.awake);
+            w.now.rows.use_required(p.layout, p.blocks, w.now.active_blocks);
         }
         if (!w.now.rows.blocks.empty()) {
             scale_rows(p, w);

@@ -133,7 +133,7 @@ double limit_at_hand(const Program& p, Workspace& w, int e, double t, const VecX
     return limits.bounding(p.frictions[e].dim == 1 ? friction_force(p, w, e)[0] : 0.0);
 }
 
-void forget_slip_directions(Workspace& w) {
+void reset_slip_directions(Workspace& w) {
     std::fill(w.state.slip_direction.begin(), w.state.slip_direction.end(), Vec3::Zero());
 }
 
@@ -141,7 +141,7 @@ void forget_slip_directions(Workspace& w) {
 static Vec3 force_direction(const Program& p, Workspace& w, int e) {
     const Friction& f = p.frictions[e];
     if (f.dim == 1) return Vec3(-w.state.mode[e], 0.0, 0.0);
-    if (w.state.seeks_directions) return -w.state.last_direction[e];
+    if (w.state.solves_directions) return -w.state.last_direction[e];
     const Vec3 u = slip_velocity(w.now, f);
     const double speed = u.norm();
     if (speed > min_directed_speed * (1.0 + w.now.speed))
@@ -163,9 +163,9 @@ static PN_INLINE void add_force_of_slip(const Program& p, Workspace& w, int e, V
 
 void add_slip_force(const Program& p, Workspace& w, int e, VecX& C) { add_force_of_slip(p, w, e, C); }
 
-void add_slip_forces(const Program& p, Workspace& w, bool loaded, VecX& C) {
+void add_slip_forces(const Program& p, Workspace& w, bool load_dependent, VecX& C) {
     for (int e : w.now.slipping)
-        if ((p.frictions[e].reaction != Reaction::none) == loaded) add_force_of_slip(p, w, e, C);
+        if ((p.frictions[e].reaction != Reaction::none) == load_dependent) add_force_of_slip(p, w, e, C);
 }
 
 }  // namespace pn

@@ -33,7 +33,7 @@ SlipLimits static_limits(const Program& p, Workspace& w, int element, double t, 
 
 // Clear the slip directions of the step's start: states between the ends of a step, which contain no reversal, set
 // their own.
-void forget_slip_directions(Workspace& w);
+void reset_slip_directions(Workspace& w);
 // Friction force of an element in the last evaluation: the multiplier if it sticks, else the force of its law.
 Vec3 friction_force(const Program& p, Workspace& w, int element);
 // Force of a sticking element relative to the middle of its limits, and the maximum of its magnitude.
@@ -46,8 +46,8 @@ HoldingForce holding_force(const Program& p, Workspace& w, int element, double t
 // Nearest bound of the friction force of a sticking element, limit of a slipping element, zero without load.
 double limit_at_hand(const Program& p, Workspace& w, int element, double t, const VecX& q, const VecX& v);
 // Add the force of a slipping element, for the limit in the workspace, to a generalized force. add_slip_forces adds the
-// forces of all slipping elements, with (`loaded`) or without a load from reactions.
+// forces of all slipping elements, with (`load_dependent`) or without a load from reactions.
 void add_slip_force(const Program& p, Workspace& w, int element, VecX& C);
-void add_slip_forces(const Program& p, Workspace& w, bool loaded, VecX& C);
+void add_slip_forces(const Program& p, Workspace& w, bool load_dependent, VecX& C);
 
 }  // namespace pn

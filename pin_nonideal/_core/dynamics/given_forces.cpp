@@ -104,7 +104,7 @@ struct Torque {
 
 }  // namespace
 
-void asked_torque(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, VecX& tau) {
+void demanded_torque(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, VecX& tau) {
     if (w.now.has_override) {
         tau = w.now.override_torque;
         return;
@@ -114,8 +114,8 @@ void asked_torque(const Program& p, Workspace& w, double t, const VecX& q, const
 }
 
 void given_forces(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
-    asked_torque(p, w, t, q, v, w.now.tau);
-    if (p.limits_effort()) w.now.tau = w.now.tau.cwiseMax(p.least_effort).cwiseMin(p.most_effort);
+    demanded_torque(p, w, t, q, v, w.now.tau);
+    if (p.limits_effort()) w.now.tau = w.now.tau.cwiseMax(p.min_effort).cwiseMin(p.max_effort);
     w.now.external.setZero();
     w.now.joint_external.setZero();
     if (p.forces.empty()) return;

@@ -6,7 +6,7 @@
 namespace pn {
 
 // Compute the commanded torques of the actuators, before effort limits.
-void asked_torque(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, VecX& tau);
+void demanded_torque(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, VecX& tau);
 // Compute the given forces and the torques within effort limits: w.now.external and w.now.tau.
 void given_forces(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 

@@ -20,7 +20,7 @@ struct Implicit : Unknowns {
         const RunState& state = w.state;
         // the proof has already failed
         if (state.unique == Uniqueness::not_shown) return state.steps_since == undecided_steps;
-        return state.steps_since >= (state.growth < implicit_friction_parameters.safe_growth
+        return state.steps_since >= (state.spectral_bound < implicit_friction_parameters.safe_growth
                                          ? std::max(n, implicit_friction_parameters.kept_steps)
                                          : 1);
     }
@@ -28,13 +28,13 @@ struct Implicit : Unknowns {
     // Check if the equation contracts near its solution y. If so, restore the motion of y.
     bool contracts(const VecX& y) {
         ReactionEquation& arrays = w.scratch.equation;
-        const FrozenZeroLoads piece(p, w);
+        const FrozenZeroLoads frozen(p, w);
         equation(y, arrays);
         if (!arrays.finite()) throw Failure(Failure::Kind::not_finite, t);
         arrays.steepest(w.scratch.jacobian);
-        const double bound = growth(w.scratch.jacobian);
-        if (!(bound < 1.0 - uniqueness_parameters.least_determinant)) return false;
-        w.state.growth = bound;
+        const double bound = spectral_bound(w.scratch.jacobian);
+        if (!(bound < 1.0 - uniqueness_parameters.min_determinant)) return false;
+        w.state.spectral_bound = bound;
         w.state.steps_since = 0;
         w.state.unique = shares_contact_loads(p, w) ? Uniqueness::not_shown : Uniqueness::shown;
         set(y);
@@ -42,39 +42,44 @@ struct Implicit : Unknowns {
         return true;
     }
 
-    // Solve for one zero-load set after the other until a solution is consistent with its own set. The step to another
-    // solution is damped until the error decreases, because two sets could alternate forever.
-    void solve_pieces(VecX& y) {
+    // Solve for one zero-load set after the other until a solution is consistent with its own set. Other sets are searched
+    // if none is found, or if a set has no solution.
+    void solve_zero_load_sets(VecX& y) {
         VecX g(n);
         const VecX start = y;
-        try {
-            image(y, g);
-            double error = (g - y).norm();
-            for (int turn = 0; turn < implicit_friction_parameters.max_zero_load_sets; ++turn) {
-                const VecX from = y;
-                {
-                    const FrozenZeroLoads piece(p, w);
-                    solve_bearings(y);
-                }
-                if (is_motion(y)) return;
-                if (!approach(from, error, y, g)) break;
-            }
-        } catch (const Failure& failure) {
-            if (failure.kind != Failure::Kind::paradox || failure.solutions == Failure::Solutions::several) throw;
-            decide_over_pieces(*this, start, y, failure);
-            image(y, g);
-            return;
-        }
-        decide_over_pieces(*this, start, y, Failure(Failure::Kind::not_converged, t, elements()));
+        bool is_consistent = false;
+        const auto failure =
+            attempt({Failure::Kind::paradox}, [&] { is_consistent = alternate_zero_load_sets(y, g); });
+        if (is_consistent) return;
+        if (failure && failure->solutions == Failure::Solutions::several) throw *failure;
+        decide_over_zero_load_sets(*this, start, y,
+                                   failure.value_or(Failure(Failure::Kind::not_converged, t, elements())));
         image(y, g);
+    }
+
+    // Return false if no solution is consistent with its own set. The step to another solution is damped until the error
+    // decreases, because two sets could alternate forever.
+    bool alternate_zero_load_sets(VecX& y, VecX& g) {
+        image(y, g);
+        double error = (g - y).norm();
+        for (int turn = 0; turn < implicit_friction_parameters.max_zero_load_sets; ++turn) {
+            const VecX from = y;
+            {
+                const FrozenZeroLoads frozen(p, w);
+                solve_bearings(y);
+            }
+            if (is_motion(y)) return true;
+            if (!backtrack(from, error, y, g)) break;
+        }
+        return false;
     }
 
     // Backtrack from y toward `from` until the error is smaller than before. Return false if no point has a smaller
     // error.
-    bool approach(const VecX& from, double& error, VecX& y, VecX& g) {
-        const VecX way = y - from;
+    bool backtrack(const VecX& from, double& error, VecX& y, VecX& g) {
+        const VecX step = y - from;
         for (double part = 1.0; part >= implicit_friction_parameters.min_zero_load_step; part *= 0.5) {
-            y = from + part * way;
+            y = from + part * step;
             image(y, g);
             const double there = (g - y).norm();
             if (!(there < (1.0 - implicit_friction_parameters.min_error_gain * part) * error)) continue;
@@ -93,7 +98,7 @@ struct Implicit : Unknowns {
         VecX& before = w.scratch.before;
         before = y;
         const bool solved = newton.solve(arrays, y);
-        const bool regular = solved && newton.factorize(arrays, y) > uniqueness_parameters.least_determinant;
+        const bool regular = solved && newton.factorize(arrays, y) > uniqueness_parameters.min_determinant;
         if (!regular || is_due()) decide(*this, arrays, before, y, solved);
         w.now.determinant = newton.factorize(arrays, y);
         double last = std::numeric_limits<double>::infinity();
@@ -132,7 +137,7 @@ struct Implicit : Unknowns {
             if (!step.allFinite()) throw Failure(Failure::Kind::paradox, t, elements(), 0.0);
             y += step;
         }
-        w.now.determinant = least_determinant(*this, J);
+        w.now.determinant = min_determinant(*this, J);
         throw Failure(Failure::Kind::paradox, t, elements(), w.now.determinant);
     }
 
@@ -184,7 +189,7 @@ struct Implicit : Unknowns {
         if (!iterate() || (bearings && is_due() && !contracts(y))) {
             VecX& solution = w.scratch.solution;
             solution = y.head(n);
-            if (bearings && shares_contact_loads(p, w)) solve_pieces(solution);
+            if (bearings && shares_contact_loads(p, w)) solve_zero_load_sets(solution);
             else if (bearings) solve_bearings(solution);
             else solve_laws(solution);
             y.head(n) = solution;
@@ -199,15 +204,15 @@ struct Implicit : Unknowns {
 
 // Compute loads from the ideal motion, as in Example (c) of the paper. The laws with these loads are then known.
 static void ideal_loads(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
-    bool asked = false;
-    for (const Friction& f : p.frictions) asked |= f.reaction == Reaction::ideal;
-    each_law<UserLaw>(p.laws, [&](const UserLaw& law) { asked |= law.reaction == Reaction::ideal; });
-    if (!asked) return;
+    bool has_ideal_reaction = false;
+    for (const Friction& f : p.frictions) has_ideal_reaction |= f.reaction == Reaction::ideal;
+    each_law<UserLaw>(p.laws, [&](const UserLaw& law) { has_ideal_reaction |= law.reaction == Reaction::ideal; });
+    if (!has_ideal_reaction) return;
     const IdealMotion motion(p, w);
     for (size_t e = 0; e < p.frictions.size(); ++e)
         if (p.frictions[e].reaction == Reaction::ideal) update_limit(p, w, e, t, q, v);
     each_law<UserLaw>(p.laws, [&](const UserLaw& law) {
-        if (law.reaction == Reaction::ideal) w.now.base_C += ask(p, law, w, t, q, v);
+        if (law.reaction == Reaction::ideal) w.now.base_C += user_law_force(p, law, w, t, q, v);
     });
 }
 

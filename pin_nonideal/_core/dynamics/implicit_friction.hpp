@@ -30,7 +30,7 @@ inline constexpr ImplicitFrictionParameters implicit_friction_parameters{};
 
 // Check if any law acts. Friction of contacts does not act if all contacts are open.
 inline bool laws_act(const Program& p, const Workspace& w) {
-    return p.has_laws() && (!p.has_contact_friction_only || !w.now.touching.empty());
+    return p.has_laws() && (!p.has_contact_friction_only || !w.now.closed_gaps.empty());
 }
 
 // Compute C of all laws that read no reactions, including slipping friction of constant limits: w.now.C_smooth.

@@ -65,7 +65,7 @@ LawState law_state(const Workspace& w, const VecX& v) {
 
 }  // namespace
 
-const VecX& ask(const Program& p, const UserLaw& law, Workspace& w, double t, const VecX& q, const VecX& v) {
+const VecX& user_law_force(const Program& p, const UserLaw& law, Workspace& w, double t, const VecX& q, const VecX& v) {
     VecX& C = w.now.user_C[law.index];
     law.function(p, t, q, v, w, C, w.state.z.data() + law.state, w.now.dz.data() + law.state);
     return C;
@@ -74,7 +74,7 @@ const VecX& ask(const Program& p, const UserLaw& law, Workspace& w, double t, co
 void add_smooth_forces(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, VecX& C) {
     if (p.user_laws > 0)
         each_law<UserLaw>(p.laws, [&](const UserLaw& law) {
-            if (law.reaction == Reaction::none) ask(p, law, w, t, q, v);
+            if (law.reaction == Reaction::none) user_law_force(p, law, w, t, q, v);
         });
     GeneralizedForce sink{p, w.now, C, &w.now.dz};
     const LawState state = law_state(w, v);

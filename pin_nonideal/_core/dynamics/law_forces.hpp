@@ -6,7 +6,7 @@
 namespace pn {
 
 // Evaluate the force of a user's law for the reactions in the workspace. Store it in w.now.user_C and return it.
-const VecX& ask(const Program& p, const UserLaw& law, Workspace& w, double t, const VecX& q, const VecX& v);
+const VecX& user_law_force(const Program& p, const UserLaw& law, Workspace& w, double t, const VecX& q, const VecX& v);
 // Add C of each law that does not read reactions.
 void add_smooth_forces(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, VecX& C);
 // Dofs on which each law can act in any configuration, ascending.

@@ -80,7 +80,7 @@ static void find_alike(Program& p) {
     std::map<std::vector<double>, int> first;
     for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
         const GapNumbers of(p, p.gaps[i]);
-        p.gaps[i].alike = of.is_known() ? first.emplace(of.numbers(), i).first->second : i;
+        p.gaps[i].same_geometry_as = of.is_known() ? first.emplace(of.numbers(), i).first->second : i;
     }
 }
 
@@ -164,11 +164,11 @@ void Program::finish() {
     for (const Angle& angle : mechanism.angles)
         if (constrained[angle.joint]) constrained_angles.push_back(angle);
     driven = !forces.empty() || !std::holds_alternative<NoActuation>(actuation);
-    asks_functions = std::holds_alternative<TorqueFunction>(actuation) || user_laws > 0 || moves_in_time;
-    for (const Friction& f : frictions) asks_functions |= f.user_limit != nullptr;
+    calls_functions = std::holds_alternative<TorqueFunction>(actuation) || user_laws > 0 || moves_in_time;
+    for (const Friction& f : frictions) calls_functions |= f.user_limit != nullptr;
     for (const GivenForce& each : forces)
         std::visit([&](const auto& f) {
-            asks_functions |= f.asks_function();
+            calls_functions |= f.calls_function();
             has_body_forces |= f.acts_on_bodies;
         }, each);
 }

@@ -19,7 +19,7 @@ struct Gap {
     double restitution = 0.0;
     std::vector<int> elements;  // friction elements of the contact
     int sliding = -1;           // sliding element along the contact plane, with forces in Coulomb's cone
-    int alike = -1;             // first gap with the same geometry, or the gap itself
+    int same_geometry_as = -1;  // first gap with the same geometry, or the gap itself
 };
 
 // Meaning of the restitution e of a contact in an impact: ratio of gap rates (Newton) or of impulses (Poisson).
@@ -58,27 +58,27 @@ struct Program {
 
     std::vector<GivenForce> forces;
     Actuation actuation;
-    TorqueTable added_torque;            // torques in addition to a sampled control; no times if there are none
-    VecX least_effort, most_effort;      // limits of the actuators, by dof (empty if unlimited)
+    TorqueTable added_torque;     // torques in addition to a sampled control; no times if there are none
+    VecX min_effort, max_effort;  // limits of the actuators, by dof (empty if unlimited)
 
     // Flags that skip computations that the scene does not need.
     bool has_laws() const { return !frictions.empty() || !laws.empty(); }
-    bool limits_effort() const { return least_effort.size() > 0; }
+    bool limits_effort() const { return min_effort.size() > 0; }
     // Return the actuation torques that are linear between times, null if there are none.
     const TorqueTable* torque_table() const {
         return added_torque.times.empty() ? std::get_if<TorqueTable>(&actuation) : &added_torque;
     }
     bool needs_reactions = false;        // some law reads them
     bool has_contact_friction_only = false;      // the only laws are frictions of unilateral contacts
-    bool driven = false;                 // forces or actuation
-    bool has_body_forces = false;        // given forces that act on bodies
-    bool moves_in_time = false;          // some constraint depends on time
-    bool driven_exactly = false;         // some constraint does, and all rates are exact derivatives, not differences
-    std::vector<double> breaks;          // known break times of the functions of time, ascending
-    bool searches_breaks = false;        // some user function of time does not declare its breaks
-    bool asks_functions = false;         // user functions may change the forces while nothing moves
-    bool has_user_rows = false;          // some rows come from user functions, A and b together
-    bool affine_rates = true;            // the rate of every row is A(q, t) v + phi_t
+    bool driven = false;           // forces or actuation
+    bool has_body_forces = false;  // given forces that act on bodies
+    bool moves_in_time = false;    // some constraint depends on time
+    bool driven_exactly = false;   // some constraint does, and all rates are exact derivatives, not differences
+    std::vector<double> breaks;    // known break times of the functions of time, ascending
+    bool searches_breaks = false;  // some user function of time does not declare its breaks
+    bool calls_functions = false;  // user functions may change the forces while nothing moves
+    bool has_user_rows = false;    // some rows come from user functions, A and b together
+    bool affine_rates = true;      // the rate of every row is A(q, t) v + phi_t
     std::vector<int> constrained_joints;     // joints whose bodies the constraints tie, and their ancestors in the tree
     std::vector<Angle> constrained_angles;   // of these joints
     std::vector<int> constrained_dofs;       // in the supports of the rows, ascending

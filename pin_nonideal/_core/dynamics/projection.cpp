@@ -140,13 +140,13 @@ static double velocity_floor(const Workspace& w, const VecX& v) {
 }
 
 // Reset the multipliers of the closing move. Open contacts have rows here too, so unneeded writes are skipped.
-static void forget_closing(Workspace& w) {
+static void reset_closing(Workspace& w) {
     if (w.now.has_closing) w.now.closing_lam.setZero();
     w.now.has_closing = false;
 }
 
 bool is_on_constraints(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
-    forget_closing(w);
+    reset_closing(w);
     if (p.constraints == 0) return true;
     evaluate_residuals(p, w, t, q, v);
     if (gather_residuals(p, w) > position_floor(p, w)) return false;
@@ -157,7 +157,7 @@ bool is_on_constraints(const Program& p, Workspace& w, double t, const VecX& q, 
 
 bool project_position(const Program& p, Workspace& w, double t, VecX& q, const VecX& v, bool configured,
                       bool keeps_factors) {
-    forget_closing(w);
+    reset_closing(w);
     double largest = 0.0, floor = 0.0;
     if (!w.now.rows.blocks.empty()) {
         if (!configured) evaluate_residuals(p, w, t, q, v);
@@ -169,7 +169,7 @@ bool project_position(const Program& p, Workspace& w, double t, VecX& q, const V
     configured &= !moves;
     int count = 0;      // steps since the factors were taken
     double rate = 1.0;  // ratio of the largest residuals of the last two steps
-    for (int it = 0; it < projection_limit && largest > floor; ++it) {
+    for (int it = 0; it < max_projection_iterations && largest > floor; ++it) {
         if (count == 0) {
             w.scratch.position_start = q;
             w.scratch.position_lam.setZero();
@@ -230,7 +230,7 @@ static void stop_locked(const Program& p, const Workspace& w, VecX& v) {
 bool keeps_to_rows(const Program& p, Workspace& w, double t, const VecX& q, VecX& v) {
     stop_locked(p, w, v);
     if (w.now.rows.blocks.empty()) return true;
-    forget_closing(w);
+    reset_closing(w);
     const double fastest = v.cwiseAbs().maxCoeff();
     if (!p.affine_rates || fastest > projection_parameters.slow_speed) return false;
     // The check for immobility needs the independent rows, so projection decides it.
@@ -250,7 +250,7 @@ bool project_velocity(const Program& p, Workspace& w, double t, VecX& v) {
     double last = gather_rates(p, w, t, v);
     w.now.projected_rate = std::max(w.now.projected_rate, last / std::max(floor, projection_parameters.no_floor));
     bool moved = false;
-    for (int it = 0; it < projection_limit && last > floor; ++it) {
+    for (int it = 0; it < max_projection_iterations && last > floor; ++it) {
         least_move(p, w, w.scratch.scaled);
         v += w.scratch.scaled;
         moved = true;

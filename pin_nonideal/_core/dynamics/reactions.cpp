@@ -64,7 +64,7 @@ static void sweep_tree(const Mechanism& m, const Evaluation& now, Reactions& r) 
 }
 
 // Maximum number of load-sharing contacts for which all zero-load sets are tried.
-static constexpr size_t most_sharing = 6;
+static constexpr size_t max_sharing_contacts = 6;
 
 // If the minimum-norm multipliers need tension in a contact, replace them by the minimum-norm ones without tension. If
 // none exist, minimize the tension.
@@ -80,7 +80,7 @@ static void press_all(const Program& p, Workspace& w, Reactions& r) {
     }
     r.loads_are_feasible = true;
     if (!r.is_zero_load_set_frozen) {
-        r.unloaded.assign(p.gaps.size(), 0);
+        r.has_zero_load.assign(p.gaps.size(), 0);
         if (!pulls) return;
     }
     const MatX& free = free_multipliers(p.blocks, now.B, p.described, w.now.rows);
@@ -92,7 +92,7 @@ static void press_all(const Program& p, Workspace& w, Reactions& r) {
         Z.row(k) = free.row(row);
         if (!(Z.row(k).norm() > min_null_space_entry)) Z.row(k).setZero();
         N[k] = r.lam[row];
-        held[k] = r.unloaded[gaps[k]];
+        held[k] = r.has_zero_load[gaps[k]];
     }
     if (r.is_zero_load_set_frozen) {
         r.lam += free * shortest_with_zeros(Z, N, held);
@@ -102,26 +102,26 @@ static void press_all(const Program& p, Workspace& w, Reactions& r) {
     r.lam += free * found.z;
     r.loads_are_feasible = found.is_feasible;
     for (size_t k = 0; k < gaps.size(); ++k) {
-        r.unloaded[gaps[k]] = found.held[k];
+        r.has_zero_load[gaps[k]] = found.held[k];
         double& load = r.lam[p.blocks[p.gaps[gaps[k]].block].row];
         if (found.is_feasible) load = found.held[k] ? 0.0 : std::max(load, 0.0);
     }
 }
 
-std::vector<std::vector<char>> load_pieces(const Program& p, const Workspace& w) {
+std::vector<std::vector<char>> zero_load_sets(const Program& p, const Workspace& w) {
     std::vector<int> sharing;
     for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i)
         if (w.state.closed[i] && !p.blocks[p.gaps[i].block].kept.empty()) sharing.push_back(i);
-    std::vector<std::vector<char>> pieces;
-    if (sharing.size() > most_sharing) return pieces;
+    std::vector<std::vector<char>> sets;
+    if (sharing.size() > max_sharing_contacts) return sets;
     const size_t free = dependent_rows(w.now.rows).size();
-    for (unsigned piece = 0; piece < 1u << sharing.size(); ++piece) {
+    for (unsigned bits = 0; bits < 1u << sharing.size(); ++bits) {
         // more loads than the null space's dimension vanish only by coincidence
-        if (std::bitset<most_sharing>(piece).count() > free) continue;
-        std::vector<char>& unloaded = pieces.emplace_back(p.gaps.size(), 0);
-        for (size_t k = 0; k < sharing.size(); ++k) unloaded[sharing[k]] = piece >> k & 1;
+        if (std::bitset<max_sharing_contacts>(bits).count() > free) continue;
+        std::vector<char>& has_zero_load = sets.emplace_back(p.gaps.size(), 0);
+        for (size_t k = 0; k < sharing.size(); ++k) has_zero_load[sharing[k]] = bits >> k & 1;
     }
-    return pieces;
+    return sets;
 }
 
 const Reactions& reactions(const Program& p, Workspace& w) {
@@ -209,7 +209,7 @@ Force carried_wrench(const Program& p, Workspace& w, int index) {
     const Body& body = now.terms.body[frame.joint];
     WrenchAbout wrench{now, body.ref + body.p + body.R * frame.p};
     for (int k = 0; k < own.total; ++k) wrench.add(index, k, p.share(own, k, r.lam));
-    for (int e : now.loaded) {
+    for (int e : now.loaded_elements) {
         const Friction& f = p.frictions[e];
         if (f.anchor != index) continue;
         for (int k = 0; k < f.dim; ++k)

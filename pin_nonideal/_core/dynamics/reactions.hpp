@@ -14,7 +14,7 @@ inline bool shares_contact_loads(const Program& p, const Workspace& w) { return 
 
 // List all possible zero-load sets of contacts that share loads: by gap, true if its load is zero. Empty if there are
 // too many sets.
-std::vector<std::vector<char>> load_pieces(const Program& p, const Workspace& w);
+std::vector<std::vector<char>> zero_load_sets(const Program& p, const Workspace& w);
 
 // Freezes the zero-load set of the current motion during its lifetime. Loads are linear in the motion for a fixed set.
 class FrozenZeroLoads {
@@ -26,8 +26,8 @@ public:
         hold(true);
     }
     // Freeze the given set of contacts.
-    FrozenZeroLoads(Workspace& w, const std::vector<char>& unloaded) : r_(w.now.reactions), was_frozen_(false) {
-        r_.unloaded = unloaded;
+    FrozenZeroLoads(Workspace& w, const std::vector<char>& has_zero_load) : r_(w.now.reactions), was_frozen_(false) {
+        r_.has_zero_load = has_zero_load;
         hold(true);
     }
     ~FrozenZeroLoads() {
@@ -49,12 +49,12 @@ private:
 class ReleasedZeroLoads {
 public:
     explicit ReleasedZeroLoads(Workspace& w)
-        : r_(w.now.reactions), was_frozen_(r_.is_zero_load_set_frozen), kept_(r_.unloaded) {
+        : r_(w.now.reactions), was_frozen_(r_.is_zero_load_set_frozen), kept_(r_.has_zero_load) {
         r_.is_zero_load_set_frozen = r_.current = false;
     }
     ~ReleasedZeroLoads() {
         r_.is_zero_load_set_frozen = was_frozen_;
-        if (was_frozen_) r_.unloaded = kept_;
+        if (was_frozen_) r_.has_zero_load = kept_;
         r_.current = false;
     }
     ReleasedZeroLoads(const ReleasedZeroLoads&) = delete;

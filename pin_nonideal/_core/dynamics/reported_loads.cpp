@@ -79,15 +79,15 @@ ReportedLoads::ReportedLoads(const Program& p, Workspace& w) : w_(w) {
     const MatX W = MatX::Identity(n, n) - Q * Q.transpose();  // zero for multipliers that exert no force
     VecX f(n);
     if (!ConeComplementarity().hold(W, -W * of_rows, shares.cones, f)) return;
-    least_norm_ = lam;
+    minimum_norm_ = lam;
     Reactions& r = w.now.reactions;
     for (int k = 0; k < n; ++k) r.lam[shares.rows[k]] = f[k];
     r.swept = false;
 }
 
 ReportedLoads::~ReportedLoads() {
-    if (least_norm_.size() == 0) return;
-    w_.now.reactions.lam = least_norm_;
+    if (minimum_norm_.size() == 0) return;
+    w_.now.reactions.lam = minimum_norm_;
     w_.now.reactions.swept = false;
 }
 

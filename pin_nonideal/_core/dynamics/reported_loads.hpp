@@ -27,7 +27,7 @@ public:
 
 private:
     Workspace& w_;
-    VecX least_norm_;  // empty if the multipliers stayed
+    VecX minimum_norm_;  // empty if the multipliers stayed
 };
 
 }  // namespace pn

@@ -111,12 +111,12 @@ void project_anew(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
     if (!w.now.rows.blocks.empty()) project(p, w, t, q, v);
 }
 
-Closure close(const Program& p, Workspace& w, double t, VecX& q, VecX& v, double far) {
+Closure close(const Program& p, Workspace& w, double t, VecX& q, VecX& v, double max_residual) {
     Closure found;
     update_kinematics(p, w, t, q, v);
     violations(p, w, t, v, found.before, found.rate);
     found.after = found.before;
-    if (!(found.before <= far)) return found;
+    if (!(found.before <= max_residual)) return found;
     project_anew(p, w, t, q, v);
     update_kinematics(p, w, t, q, v);
     violations(p, w, t, v, found.after, found.rate);

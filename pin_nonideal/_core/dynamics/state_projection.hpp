@@ -40,8 +40,9 @@ void choose_rows_near(const Program& p, Workspace& w, double t, VecX& q, const V
 // Project a state without factors from an earlier step. Uses the factors and independent rows at the state itself, with
 // all elements slipping.
 void project_anew(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
-// Do the same unless the largest residual exceeds `far`. Return the residual before and after, and the largest rate.
+// Do the same unless the largest residual exceeds `max_residual`. Return the residual before and after, and the largest
+// rate.
 struct Closure { double before, after, rate; };
-Closure close(const Program& p, Workspace& w, double t, VecX& q, VecX& v, double far);
+Closure close(const Program& p, Workspace& w, double t, VecX& q, VecX& v, double max_residual);
 
 }  // namespace pn

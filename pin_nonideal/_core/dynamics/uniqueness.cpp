@@ -13,7 +13,7 @@ namespace {
 
 using Solutions = Failure::Solutions;
 
-Failure paradox(const Unknowns& u, double determinant, Solutions solutions = Solutions::not_told) {
+Failure paradox(const Unknowns& u, double determinant, Solutions solutions = Solutions::unproven) {
     Failure failure(Failure::Kind::paradox, u.t, u.elements(), determinant);
     failure.solutions = solutions;
     return failure;
@@ -41,7 +41,7 @@ void sort_by_distance(const ReactionEquation& equation, const VecX& start, std::
     for (const VecX& y : roots) size = size.cwiseMax(y);
     size = size.cwiseMax(min_scale);
     const auto rank = [&](const VecX& y) {
-        return std::pair(determinant_at(equation, y) < uniqueness_parameters.least_determinant,
+        return std::pair(determinant_at(equation, y) < uniqueness_parameters.min_determinant,
                          (y - start).cwiseQuotient(size).cwiseAbs().maxCoeff());
     };
     std::sort(roots.begin(), roots.end(), [&](const VecX& y, const VecX& x) { return rank(y) < rank(x); });
@@ -81,7 +81,7 @@ bool holds(Unknowns& u, const VecX& y) {
     u.motion();
     for (int e = 0; e < static_cast<int>(u.p.frictions.size()); ++e)
         if (u.w.state.mode[e] == sticking &&
-            !holding_force(u.p, u.w, e, u.t, u.q, u.v).is_within(uniqueness_parameters.holding_limit_tolerance))
+            !holding_force(u.p, u.w, e, u.t, u.q, u.v).is_within(uniqueness_parameters.limit_rounding))
             return false;
     return true;
 }
@@ -102,14 +102,14 @@ bool pulls(const Unknowns& u, const VecX& y) {
 
 }  // namespace
 
-void decide_over_pieces(Unknowns& u, const VecX& start, VecX& y, const Failure& failure) {
-    const std::vector<std::vector<char>> pieces = load_pieces(u.p, u.w);
-    if (pieces.empty()) throw Failure(Failure::Kind::not_converged, u.t, u.elements());
+void decide_over_zero_load_sets(Unknowns& u, const VecX& start, VecX& y, const Failure& failure) {
+    const std::vector<std::vector<char>> sets = zero_load_sets(u.p, u.w);
+    if (sets.empty()) throw Failure(Failure::Kind::not_converged, u.t, u.elements());
     std::vector<VecX> found;
     ReactionEquation equation;
     bool complete = true;
-    for (const std::vector<char>& unloaded : pieces) {
-        const FrozenZeroLoads held(u.w, unloaded);
+    for (const std::vector<char>& has_zero_load : sets) {
+        const FrozenZeroLoads held(u.w, has_zero_load);
         u.equation(y, equation);
         if (!equation.finite()) throw Failure(Failure::Kind::not_finite, u.t);
         ReactionRoots roots;
@@ -118,7 +118,7 @@ void decide_over_pieces(Unknowns& u, const VecX& start, VecX& y, const Failure& 
         else if (ReactionNewton().solve(equation, linear)) roots.y.push_back(linear);
         complete &= roots.complete && !roots.at_edge;
         for (const VecX& root : roots.y)
-            if (u.is_motion(root) && determinant_at(equation, root) > uniqueness_parameters.least_determinant)
+            if (u.is_motion(root) && determinant_at(equation, root) > uniqueness_parameters.min_determinant)
                 found.push_back(root);
     }
     if (found.empty() && !complete) throw Failure(Failure::Kind::not_converged, u.t, u.elements());
@@ -133,13 +133,13 @@ void decide(Unknowns& u, const ReactionEquation& equation, const VecX& start, Ve
     RunState& state = u.w.state;
     MatX L;
     equation.steepest(L);
-    state.growth = growth(L);
+    state.spectral_bound = spectral_bound(L);
     state.steps_since = 0;
-    const bool contracts = state.growth < 1.0 - uniqueness_parameters.least_determinant;
+    const bool contracts = state.spectral_bound < 1.0 - uniqueness_parameters.min_determinant;
     const bool in_pieces = shares_contact_loads(u.p, u.w);  // one zero-load set proves nothing about the others
     state.unique = contracts && !in_pieces ? Uniqueness::shown : Uniqueness::not_shown;
     if (contracts && solved) return;
-    if (solved && determinant_at(equation, y) > uniqueness_parameters.least_determinant) {
+    if (solved && determinant_at(equation, y) > uniqueness_parameters.min_determinant) {
         const bool linear = only_opening(u);
         if (linear && !in_pieces) state.unique = Uniqueness::shown;
         if (linear || pulls(u, y)) return;
@@ -157,12 +157,12 @@ void decide(Unknowns& u, const ReactionEquation& equation, const VecX& start, Ve
         // A solution from infinite loads then has a contact in tension, unless det(I - dg/dy) is zero. A solution with
         // a negative determinant amplifies load changes, and the opening contact continues in another motion.
         if (only_opening(u))
-            roots.at_edge = !(determinant_at(equation, found.front()) > uniqueness_parameters.least_determinant);
+            roots.at_edge = !(determinant_at(equation, found.front()) > uniqueness_parameters.min_determinant);
     }
-    const double edge = std::min(1.0 - state.growth, 0.0);
+    const double edge = std::min(1.0 - state.spectral_bound, 0.0);
     if (!roots.complete && solved && found.empty()) found.push_back(y);
     if (found.empty() && !roots.complete) throw Failure(Failure::Kind::not_converged, u.t, u.elements());
-    if (found.empty()) throw paradox(u, edge, roots.at_edge ? Solutions::not_told : Solutions::none);
+    if (found.empty()) throw paradox(u, edge, roots.at_edge ? Solutions::unproven : Solutions::none);
     sort_by_distance(equation, start, found);
     double least = HUGE_VAL;
     for (const VecX& root : found) least = std::min(least, determinant_at(equation, root));
@@ -175,12 +175,12 @@ void decide(Unknowns& u, const ReactionEquation& equation, const VecX& start, Ve
     // yet.
     const auto hold = std::count_if(found.begin(), found.end(), [&](const VecX& root) { return holds(u, root); });
     const bool shown = found.size() == 1 || hold > 1;
-    if (!shown && determinant_at(equation, y) > uniqueness_parameters.least_determinant) return;
+    if (!shown && determinant_at(equation, y) > uniqueness_parameters.min_determinant) return;
     state.unique = Uniqueness::several;
     VecX::Index widest = 0;
     (found.back() - y).cwiseQuotient((found.back() + y).cwiseMax(min_scale)).cwiseAbs().maxCoeff(&widest);
     u.w.now.several_element = u.elements()[widest];
-    if (u.w.continues && determinant_at(equation, y) > uniqueness_parameters.least_determinant) return;
+    if (u.w.continues && determinant_at(equation, y) > uniqueness_parameters.min_determinant) return;
     if (found.size() == 1) throw paradox(u, std::min(least, edge));
     throw two_motions(u, least, found[0], found[1]);
 }
@@ -219,9 +219,9 @@ VecX constants(const Unknowns& u) {
 }
 
 // Laws mostly grow with |load|, which has two branches: beyond the kink, the law's rows of dg/dy change sign. Call
-// `look` with dg/dy of each combination of branches, and the mirrored rows.
-template <class Look>
-void each_mixture(const Unknowns& u, const MatX& J, const Look& look) {
+// `visit` with dg/dy of each combination of branches, and the mirrored rows.
+template <class Visit>
+void each_mixture(const Unknowns& u, const MatX& J, const Visit& visit) {
     const auto laws = groups(u);
     const int m = static_cast<int>(laws.size());
     const bool all = m <= uniqueness_parameters.max_mixed_laws;
@@ -234,33 +234,34 @@ void each_mixture(const Unknowns& u, const MatX& J, const Look& look) {
             other.middleRows(first, count) *= -1.0;
             mirrored.segment(first, count).setOnes();
         }
-        look(other, mirrored);
+        visit(other, mirrored);
     }
 }
 
 // Check if Newton's method from `start` converges to a solution other than y. If so, `start` is that solution.
 bool leads_elsewhere(Unknowns& u, const VecX& y, VecX& start, double size) {
-    VecX g(u.n);
-    MatX J;
-    try {
+    bool is_other = false;
+    attempt({Failure::Kind::not_finite, Failure::Kind::not_converged}, [&] {
+        VecX g(u.n);
+        MatX J;
         for (int it = 0; it < Unknowns::parameters.max_newton; ++it) {
             u.image(start, g);
             const VecX residual = g - start;
             const double scale = std::max({size, start.cwiseAbs().maxCoeff(), g.cwiseAbs().maxCoeff()});
-            if (residual.cwiseAbs().maxCoeff() <= uniqueness_parameters.same_solution * scale)
-                return (start - y).cwiseAbs().maxCoeff() > uniqueness_parameters.other_solution * scale;
+            if (residual.cwiseAbs().maxCoeff() <= uniqueness_parameters.same_solution * scale) {
+                is_other = (start - y).cwiseAbs().maxCoeff() > uniqueness_parameters.other_solution * scale;
+                return;
+            }
             differentiate(u, start, g, scale, J);
             start += solve(MatX::Identity(u.n, u.n) - J, residual);
         }
-    } catch (const Failure& failure) {
-        if (failure.kind != Failure::Kind::not_finite && failure.kind != Failure::Kind::not_converged) throw;
-    }
-    return false;
+    });
+    return is_other;
 }
 
 }  // namespace
 
-double least_determinant(const Unknowns& u, const MatX& J) {
+double min_determinant(const Unknowns& u, const MatX& J) {
     const MatX I = MatX::Identity(u.n, u.n);
     double least = determinant(I - J);
     each_mixture(u, J, [&](const MatX& other, const VecX&) { least = std::min(least, determinant(I - other)); });
@@ -271,10 +272,10 @@ void look_for_others(Unknowns& u, VecX& y, const MatX& J, double size) {
     RunState& state = u.w.state;
     const MatX I = MatX::Identity(u.n, u.n);
     const double here = determinant(I - J);
-    const bool regular = here > uniqueness_parameters.least_determinant;
+    const bool regular = here > uniqueness_parameters.min_determinant;
     u.w.now.determinant = here;
     state.unique = Uniqueness::not_shown;
-    if (std::abs(here) <= uniqueness_parameters.least_determinant)
+    if (std::abs(here) <= uniqueness_parameters.min_determinant)
         throw paradox(u, std::min(here, 0.0));  // counts as zero
     const VecX bound = solve(I - J.cwiseAbs(), VecX::Ones(u.n));
     if ((bound.array() > 0.0).all()) return;

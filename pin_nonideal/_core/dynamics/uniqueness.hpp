@@ -12,9 +12,9 @@ struct UniquenessParameters {
     double other_solution = 1e-6;   // relative distance beyond which two solutions differ
     double near_motion = 1e-6;      // tolerance between solutions of the arrays and motions, relative to the unknowns
     int refinements = 3;            // corrections of such a solution
-    double holding_limit_tolerance = 1e-9;  // tolerance of a holding force, relative to its limit
+    double limit_rounding = 1e-9;  // tolerance of a holding force, relative to its limit
     // Determinants below this value count as zero.
-    double least_determinant = 1e-8;
+    double min_determinant = 1e-8;
 };
 
 inline constexpr UniquenessParameters uniqueness_parameters{};
@@ -26,14 +26,14 @@ void decide(Unknowns& unknowns, const ReactionEquation& equation, const VecX& st
 
 // Solve with all zero-load sets after one of them had no solution. y becomes the solution nearest to `start` in any
 // set. If no set has a solution, throw `failure`.
-void decide_over_pieces(Unknowns& unknowns, const VecX& start, VecX& y, const Failure& failure);
+void decide_over_zero_load_sets(Unknowns& unknowns, const VecX& start, VecX& y, const Failure& failure);
 
 // Search for other solutions with user functions among the unknowns. J is dg/dy at y. Throws a failure if the
 // determinant indicates other solutions and Newton's method finds one. Finding none proves nothing. If the run
 // continues, y becomes the solution that is least sensitive to changes of the loads.
 void look_for_others(Unknowns& unknowns, VecX& y, const MatX& J, double size);
 // Smallest det(I - dg/dy) over the combinations of branches of the laws.
-double least_determinant(const Unknowns& unknowns, const MatX& J);
+double min_determinant(const Unknowns& unknowns, const MatX& J);
 // Compute dg/dy by finite differences, scaled by the size of the unknowns.
 void differentiate(Unknowns& unknowns, const VecX& y, const VecX& g, double size, MatX& J);
 

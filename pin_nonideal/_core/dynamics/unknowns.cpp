@@ -48,7 +48,7 @@ void Unknowns::image(const VecX& y, VecX& g) {
     each([&](size_t e) {
         w.now.load[e] = load_limits(p, w, p.frictions[e], t, q, v);
         g[k++] = limit_under(p, w, static_cast<int>(e), w.now.load[e].against(w.state.mode[e]));
-    }, [&](const UserLaw& law) { g.segment(k, nv) = ask(p, law, w, t, q, v); k += nv; });
+    }, [&](const UserLaw& law) { g.segment(k, nv) = user_law_force(p, law, w, t, q, v); k += nv; });
 }
 
 double Unknowns::rounding() const {

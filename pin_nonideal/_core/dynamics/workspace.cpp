@@ -34,11 +34,11 @@ static void size(const Program& p, Evaluation& now) {
     for (size_t i = 0; i < p.blocks.size(); ++i) now.values[i].resize(p.blocks[i].kind, nv);
     now.is_inactive.assign(p.blocks.size(), 0);
     now.selected.assign(p.gaps.size(), 1);
-    now.awake.resize(p.blocks.size());
-    now.touching.resize(p.gaps.size());
-    std::iota(now.awake.begin(), now.awake.end(), 0);
-    std::iota(now.touching.begin(), now.touching.end(), 0);
-    now.loaded.reserve(elements);
+    now.active_blocks.resize(p.blocks.size());
+    now.closed_gaps.resize(p.gaps.size());
+    std::iota(now.active_blocks.begin(), now.active_blocks.end(), 0);
+    std::iota(now.closed_gaps.begin(), now.closed_gaps.end(), 0);
+    now.loaded_elements.reserve(elements);
     now.slipping.reserve(elements);
     now.A.assign(p.entries, 0.0);
     now.B.assign(p.entries, 0.0);
@@ -63,7 +63,7 @@ static void size(const Program& p, const Evaluation& now, Scratch& scratch) {
     for (VecX* x : {&scratch.r, &scratch.residual, &scratch.lam_step, &scratch.position_lam})
         *x = VecX::Zero(p.layout.rows);
     scratch.position_start = VecX::Zero(p.mechanism.nq);
-    scratch.position_lam_steps.assign(projection_limit, scratch.position_lam);
+    scratch.position_lam_steps.assign(max_projection_iterations, scratch.position_lam);
     scratch.ideal_locked.assign(nv, 0);
     scratch.unknown = scratch.image = scratch.shifted = VecX::Zero(p.unknowns());
     scratch.subtree_force = scratch.body_inertia = scratch.body_residual = now.body_force;
@@ -83,18 +83,18 @@ Workspace::Workspace(const Program& p) {
 // Thousands of contacts may be open. Contacts that stay open cost one comparison each.
 static void select_contacts(const Program& p, Workspace& w) {
     if (same_bytes(w.state.closed, w.now.selected)) return;
-    w.now.touching.clear();
+    w.now.closed_gaps.clear();
     for (size_t i = 0; i < p.gaps.size(); ++i) {
         const char closed = w.state.closed[i];
-        if (closed) w.now.touching.push_back(static_cast<int>(i));
+        if (closed) w.now.closed_gaps.push_back(static_cast<int>(i));
         if (closed == w.now.selected[i]) continue;
         w.now.selected[i] = closed;
         w.now.is_inactive[p.gaps[i].block] = !closed;
         for (int e : p.gaps[i].elements) w.now.is_inactive[p.frictions[e].block] = !closed;
     }
-    w.now.awake.clear();
+    w.now.active_blocks.clear();
     for (size_t i = 0; i < p.blocks.size(); ++i)
-        if (!w.now.is_inactive[i]) w.now.awake.push_back(static_cast<int>(i));
+        if (!w.now.is_inactive[i]) w.now.active_blocks.push_back(static_cast<int>(i));
 }
 
 void select_rows(const Program& p, Workspace& w) {
@@ -102,17 +102,17 @@ void select_rows(const Program& p, Workspace& w) {
     for (int row : w.now.rows.envelope.row_at) w.now.rows.required[row] = 0;
     std::fill_n(w.now.rows.required.begin(), before_gaps, char(1));
     select_contacts(p, w);
-    for (int i : w.now.touching) {
+    for (int i : w.now.closed_gaps) {
         const Block& block = p.blocks[p.gaps[i].block];
         std::fill_n(w.now.rows.required.begin() + block.row, block.kept.size(), char(1));
     }
-    w.now.loaded.clear();
+    w.now.loaded_elements.clear();
     w.now.slipping.clear();
     std::fill(w.now.terms.locked.begin(), w.now.terms.locked.end(), char(0));
     for (size_t e = 0; e < p.frictions.size(); ++e) {
         if (w.state.mode[e] == unloaded) continue;
         const Block& block = p.blocks[p.frictions[e].block];
-        w.now.loaded.push_back(static_cast<int>(e));
+        w.now.loaded_elements.push_back(static_cast<int>(e));
         if (w.state.mode[e] != sticking) {
             w.now.slipping.push_back(static_cast<int>(e));
             continue;
@@ -122,7 +122,7 @@ void select_rows(const Program& p, Workspace& w) {
         else
             for (size_t k = 0; k < block.kept.size(); ++k) w.now.rows.required[block.row + k] = 1;
     }
-    w.now.rows.use_required(p.layout, p.blocks, w.now.awake);
+    w.now.rows.use_required(p.layout, p.blocks, w.now.active_blocks);
     w.state.has_ideal_row_choice = false;
     w.state.rank_tolerance = rank_tolerance_sticking;
 }
@@ -148,7 +148,7 @@ void set_closed(const Program& p, Workspace& w, const std::vector<char>& closed)
 }
 
 void set_contacts(const Program& p, Workspace& w, const std::vector<char>& closed, const std::vector<Mode>& modes) {
-    for (int i : w.now.touching) {
+    for (int i : w.now.closed_gaps) {
         const Block& block = p.blocks[p.gaps[i].block];
         if (!closed[i]) std::fill_n(w.now.lam.data() + block.row, block.kept.size(), 0.0);
     }

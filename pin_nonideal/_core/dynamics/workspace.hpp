@@ -17,7 +17,7 @@ namespace pn {
 
 // Maximum number of iterations of a projection, each with stored multipliers. Newton's method takes three if it
 // converges well.
-constexpr int projection_limit = 12;
+constexpr int max_projection_iterations = 12;
 
 // Rank tolerance of the rows while elements stick. A motion is free if sticking elements would hold it with less than
 // this part of their forces. The value is the square root of response_rank_threshold (complementarity/box_lcp.hpp), since
@@ -40,7 +40,7 @@ struct RunState {
     // Slip directions of elements with two or three directions: at the step's start, and the last well-defined one.
     std::vector<Vec3> slip_direction, last_direction;
     std::vector<char> is_sticking_deferred;  // keeps its slip mode at rest: only rounding decides the direction
-    bool seeks_directions = false;  // steps solve for last_direction: slip is too slow to define it
+    bool solves_directions = false;  // steps solve for last_direction: slip is too slow to define it
     bool is_hyperstatic = false;   // multipliers of sticking elements are not unique
     double rank_tolerance = rank_tolerance_sticking;  // tolerance of the rows while elements stick, in these modes
     VecX z;                       // states of laws, at the last evaluated stage
@@ -52,7 +52,7 @@ struct RunState {
     VecX third_order_lam;         // third-order multipliers of the step, divided by its cubed length
     bool has_ideal_row_choice = false;   // rows that are independent without sticking elements are chosen for this step
     Uniqueness unique = Uniqueness::shown;  // uniqueness of the motion in these modes, as last decided
-    double growth = 0.0;                    // bound on the growth of the implicit reaction equation at that decision
+    double spectral_bound = 0.0;            // bound on the growth of the implicit reaction equation at that decision
     int steps_since = undecided_steps;        // steps since that decision
 
     bool sticks_anywhere() const { return std::find(mode.begin(), mode.end(), sticking) != mode.end(); }
@@ -65,7 +65,7 @@ struct Reactions {
     bool loads_are_feasible = true;   // all unilateral contacts with redundant loads can be in compression
     // Unilateral contacts with zero load, chosen so that no contact that shares their load has tension. While this set
     // is frozen, loads are linear in the motion, and tension is possible.
-    std::vector<char> unloaded;
+    std::vector<char> has_zero_load;
     bool is_zero_load_set_frozen = false;
     VecX lam;              // by kept row, minimum norm among redundant rows
     std::vector<Force> body;  // external forces on each body, later the sums of its subtree
@@ -87,10 +87,10 @@ struct Evaluation {
     double row_time(double t) const { return t < not_before ? not_before : t > not_after ? not_after : t; }
     std::vector<RowValues> values;  // by block
     std::vector<char> is_inactive;  // blocks of open contacts, which are neither rows nor evaluated
-    std::vector<int> awake;              // the other blocks
-    std::vector<int> touching;           // closed gaps
-    std::vector<char> selected;          // closed flags by gap, at the last selection of rows
-    std::vector<int> loaded, slipping;   // elements with load (sticking or slipping), and slipping elements
+    std::vector<int> active_blocks;              // the other blocks
+    std::vector<int> closed_gaps;                // closed gaps
+    std::vector<char> selected;                  // closed flags by gap, at the last selection of rows
+    std::vector<int> loaded_elements, slipping;  // elements with load (sticking or slipping), and slipping elements
     std::vector<double> A, B;
     RowSystem rows, ideal_rows;  // ideal: of the constraints without sticking elements (see IdealMotion)
     VecX b, lam;  // by kept row

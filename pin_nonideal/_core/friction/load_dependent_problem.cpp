@@ -35,7 +35,10 @@ RestProblem::RestProblem(const Program& program, Workspace& workspace, double ti
         const Friction& f = p.frictions[e];
         by_functions |= f.reaction == Reaction::total && f.load == Friction::Load::user;
     }
-    if (by_functions) equation.ask = [this](const VecX& x, VecX& alpha, FrictionLimits& limits) { ask(x, alpha, limits); };
+    if (by_functions)
+        equation.evaluate_laws = [this](const VecX& x, VecX& alpha, FrictionLimits& limits) {
+            evaluate_laws(x, alpha, limits);
+        };
     else collect_loads();
 }
 
@@ -72,25 +75,25 @@ void RestProblem::describe(size_t i, bool resting) {
 // Compute the loads, which are linear in the motion: loads without friction, and contribution of a unit force of each
 // element.
 void RestProblem::collect_loads() {
-    std::vector<int> loaded;
+    std::vector<int> load_dependent;
     for (size_t i = 0; i < problem_.elements.size(); ++i) {
         if (friction(i).reaction != Reaction::total || friction(i).load == Friction::Load::none) continue;
-        equation.elements[i].vector = 3 * static_cast<int>(loaded.size());
+        equation.elements[i].vector = 3 * static_cast<int>(load_dependent.size());
         equation.elements[i].vectors = 3;
-        loaded.push_back(static_cast<int>(i));
+        load_dependent.push_back(static_cast<int>(i));
     }
-    if (loaded.empty()) return;
-    const int rows = 9 * static_cast<int>(loaded.size());
+    if (load_dependent.empty()) return;
+    const int rows = 9 * static_cast<int>(load_dependent.size());
     const auto collect = [&] {
         VecX out(rows);
         w.now.renew();
-        for (size_t k = 0; k < loaded.size(); ++k) {
-            const LoadVectors vectors = load_vectors(p, w, friction(loaded[k]));
+        for (size_t k = 0; k < load_dependent.size(); ++k) {
+            const LoadVectors vectors = load_vectors(p, w, friction(load_dependent[k]));
             for (int j = 0; j < 3; ++j) out.segment<3>(9 * k + 3 * j) = vectors[j].eigen();
         }
         return out;
     };
-    const FrozenZeroLoads piece(p, w);
+    const FrozenZeroLoads frozen(p, w);
     move(VecX::Zero(equation.n));
     equation.still = collect();
     equation.loads.resize(rows, equation.n);
@@ -134,17 +137,17 @@ bool RestProblem::is_motion(const VecX& x) {
     return off <= zero_load_limit_rounding * size;
 }
 
-void RestProblem::enter_piece(const VecX& x) {
+void RestProblem::freeze_zero_loads(const VecX& x) {
     move(x);
     collect_loads();
 }
 
-void RestProblem::enter_piece(const std::vector<char>& unloaded) {
-    const FrozenZeroLoads piece(w, unloaded);
+void RestProblem::freeze_zero_loads(const std::vector<char>& has_zero_load) {
+    const FrozenZeroLoads frozen(w, has_zero_load);
     collect_loads();
 }
 
-void RestProblem::ask(const VecX& x, VecX& alpha, FrictionLimits& limits) {
+void RestProblem::evaluate_laws(const VecX& x, VecX& alpha, FrictionLimits& limits) {
     VecX C = VecX::Zero(p.mechanism.nv);
     problem_.add_forces(p, w, x, C);
     C = w.now.C_smooth + C;

@@ -22,13 +22,13 @@ public:
 
     // Acceleration under forces x, if no law is a user function.
     VecX acceleration(const VecX& x) const { return without_ + problem_.response * x; }
-    bool has_pieces() const { return equation.loads.rows() > 0 && shares_contact_loads(p, w); }
+    bool has_zero_load_sets() const { return equation.loads.rows() > 0 && shares_contact_loads(p, w); }
     // Check if forces x give a consistent motion. Then no unilateral contact has tension, and shared loads are
-    // consistent with the zero-load set of the equation. enter_piece sets up the equation for the zero-load set of x,
+    // consistent with the zero-load set of the equation. freeze_zero_loads sets up the equation for the zero-load set of x,
     // or for a given set.
     bool is_motion(const VecX& x);
-    void enter_piece(const VecX& x);
-    void enter_piece(const std::vector<char>& unloaded);
+    void freeze_zero_loads(const VecX& x);
+    void freeze_zero_loads(const std::vector<char>& has_zero_load);
     // Factor of the limit of the i-th element while it sticks, and after slip onset.
     double holding_factor(size_t i) const;
     double sliding_factor(size_t i) const;
@@ -37,7 +37,7 @@ private:
     const Friction& friction(size_t i) const { return p.frictions[problem_.elements[i]]; }
     void describe(size_t i, bool resting);
     void collect_loads();
-    void ask(const VecX& x, VecX& alpha, FrictionLimits& limits);
+    void evaluate_laws(const VecX& x, VecX& alpha, FrictionLimits& limits);
     // Set the motion in the workspace to that under forces x.
     void move(const VecX& x);
 

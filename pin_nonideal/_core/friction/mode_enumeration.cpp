@@ -11,19 +11,19 @@ namespace pn {
 
 namespace {
 
-constexpr int most_elements = 5;  // 243 choices, each with one implicit equation
+constexpr int max_enumerated_elements = 5;  // 243 choices, each with one implicit equation
 
 bool may_be_tried(const Program& p, const std::vector<int>& list) {
-    return list.size() <= most_elements &&
+    return list.size() <= max_enumerated_elements &&
            std::all_of(list.begin(), list.end(), [&](int e) { return p.frictions[e].dim == 1; });
 }
 
-struct EachChoice {
+struct ModeEnumeration {
     const Program& p;
     Workspace& w;
     double t;
     const VecX &q, &v;
-    const ModeQuestion& question;
+    const ModeQuery& query;
     std::vector<std::vector<Mode>> motions;  // modes whose motions satisfy the conditions of these modes
     bool shown = true;                       // true if all other modes are proven to have no motion
     double determinant = 0.0;                // smallest determinant of the modes without a motion
@@ -31,11 +31,11 @@ struct EachChoice {
     // Decode `number` into modes: each element sticks or slips in either direction. Return false if an element at its
     // limit sticks.
     bool choose(int number, std::vector<Mode>& modes) const {
-        for (int e : question.at_rest) {
+        for (int e : query.at_rest) {
             modes[e] = number % 3 == 0 ? sticking : number % 3 == 1 ? slip_plus : slip_minus;
             number /= 3;
-            const auto& breaking = question.breaking;
-            if (modes[e] == sticking && std::find(breaking.begin(), breaking.end(), e) != breaking.end()) return false;
+            const auto& at_limit = query.at_limit;
+            if (modes[e] == sticking && std::find(at_limit.begin(), at_limit.end(), e) != at_limit.end()) return false;
         }
         return true;
     }
@@ -50,23 +50,21 @@ struct EachChoice {
     // Check if the current motion satisfies the conditions of its modes, up to rounding.
     bool keeps_conditions() {
         const double size = w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm();
-        return std::all_of(question.at_rest.begin(), question.at_rest.end(), [&](int e) {
+        return std::all_of(query.at_rest.begin(), query.at_rest.end(), [&](int e) {
             if (w.state.mode[e] != sticking)
-                return slip_rate_along_mode(p, w, e) >= -slip_onset_parameters.limit_slack * size;
-            return holding_force(p, w, e, t, q, v).is_within(slip_onset_parameters.limit_slack);
+                return slip_rate_along_mode(p, w, e) >= -slip_onset_parameters.condition_slack * size;
+            return holding_force(p, w, e, t, q, v).is_within(slip_onset_parameters.condition_slack);
         });
     }
 
     void try_all() {
-        std::vector<Mode> modes = question.modes;
-        const int choices = static_cast<int>(std::lround(std::pow(3.0, question.at_rest.size())));
+        std::vector<Mode> modes = query.modes;
+        const int choices = static_cast<int>(std::lround(std::pow(3.0, query.at_rest.size())));
         for (int number = 0; number < choices; ++number) {
             if (!choose(number, modes)) continue;
-            try {
-                move(modes);
-            } catch (const Failure& failure) {
-                shown &= failure.solutions == Failure::Solutions::none;
-                if (failure.kind == Failure::Kind::paradox) determinant = std::min(determinant, failure.value);
+            if (const auto failure = attempt([&] { move(modes); })) {
+                shown &= failure->solutions == Failure::Solutions::none;
+                if (failure->kind == Failure::Kind::paradox) determinant = std::min(determinant, failure->value);
                 continue;
             }
             if (keeps_conditions()) motions.push_back(modes);
@@ -76,7 +74,7 @@ struct EachChoice {
 
     const std::vector<Mode>* stickiest() const {
         const auto holds_all_of = [&](const std::vector<Mode>& one, const std::vector<Mode>& other) {
-            return std::all_of(question.at_rest.begin(), question.at_rest.end(),
+            return std::all_of(query.at_rest.begin(), query.at_rest.end(),
                                [&](int e) { return one[e] == sticking || other[e] != sticking; });
         };
         for (const std::vector<Mode>& one : motions)
@@ -86,13 +84,13 @@ struct EachChoice {
     }
 
     [[noreturn]] void paradox() {
-        Failure failure(Failure::Kind::paradox, t, question.at_rest, determinant);
+        Failure failure(Failure::Kind::paradox, t, query.at_rest, determinant);
         failure.solutions = motions.empty() ? Failure::Solutions::none : Failure::Solutions::several;
         for (size_t i = 0; i < std::min<size_t>(2, motions.size()); ++i) {
             move(motions[i]);
-            VecX limits(question.at_rest.size());
+            VecX limits(query.at_rest.size());
             for (int k = 0; k < limits.size(); ++k)
-                limits[k] = static_limits(p, w, question.at_rest[k], t, q, v).reach();
+                limits[k] = static_limits(p, w, query.at_rest[k], t, q, v).reach();
             failure.limits.push_back(limits);
             failure.accelerations.push_back(w.now.a);
         }
@@ -102,17 +100,17 @@ struct EachChoice {
 
 }  // namespace
 
-bool take_only_choice(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
-                      const ModeQuestion& question) {
-    if (!may_be_tried(p, question.at_rest)) return false;
-    EachChoice each{p, w, t, q, v, question, {}};
+bool enumerate_modes(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
+                     const ModeQuery& query) {
+    if (!may_be_tried(p, query.at_rest)) return false;
+    ModeEnumeration each{p, w, t, q, v, query, {}};
     each.try_all();
     if (each.motions.empty() && !each.shown) return false;
     const std::vector<Mode>* modes = each.stickiest();
     if (!modes) each.paradox();
     each.move(*modes);
     w.now.several = each.motions.size() > 1;
-    w.now.several_element = question.at_rest.front();
+    w.now.several_element = query.at_rest.front();
     return true;
 }
 

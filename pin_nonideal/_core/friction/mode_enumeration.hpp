@@ -11,6 +11,6 @@ namespace pn {
 // element sticks that sticks in any other. Return false if no tried modes satisfy them but other choices may have a
 // motion. Throw a paradox if no motion exists, or if no motion has all the sticking elements of the others. On return
 // the workspace holds the selected motion.
-bool take_only_choice(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, const ModeQuestion& question);
+bool enumerate_modes(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, const ModeQuery& query);
 
 }  // namespace pn

@@ -33,29 +33,27 @@ std::optional<int> change_modes(const Program& p, Workspace& w, double t, const 
 
 }  // namespace
 
-bool try_previous_modes(const Program& p, Workspace& w, double t, VecX& q, VecX& v, const ModeQuestion& question,
+bool try_previous_modes(const Program& p, Workspace& w, double t, VecX& q, VecX& v, const ModeQuery& query,
                         int element) {
-    const bool breaks = !question.breaking.empty();
+    const bool breaks = !query.at_limit.empty();
     // An element starts to slip alone only if no other rows hold the same freedom.
-    const bool alone = p.frictions[element].dim == 1 && question.breaking.size() == 1 && !w.now.rows.redundant;
+    const bool alone = p.frictions[element].dim == 1 && query.at_limit.size() == 1 && !w.now.rows.redundant;
     if (p.needs_reactions || (breaks && !alone)) return false;
-    std::vector<Mode> modes = question.modes;
-    for (int e : question.at_rest) modes[e] = sticking;
+    std::vector<Mode> modes = query.modes;
+    for (int e : query.at_rest) modes[e] = sticking;
     if (breaks) modes[element] = holding_force(p, w, element, t, q, v).force[0] < 0.0 ? slip_plus : slip_minus;
     const VecX q_before = q, v_before = v;
-    for (int round = 0; round < mode_update_parameters.rounds; ++round) {
+    const double max_change = mode_update_parameters.min_velocity_change * (1.0 + v_before.cwiseAbs().maxCoeff());
+    for (int round = 0; round < mode_update_parameters.max_rounds; ++round) {
         set_modes(p, w, modes);
-        try {
+        bool keeps_velocity = false;
+        const auto failure = attempt({Failure::Kind::inconsistent}, [&] {
             project_into_modes(p, w, t, q, v);
-            if ((v - v_before).cwiseAbs().maxCoeff() >
-                mode_update_parameters.min_velocity_change * (1.0 + v_before.cwiseAbs().maxCoeff()))
-                break;
-            begin_step(p, w, t, q, v);
-        } catch (const Failure& failure) {
-            if (failure.kind != Failure::Kind::inconsistent) throw;
-            break;
-        }
-        const std::optional<int> changed = change_modes(p, w, t, q, v, question.at_rest, modes);
+            keeps_velocity = !((v - v_before).cwiseAbs().maxCoeff() > max_change);
+            if (keeps_velocity) begin_step(p, w, t, q, v);
+        });
+        if (failure || !keeps_velocity) break;
+        const std::optional<int> changed = change_modes(p, w, t, q, v, query.at_rest, modes);
         if (changed == 0) return true;
         if (!changed) break;
         q = q_before;

@@ -14,7 +14,7 @@ struct ModeUpdateParameters {
     // motion.
     double min_velocity_change = 1e-6;
     double condition_slack = 1e-9;  // rounding relative to the limit, or to the scale of accelerations
-    int rounds = 6;                 // rounds of mode changes before the full problem is solved
+    int max_rounds = 6;             // rounds of mode changes before the full problem is solved
 };
 
 inline constexpr ModeUpdateParameters mode_update_parameters{};
@@ -22,7 +22,7 @@ inline constexpr ModeUpdateParameters mode_update_parameters{};
 // Try these modes at (q, v), projected onto the required rows. The element of the event sticks, or slips if it was
 // sticking and reached its limit. Modes with violated conditions are changed for a few rounds. Return true if all
 // conditions hold. The workspace is then evaluated with these modes. Otherwise q and v are restored.
-bool try_previous_modes(const Program& p, Workspace& w, double t, VecX& q, VecX& v, const ModeQuestion& question,
+bool try_previous_modes(const Program& p, Workspace& w, double t, VecX& q, VecX& v, const ModeQuery& query,
                         int element);
 
 }  // namespace pn

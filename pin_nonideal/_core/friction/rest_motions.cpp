@@ -24,7 +24,7 @@ bool sticks_more(const std::vector<bool>& one, const std::vector<bool>& other) {
 bool RestMotions::find_in_piece(RestProblem& problem, VecX& x) {
     const RestEquation& equation = problem.equation;
     const AllMotions all = all_motions(equation);
-    if (all.complete && !problem.has_pieces()) {
+    if (all.complete && !problem.has_zero_load_sets()) {
         std::vector<VecX> motions;
         for (const VecX& forces : all.forces)
             if (problem.is_motion(forces)) motions.push_back(forces);
@@ -39,12 +39,12 @@ bool RestMotions::find_in_piece(RestProblem& problem, VecX& x) {
 
 bool RestMotions::find(RestProblem& problem, VecX& x) {
     for (int turn = 0; turn < implicit_friction_parameters.max_zero_load_sets && find_in_piece(problem, x); ++turn) {
-        if (!problem.has_pieces() || problem.is_motion(x)) return true;
-        problem.enter_piece(x);
+        if (!problem.has_zero_load_sets() || problem.is_motion(x)) return true;
+        problem.freeze_zero_loads(x);
     }
-    if (!problem.has_pieces()) return false;
-    for (const std::vector<char>& unloaded : load_pieces(p, w)) {
-        problem.enter_piece(unloaded);
+    if (!problem.has_zero_load_sets()) return false;
+    for (const std::vector<char>& has_zero_load : zero_load_sets(p, w)) {
+        problem.freeze_zero_loads(has_zero_load);
         x.setZero();
         if (find_in_piece(problem, x) && problem.is_motion(x)) return true;
     }
@@ -53,9 +53,9 @@ bool RestMotions::find(RestProblem& problem, VecX& x) {
 
 bool RestMotions::refine(RestProblem& problem, VecX& x) {
     for (int turn = 0; turn < implicit_friction_parameters.max_zero_load_sets; ++turn) {
-        if (problem.has_pieces()) problem.enter_piece(x);
+        if (problem.has_zero_load_sets()) problem.freeze_zero_loads(x);
         if (!refine_rest(problem.equation, x)) return false;
-        if (!problem.has_pieces() || problem.is_motion(x)) return true;
+        if (!problem.has_zero_load_sets() || problem.is_motion(x)) return true;
     }
     return false;
 }
@@ -67,8 +67,8 @@ bool RestMotions::hold(RestProblem& problem, VecX& x) {
     x = problem.equation.holding_forces();
     for (int turn = 0; turn < implicit_friction_parameters.max_zero_load_sets; ++turn) {
         const bool holds = hold_at_rest(problem.equation, x);
-        if (!problem.has_pieces() || problem.is_motion(x)) return holds;
-        problem.enter_piece(x);
+        if (!problem.has_zero_load_sets() || problem.is_motion(x)) return holds;
+        problem.freeze_zero_loads(x);
     }
     return false;
 }

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "complementarity/load_dependent/equation.hpp"
-#include "friction/mode_question.hpp"
+#include "friction/mode_query.hpp"
 #include "friction/problem.hpp"
 
 namespace pn {
@@ -12,15 +12,15 @@ struct SlipOnsetParameters {
     double residual_to_acceleration = 10.0;  // factor from the residual of the equation to the error of accelerations
     double max_acceleration = 1e-6;          // accelerations below this fraction are slip onset exactly at a limit
     double limit_rounding = 1e-13;           // rounding relative to a limit
-    double limit_slack = 1e-9;               // allowed violation of a mode's condition, relative to a limit
+    double condition_slack = 1e-9;           // allowed violation of a mode's condition, relative to a limit
 };
 
 inline constexpr SlipOnsetParameters slip_onset_parameters{};
 
 // Compute the modes for the forces f of a program with these limits. Slip directions are stored in the workspace.
-std::vector<Mode> modes_of(Workspace& w, const ModeQuestion& question, const FrictionProblem& problem, const VecX& f,
+std::vector<Mode> modes_of(Workspace& w, const ModeQuery& query, const FrictionProblem& problem, const VecX& f,
                            const FrictionLimits& limits);
 // Compute the modes for a solution x of the load-dependent equation, as accurate as its residual.
-std::vector<Mode> modes_of(Workspace& w, const ModeQuestion& question, const RestEquation& equation, const VecX& x);
+std::vector<Mode> modes_of(Workspace& w, const ModeQuery& query, const RestEquation& equation, const VecX& x);
 
 }  // namespace pn

@@ -30,18 +30,18 @@ struct Search {
     Workspace& w;
     double t;
     const VecX &q, &v;
-    const ModeQuestion& question;
+    const ModeQuery& query;
     const std::vector<int>& list;  // elements at rest
     std::vector<int> slipping;     // slipping elements with load-dependent limits
     RestMotions motions;           // those of load-dependent limits
     bool loads_are_feasible = true;           // the motion of the iteration has no contact in tension
 
     Search(const Program& program, Workspace& workspace, double time, const VecX& q_, const VecX& v_,
-           const ModeQuestion& asked)
-        : p(program), w(workspace), t(time), q(q_), v(v_), question(asked), list(asked.at_rest),
+           const ModeQuery& mode_query)
+        : p(program), w(workspace), t(time), q(q_), v(v_), query(mode_query), list(mode_query.at_rest),
           motions(program, workspace, time, list) {
         for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e)
-            if (!contains(list, e) && slips(asked.modes[e]) && p.frictions[e].reaction == Reaction::total)
+            if (!contains(list, e) && slips(mode_query.modes[e]) && p.frictions[e].reaction == Reaction::total)
                 slipping.push_back(e);
     }
 
@@ -50,7 +50,7 @@ struct Search {
         w.state.warm = limits_known;
         if (limits_known) {  // other solutions of these modes do not start from rest
             w.state.unique = Uniqueness::shown;
-            w.state.growth = 1.0;
+            w.state.spectral_bound = 1.0;
             w.state.steps_since = -1;
         }
         begin_step(p, w, t, q, v);
@@ -59,18 +59,14 @@ struct Search {
     // Check if the motion of the suggested modes satisfies their conditions. The motion is then unique, because no
     // limit depends on the load. On return the workspace is evaluated at this motion.
     bool keeps_suggestion() {
-        if (p.needs_reactions || !question.breaking.empty()) return false;
-        try {
-            apply(question.modes, false);
-        } catch (const Failure& failure) {  // driven elements do not stick
-            if (failure.kind != Failure::Kind::inconsistent) throw;
-            return false;
-        }
+        if (p.needs_reactions || !query.at_limit.empty()) return false;
+        // Driven elements do not stick.
+        if (attempt({Failure::Kind::inconsistent}, [&] { apply(query.modes, false); })) return false;
         const double size = w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm();
         return std::all_of(list.begin(), list.end(), [&](int e) {
             if (w.state.mode[e] == sticking)
                 return holding_force(p, w, e, t, q, v).is_within(slip_onset_parameters.limit_rounding);
-            return p.frictions[e].dim == 1 && slip_rate_along_mode(p, w, e) >= -slip_onset_parameters.limit_slack * size;
+            return p.frictions[e].dim == 1 && slip_rate_along_mode(p, w, e) >= -slip_onset_parameters.condition_slack * size;
         });
     }
 
@@ -144,7 +140,7 @@ struct Search {
         double change = 0.0;
         for (int turn = 0; turn < stick_slip_parameters.max_limit_iterations; ++turn) {
             const VecX f = friction_program(problem.W, problem.alpha0, problem.dims, limits);
-            const std::vector<Mode> next = modes_of(w, question, problem, f, limits);
+            const std::vector<Mode> next = modes_of(w, query, problem, f, limits);
             if (next == modes && change <= stick_slip_parameters.limit_tolerance) return true;
             modes = next;
             change = follow(problem, f, modes, limits);
@@ -153,17 +149,17 @@ struct Search {
     }
 
     // Forces of the elements at rest in the nearby motion.
-    VecX near(const RestEquation& equation) const {
+    VecX nearby_forces(const RestEquation& equation) const {
         VecX x = VecX::Zero(equation.n);
         for (size_t i = 0; i < list.size(); ++i)
             for (int k = 0; k < equation.elements[i].dim; ++k)
-                x[equation.elements[i].row + k] = question.near[list[i]][k];
+                x[equation.elements[i].row + k] = query.nearby_friction[list[i]][k];
         return x;
     }
 
     // Remove the friction of elements at rest. `all`: also that of slipping elements with load-dependent limits.
     void unload(bool all) {
-        std::vector<Mode> modes = question.modes;
+        std::vector<Mode> modes = query.modes;
         for (int e : list) modes[e] = unloaded;
         if (all)
             for (int e : slipping) modes[e] = unloaded;
@@ -172,26 +168,24 @@ struct Search {
     }
 
     void run() {
-        if (question.is_solved_jointly) {
-            apply(question.modes, false);
-            w.now.several = question.several;
+        if (query.is_solved_jointly) {
+            apply(query.modes, false);
+            w.now.several = query.several;
             w.now.several_element = list.front();
             return;
         }
         if (keeps_suggestion()) return;
-        std::vector<Mode> modes = question.modes;
+        std::vector<Mode> modes = query.modes;
         for (int e : list) modes[e] = unloaded;
         bool found = false;
-        try {
+        attempt({Failure::Kind::paradox}, [&] {  // elements at rest do not have their final forces here
             unload(false);
             found = alternate(modes);
             loads_are_feasible = !found || reactions(p, w).loads_are_feasible;
-        } catch (const Failure& failure) {  // elements at rest do not have their final forces here
-            if (failure.kind != Failure::Kind::paradox) throw;
-        }
-        if (p.needs_reactions && look_further(found, modes)) return;
+        });
+        if (p.needs_reactions && search_further(found, modes)) return;
         if (found) return apply(modes, false);
-        if (!take_only_choice(p, w, t, q, v, question)) throw Failure(Failure::Kind::not_converged, t, list);
+        if (!enumerate_modes(p, w, t, q, v, query)) throw Failure(Failure::Kind::not_converged, t, list);
     }
 
     // Check if the iteration may have lowered a limit too early: an element that slips in one iterate gets its kinetic
@@ -205,44 +199,44 @@ struct Search {
 
     // Search further if loads may allow several motions or none, or if the iteration gave no reliable motion. Return true
     // if the search found the motion.
-    bool look_further(bool found, const std::vector<Mode>& turned) {
+    bool search_further(bool found, const std::vector<Mode>& turned) {
         const bool is_reliable = found && loads_are_feasible && !is_released_early(turned);
         const bool slid = !found || std::any_of(list.begin(), list.end(), [&](int e) { return turned[e] != sticking; });
         unload(true);
         RestProblem problem(p, w, t, q, v, list, slipping);
         RestEquation& equation = problem.equation;
-        if (is_reliable && contraction(equation) < 1.0) return false;
+        if (is_reliable && contraction_bound(equation) < 1.0) return false;
         VecX x;
         // A complete search includes this motion. If all elements hold, no other motion has more sticking elements.
-        const bool all_known = is_searched(equation) && !problem.has_pieces();
-        if (slid && !all_known && equation.loaded()) {
+        const bool all_known = is_searched(equation) && !problem.has_zero_load_sets();
+        if (slid && !all_known && equation.is_load_dependent()) {
             if (motions.hold(problem, x)) {
                 w.now.several = is_reliable;
                 w.now.several_element = list.front();
-                std::vector<Mode> modes = question.modes;
+                std::vector<Mode> modes = query.modes;
                 for (int e : list) modes[e] = sticking;
                 settle(equation, x, modes);
                 return true;
             }
-            if (problem.has_pieces()) problem.enter_piece(VecX::Zero(equation.n));
+            if (problem.has_zero_load_sets()) problem.freeze_zero_loads(VecX::Zero(equation.n));
         }
         if (is_reliable && !is_searched(equation)) return false;
         x = VecX::Zero(equation.n);
         bool solved = motions.find(problem, x), one_limit = true;
-        if (!solved && !question.near.empty()) {
-            x = near(equation);
+        if (!solved && !query.nearby_friction.empty()) {
+            x = nearby_forces(equation);
             solved = motions.refine(problem, x);
         }
         if (!solved && release(problem, equation, std::vector<Mode>(p.frictions.size(), slip_plus))) {
             one_limit = false;  // static and kinetic limits differ: the search missed such motions
             solved = motions.find(problem, x);
         }
-        while (solved && release(problem, equation, modes_of(w, question, equation, x)))
+        while (solved && release(problem, equation, modes_of(w, query, equation, x)))
             solved = motions.find(problem, x);
         if (is_reliable && !(motions.are_complete() && solved)) return false;
         if (!solved && motions.are_complete() && one_limit && !found)
             motions.paradox(problem, std::min(0.0, equation.determinant_far_away()), {});
-        if (solved) settle(equation, x, modes_of(w, question, equation, x));
+        if (solved) settle(equation, x, modes_of(w, query, equation, x));
         return solved;
     }
 };
@@ -250,10 +244,10 @@ struct Search {
 }  // namespace
 
 void resolve_modes(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
-                   const ModeQuestion& question) {
+                   const ModeQuery& query) {
     w.now.several = false;
-    if (!question.at_rest.empty()) return Search(p, w, t, q, v, question).run();
-    set_modes(p, w, question.modes);
+    if (!query.at_rest.empty()) return Search(p, w, t, q, v, query).run();
+    set_modes(p, w, query.modes);
     begin_step(p, w, t, q, v);
 }
 

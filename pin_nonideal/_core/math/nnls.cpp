@@ -127,7 +127,7 @@ VecX nonnegative_least_squares(const MatX& A, const VecX& b) {
     return x;
 }
 
-VecX least_violation(const MatX& Z, const VecX& N) {
+VecX min_violation(const MatX& Z, const VecX& N) {
     if (N.size() == 0 || N.minCoeff() >= 0.0) return VecX::Zero(N.size());
     const MatX P = complement_of(Z);
     const VecX off = P * (N - nonnegative_least_squares(P, P * N));  // Z z takes up the rest
@@ -165,7 +165,7 @@ NonnegativeSum shortest_nonnegative(const MatX& Z, const VecX& N) {
     found.z = shortest_with_zeros(Z, N, found.held);
     found.is_feasible = !violated(noise());
     if (found.is_feasible) return found;
-    const VecX violation = least_violation(Z, N);
+    const VecX violation = min_violation(Z, N);
     found.held = binding(Z, N + violation + VecX::Constant(N.size(), nnls_parameters.binding_slack * largest(N)));
     for (int i = 0; i < N.size(); ++i)
         if (violation[i] > 0.0) found.held[i] = 1;
@@ -177,8 +177,8 @@ MaxMin max_min(const MatX& Z, const VecX& N) {
     const double size = largest(N);
     double value = N.maxCoeff() + std::max(size, min_scale);  // above any weighted mean of N
     MaxMin found{size, VecX()};
-    for (int cut = 0; cut < nnls_parameters.most_cuts; ++cut) {
-        const VecX violation = least_violation(Z, (N.array() - value).matrix());
+    for (int cut = 0; cut < nnls_parameters.max_cuts; ++cut) {
+        const VecX violation = min_violation(Z, (N.array() - value).matrix());
         if (largest(violation) <= nnls_parameters.met_rounding * size) break;  // smaller violations are rounding
         found.weight = violation / violation.sum();
         const double bound = found.weight.dot(N);

@@ -21,7 +21,7 @@ struct NnlsParameters {
     int orthogonal_passes = 2;
     // Maximum number of exchanges per column. The method is finite and takes about one. Further exchanges are rounding.
     int exchanges = 10;
-    int most_cuts = 50;  // updates of the bound in max_min, each exact for the binding numbers
+    int max_cuts = 50;  // updates of the bound in max_min, each exact for the binding numbers
 };
 
 inline constexpr NnlsParameters nnls_parameters{};
@@ -30,7 +30,7 @@ inline constexpr NnlsParameters nnls_parameters{};
 VecX nonnegative_least_squares(const MatX& A, const VecX& b);
 
 // Compute the shortest v >= 0 for which some z gives N + Z z >= -v. v is zero if all numbers can be nonnegative together.
-VecX least_violation(const MatX& Z, const VecX& N);
+VecX min_violation(const MatX& Z, const VecX& N);
 
 // Compute the shortest z that makes the marked numbers zero, or as near to zero as possible.
 VecX shortest_with_zeros(const MatX& Z, const VecX& N, const std::vector<char>& zero);

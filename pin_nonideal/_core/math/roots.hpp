@@ -7,9 +7,9 @@
 namespace pn {
 
 struct RootSearchParameters {
-    int dip_passes = 40;              // golden sections, which find a dip of 1e-16 of the margin's change
-    int root_passes = 60;             // maximum secants and bisections, of which 44 bisections reach `root_width`
-    int start_halvings = 30;          // halvings toward the start, near which a slip from rest may stop again
+    int max_dip_passes = 40;   // golden sections, which find a dip of 1e-16 of the margin's change
+    int max_root_passes = 60;  // maximum secants and bisections, of which 44 bisections reach `root_width`
+    int start_halvings = 30;   // halvings toward the start, near which a slip from rest may stop again
     double root_width = 1e-13, root_margin = 1e-13;  // the root is a guess for the repeated step
     double margin_slope_step = 1e-4;  // step of the difference for the rate of a margin, relative to the step
 };
@@ -24,7 +24,7 @@ template <class Margin>
 double root_between(double low, double margin_low, double high, double margin_high, const Margin& margin) {
     if (margin_low <= 0.0) return low;  // the margin starts at zero and falls at once
     int side = 0;
-    for (int it = 0; it < root_search_parameters.root_passes && high - low > root_search_parameters.root_width; ++it) {
+    for (int it = 0; it < root_search_parameters.max_root_passes && high - low > root_search_parameters.root_width; ++it) {
         double mid = (low * margin_high - high * margin_low) / (margin_high - margin_low);
         if (!(mid > low && mid < high)) mid = 0.5 * (low + high);
         const double here = margin(mid);
@@ -93,7 +93,7 @@ double dip_between(double a, double b, const Margin& margin, double& value) {
     constexpr double golden = 0.3819660112501051;
     const double end = b;
     double x1 = a + golden * (b - a), x2 = b - golden * (b - a), g1 = margin(x1), g2 = margin(x2);
-    for (int it = 0; it < root_search_parameters.dip_passes; ++it) {
+    for (int it = 0; it < root_search_parameters.max_dip_passes; ++it) {
         if (std::min(g1, g2) < 0.0) {
             value = std::min(g1, g2);
             return g1 < g2 ? x1 : x2;

@@ -99,18 +99,18 @@ std::vector<RunSamples> run_all(const Program& p, const Array2& q, const Array2&
     const size_t parts = std::min(count, draws * static_cast<size_t>(useful));
     RunPrograms programs(p, names, values, useful);
     std::vector<RunSamples> kept(parts);
-    std::vector<Room> rooms(useful);
+    std::vector<ThreadWorkspace> workspaces(useful);
     std::atomic<bool> stopped{false};
     options.tick = [&stopped](double t) {
-        if (stopped) throw Failure(Failure::Kind::interrupted, t);
+        if (stopped) throw EndOfRun{Failure(Failure::Kind::interrupted, t)};
     };
     const auto q_all = map(q), v_all = map(v);
     parallel_for(parts, threads, stopped, [&](size_t part, int k) {
         RunSamples mine;
         for (size_t i = part * count / parts; i < (part + 1) * count / parts && !stopped; ++i) {
             const Program& program = programs.of(i, k);
-            rooms[k].carry(program, options, !names.empty(), q_all.row(i), v_all.row(i));
-            mine.add(i, rooms[k].run.out);
+            workspaces[k].run_from(program, options, !names.empty(), q_all.row(i), v_all.row(i));
+            mine.add(i, workspaces[k].run.out);
         }
         kept[part] = std::move(mine);
     });

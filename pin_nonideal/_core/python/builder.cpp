@@ -170,10 +170,10 @@ void bind_actuation(nb::class_<Builder>& builder) {
         .def("add_torque_table", [](Builder& b, std::vector<double> times, Array2 values) {
             b.p->added_torque = TorqueTable{std::move(times), map(values).transpose()};
         }, "times"_a, "values"_a)
-        .def("limit_effort", [](Builder& b, Array least, Array most) {
-            b.p->least_effort = map(least);
-            b.p->most_effort = map(most);
-        }, "least"_a, "most"_a);
+        .def("limit_effort", [](Builder& b, Array min_effort, Array max_effort) {
+            b.p->min_effort = map(min_effort);
+            b.p->max_effort = map(max_effort);
+        }, "min_effort"_a, "max_effort"_a);
 }
 
 void bind_enums(nb::module_& m) {

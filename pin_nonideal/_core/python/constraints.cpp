@@ -54,23 +54,23 @@ namespace {
 // Conversion of a Python argument to a data member.
 template <class Value>
 struct From {
-    using Given = Value;
-    static Value make(const Given& x) { return x; }
+    using Argument = Value;
+    static Value make(const Argument& x) { return x; }
 };
 template <>
 struct From<Frame> {
-    using Given = FrameTuple;
-    static Frame make(const Given& x) { return frame_of(x); }
+    using Argument = FrameTuple;
+    static Frame make(const Argument& x) { return frame_of(x); }
 };
 template <>
 struct From<Vec3> {
-    using Given = std::vector<double>;
-    static Vec3 make(const Given& x) { return vec3(x); }
+    using Argument = std::vector<double>;
+    static Vec3 make(const Argument& x) { return vec3(x); }
 };
 template <>
 struct From<Hull> {  // corners, planes and edges, as flat lists
-    using Given = std::tuple<std::vector<double>, std::vector<double>, std::vector<int>>;
-    static Hull make(const Given& x) {
+    using Argument = std::tuple<std::vector<double>, std::vector<double>, std::vector<int>>;
+    static Hull make(const Argument& x) {
         const auto& [numbers, planes, edges] = x;
         std::vector<Vec3> corners;
         for (size_t k = 0; k + 2 < numbers.size(); k += 3)
@@ -80,18 +80,18 @@ struct From<Hull> {  // corners, planes and edges, as flat lists
 };
 template <>
 struct From<Revolved> {  // half the length, and the radii below and above
-    using Given = std::tuple<double, double, double>;
-    static Revolved make(const Given& x) { return std::make_from_tuple<Revolved>(x); }
+    using Argument = std::tuple<double, double, double>;
+    static Revolved make(const Argument& x) { return std::make_from_tuple<Revolved>(x); }
 };
 template <>
 struct From<TimeFunction> {
-    using Given = nb::object;
-    static TimeFunction make(const Given& x) { return time_function(x); }
+    using Argument = nb::object;
+    static TimeFunction make(const Argument& x) { return time_function(x); }
 };
 template <class Signature>
 struct From<std::function<Signature>> {  // user function, or None if it is optional
-    using Given = Function<typename Seen<Signature>::Type>;
-    static std::function<Signature> make(const Given& f) {
+    using Argument = Function<typename Seen<Signature>::Type>;
+    static std::function<Signature> make(const Argument& f) {
         return f ? user_function<Signature>(*f) : std::function<Signature>();
     }
 };
@@ -100,7 +100,7 @@ struct From<std::function<Signature>> {  // user function, or None if it is opti
 template <class K, class... Value>
 void bind_kind(nb::class_<Builder>& builder, const Field<K, Value>&... data) {
     builder.def((std::string("add_") + K::name).c_str(),
-        [data...](Builder& b, const std::string& name, const typename From<Value>::Given&... given) {
+        [data...](Builder& b, const std::string& name, const typename From<Value>::Argument&... given) {
             K kind{};
             ((kind.*data.member = From<Value>::make(given)), ...);
             return b.add(name, std::move(kind), K::role);

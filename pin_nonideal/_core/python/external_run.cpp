@@ -34,9 +34,9 @@ struct ExternalRunOwner {
     Recording out;
     ExternalRun run;
 
-    ExternalRunOwner(std::shared_ptr<const Program> program, const Options& asked, const Tick& tick,
+    ExternalRunOwner(std::shared_ptr<const Program> program, const Options& run_options, const Tick& tick,
              const std::vector<UserEventTuple>& events)
-        : p(std::move(program)), options(with_events(asked, events)), w(*p), run(*p, w, options, out) {
+        : p(std::move(program)), options(with_events(run_options, events)), w(*p), run(*p, w, options, out) {
         if (tick) options.tick = [tick](double t) { (*tick)(t); };
     }
 

@@ -30,7 +30,7 @@ void bind_failures(nb::module_& m) {
     using Kind = Failure::Kind;
     using Solutions = Failure::Solutions;
     nb::enum_<Solutions>(m, "Solutions", "Proven number of motions under friction at a paradox.")
-        .value("not_told", Solutions::not_told)
+        .value("unproven", Solutions::unproven)
         .value("none", Solutions::none)
         .value("several", Solutions::several);
     nb::enum_<Kind>(m, "FailureKind", "Cause of the failure of an evaluation or a run.")

@@ -6,31 +6,28 @@
 
 #include "python/reused_workspace.hpp"
 #include "run/stepped_run.hpp"
+#include "run/whole_run.hpp"
 
 namespace pn {
 
-class KeptRun {
+class ReusedRun {
 public:
     // Run from a state to the end, in a workspace that is reset first. `first`: run state of a new workspace. All calls
-    // until `forget` use the program, workspace and options of the first call. The results stay in `out` until the next
+    // until `reset` use the program, workspace and options of the first call. The results stay in `out` until the next
     // call.
-    void carry(const Program& p, Workspace& w, const RunState& first, const Options& options, const VecX& q0,
-               const VecX& v0) {
+    void run_from(const Program& p, Workspace& w, const RunState& first, const Options& options, const VecX& q0,
+                  const VecX& v0) {
         clear_samples();
         clear(p, w, first);
-        try {
+        record_end(out, [&] {
             if (!run_) run_ = std::make_unique<SteppedRun>(p, w, options, out);
             run_->begin(q0, v0, options.duration, true);
             run_->run();
-        } catch (const Failure& failure) {
-            out.failure = failure;
-        } catch (...) {
-            out.error = std::current_exception();
-        }
-        if (out.failure || out.error) forget();  // a stopped run cannot continue
+        });
+        if (out.failure || out.error) reset();  // a stopped run cannot continue
     }
 
-    void forget() { run_.reset(); }
+    void reset() { run_.reset(); }
 
     // Results. The memory of state samples is kept for the next run, unless the results were moved out.
     Recording out;
@@ -52,19 +49,19 @@ private:
 };
 
 // Workspace of one thread with its initial run state, and a run in it. Both are used for many runs.
-struct Room {
+struct ThreadWorkspace {
     std::unique_ptr<Workspace> own;
     RunState first;
-    KeptRun run;
+    ReusedRun run;
 
     // `anew`: make a new workspace and run.
-    void carry(const Program& p, const Options& options, bool anew, const VecX& q0, const VecX& v0) {
+    void run_from(const Program& p, const Options& options, bool anew, const VecX& q0, const VecX& v0) {
         if (!own || anew) {
-            run.forget();
+            run.reset();
             own = std::make_unique<Workspace>(p);
             first = own->state;
         }
-        run.carry(p, *own, first, options, q0, v0);
+        run.run_from(p, *own, first, options, q0, v0);
     }
 };
 

@@ -66,22 +66,22 @@ void Runner::choose_modes(double t, const std::optional<std::vector<Mode>>& mode
 // Close the touching contacts that do not separate and carry nonnegative loads. Given modes apply to all elements.
 void Runner::choose_contacts(double t, const std::optional<std::vector<Mode>>& modes) {
     set_closed(*p, *w, std::vector<char>(p->gaps.size(), 0));
-    ClosingQuestion question;
-    question.rest = touching_contacts(*p, *w, t, q, v, true).rest;
-    question.after_impact = true;
-    question.prescribed = modes.has_value();
-    close_contacts(*p, *w, t, q, v, question, [&](const RestingMotion* together) {
+    OnsetQuery query;
+    query.rest = touching_contacts(*p, *w, t, q, v, true).rest;
+    query.after_impact = true;
+    query.prescribed = modes.has_value();
+    close_contacts(*p, *w, t, q, v, query, [&](const RestingMotion* joint_motion) {
         update_kinematics(*p, *w, t, q, v);
-        choose_friction(t, modes, together);
+        choose_friction(t, modes, joint_motion);
     });
     if (!modes && !slip_opposes_friction(*p, *w, v)) throw Failure(Failure::Kind::not_converged, t, w->now.slipping);
 }
 
-void Runner::choose_friction(double t, const std::optional<std::vector<Mode>>& modes, const RestingMotion* together) {
-    ModeQuestion asked = first_question(*p, *w, t, q, v);  // sets the slip directions, too
+void Runner::choose_friction(double t, const std::optional<std::vector<Mode>>& modes, const RestingMotion* joint_motion) {
+    ModeQuery mode_query = make_first_mode_query(*p, *w, t, q, v);  // sets the slip directions, too
     if (!modes) {
-        if (together) together->answer(*p, *w, asked);
-        return resolve_modes(*p, *w, t, q, v, asked);
+        if (joint_motion) joint_motion->to_modes(*p, *w, mode_query);
+        return resolve_modes(*p, *w, t, q, v, mode_query);
     }
     set_modes(*p, *w, *modes);
     w->state.warm = false;
@@ -189,7 +189,7 @@ std::tuple<Numbers, Numbers, Numbers, Numbers> Runner::rows(const Array& q_in, c
         fill_A(all, m, w->now.terms, values, local.data());
         for (int k = 0; k < all.total; ++k, ++row) {
             for (size_t l = 0; l < all.support.size(); ++l) A[row * m.nv + all.support[l]] = local[l * all.total + k];
-            b[row] = -values.drift[k];
+            b[row] = -values.bias[k];
             phi[row] = values.residual[k];
             rate[row] = values.rate[k];
         }
@@ -278,18 +278,18 @@ std::pair<double, double> Runner::energies(const Array& q_in, const Array& v_in)
 }
 
 std::tuple<Numbers, Numbers, double, double, double> Runner::project(const Array& q_in, const Array& v_in, double t,
-                                                                     double far) {
+                                                                     double max_residual) {
     set(q_in, v_in, {});
-    const Closure found = close(*p, *w, t, q, v, far);
+    const Closure found = close(*p, *w, t, q, v, max_residual);
     return {to_numpy(q), to_numpy(v), found.before, found.after, found.rate};
 }
 
 Options& Runner::read(const nb::object& run_options) {
-    if (!asked.is(run_options)) {
-        run_.forget();  // the kept run uses the old options
-        asked.reset();
+    if (!last_options.is(run_options)) {
+        run_.reset();  // the kept run uses the old options
+        last_options.reset();
         options = nb::cast<Options>(run_options);
-        asked = run_options;
+        last_options = run_options;
     }
     return options;
 }
@@ -307,10 +307,10 @@ Outcome Runner::simulate(const Array& q_in, const Array& v_in) {
     {
         nb::gil_scoped_release release;
         if (is_plain(options)) {
-            run_.carry(*p, *w, first, options, q0, v0);
+            run_.run_from(*p, *w, first, options, q0, v0);
             outcome.recording = std::exchange(run_.out, {});
         } else {
-            run_.forget();
+            run_.reset();
             clear(*p, *w, first);
             pn::simulate(*p, *w, q0, v0, options, outcome.recording);
         }
@@ -327,7 +327,7 @@ Outcome Runner::simulate(const Array& q_in, const Array& v_in) {
 Outcome Runner::resume(const nb::bytes& state, const Options& with) {
     const std::string bytes(static_cast<const char*>(state.data()), state.size());
     Recording recording;
-    run_.forget();  // the kept run uses the old workspace
+    run_.reset();  // the kept run uses the old workspace
     w = std::make_unique<Workspace>(*p);
     {
         nb::gil_scoped_release release;
@@ -371,7 +371,7 @@ nb::class_<Runner> bind_runner(nb::module_& m) {
         .def("slip_rows", &Runner::slip_rows, "q"_a, "v"_a, "t"_a)
         .def("terms", &Runner::terms, "q"_a, "v"_a)
         .def("energies", &Runner::energies, "q"_a, "v"_a)
-        .def("project", &Runner::project, "q"_a, "v"_a, "t"_a, "far"_a)
+        .def("project", &Runner::project, "q"_a, "v"_a, "t"_a, "max_residual"_a)
         .def("time_evaluations", &Runner::time_evaluations, "q"_a, "v"_a, "t"_a, "count"_a)
         .def_prop_ro("rank", &Runner::constraint_rank)
         // If several motions are possible: true takes the one nearest to the last motion, false raises.

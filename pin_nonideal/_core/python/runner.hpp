@@ -33,7 +33,7 @@ struct Runner {
     VecX q, v;
 
     // RunOptions of the last run in Python, and their conversion. Functions belong to one run only.
-    nb::object asked;
+    nb::object last_options;
     Options options;
 
     explicit Runner(std::shared_ptr<const Program> program);
@@ -65,9 +65,9 @@ struct Runner {
     // Return the kinetic energy, and the potential energy in gravity [J].
     std::pair<double, double> energies(const Array& q_in, const Array& v_in);
     // Project q and v onto the constraints. Return q, v, the largest residual before, and the residual and rate after.
-    // If the residual before exceeds `far`, nothing moves.
+    // If the residual before exceeds `max_residual`, nothing moves.
     std::tuple<Numbers, Numbers, double, double, double> project(const Array& q_in, const Array& v_in, double t,
-                                                                 double far);
+                                                                 double max_residual);
     double time_evaluations(const Array& q_in, const Array& v_in, double t, int count);
 
     // Simulate with the options read last.
@@ -75,7 +75,7 @@ struct Runner {
     Outcome resume(const nb::bytes& state, const Options& with);
 
 private:
-    KeptRun run_;  // kept run, which records only states
+    ReusedRun run_;  // kept run, which records only states
 
     // Set the state and the torques. Throw std::invalid_argument if they do not fit the model, which Python explains.
     void set(const Array& q_in, const Array& v_in, const std::optional<Array>& tau);

@@ -50,7 +50,7 @@ void keep(Options& o, const Save& save, double interval) {
     o.save_interval = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(interval));
 }
 
-void tell(Options& o, const Hint& hint) {
+void set_hint(Options& o, const Hint& hint) {
     if (!hint) return;
     o.hint = [hint](double t, int dof, double rate, bool decays) {
         nb::gil_scoped_acquire gil;
@@ -115,18 +115,18 @@ decltype(Options::callback) user_callback(const Callback& given) {
     return [f = *given, q_in = HandedArray(), v_in = HandedArray()](double t, const VecX& q, const VecX& v,
                                                                     VecX& torque) mutable {
         nb::gil_scoped_acquire gil;
-        const nb::object told = f(t, q_in(q), v_in(v));
-        if (told.is_none()) return Options::Told::go_on;
-        if (told.is(Py_True)) return Options::Told::stop;
-        read_into(told, torque);
-        return Options::Told::torque;
+        const nb::object answer = f(t, q_in(q), v_in(v));
+        if (answer.is_none()) return Options::CallbackResult::proceed;
+        if (answer.is(Py_True)) return Options::CallbackResult::stop;
+        read_into(answer, torque);
+        return Options::CallbackResult::torque;
     };
 }
 
 // Project many states onto the constraints on several threads, each as by Runner::project. Return q and v by rows, and
 // the largest residual and rate of each state afterwards. Both are NaN if the projection failed.
 static std::tuple<Numbers, Numbers, Numbers, Numbers> nearest_states(const Program& p, const Array2& q_in,
-                                                                     const Array2& v_in, double t, double far,
+                                                                     const Array2& v_in, double t, double max_residual,
                                                                      int threads, const std::vector<NumberTuple>& names,
                                                                      const Array2& values) {
     RowMajor q = map(q_in), v = map(v_in);
@@ -141,7 +141,7 @@ static std::tuple<Numbers, Numbers, Numbers, Numbers> nearest_states(const Progr
         if (!spaces[k] || !names.empty()) spaces[k] = std::make_unique<Workspace>(mine);
         VecX q_one = q.row(i), v_one = v.row(i);
         try {
-            const Closure found = close(mine, *spaces[k], t, q_one, v_one, far);
+            const Closure found = close(mine, *spaces[k], t, q_one, v_one, max_residual);
             after[i] = found.after;
             rate[i] = found.rate;
             q.row(i) = q_one;
@@ -179,11 +179,11 @@ static nb::typed<nb::list, std::optional<Outcome>> rollout(const Program& p, con
     const size_t count = q.shape(0);
     const int useful = useful_threads(count, threads);
     RunPrograms programs(p, names, values, useful);
-    std::vector<Room> rooms(useful);
+    std::vector<ThreadWorkspace> workspaces(useful);
     std::vector<std::optional<Outcome>> outcomes(count);
     std::atomic<bool> stopped{false};
     const auto stop = [&stopped](double t) {
-        if (stopped) throw Failure(Failure::Kind::interrupted, t);
+        if (stopped) throw EndOfRun{Failure(Failure::Kind::interrupted, t)};
     };
     Options own = options;  // options of the caller's thread, which receives Python's signals
     watch(own, {});
@@ -196,17 +196,18 @@ static nb::typed<nb::list, std::optional<Outcome>> rollout(const Program& p, con
     try {
         parallel_for(count, threads, stopped, [&](size_t i, int k) {
             const bool anew = !names.empty() || options.record.dense;
-            Room& room = rooms[k];
-            room.carry(programs.of(i, k), k == 0 ? own : options, anew, q_all.row(i), v_all.row(i));
-            if (is_interrupt(room.run.out.error)) stopped = true;
-            outcomes[i] = Outcome{room.own->counters, std::exchange(room.run.out, {})};
+            ThreadWorkspace& workspace = workspaces[k];
+            workspace.run_from(programs.of(i, k), k == 0 ? own : options, anew, q_all.row(i), v_all.row(i));
+            if (is_interrupt(workspace.run.out.error)) stopped = true;
+            outcomes[i] = Outcome{workspace.own->counters, std::exchange(workspace.run.out, {})};
         });
     } catch (...) {  // the outcome of an interrupted run reports the interrupt
-        const auto tells = [](const std::optional<Outcome>& one) {
+        const auto was_interrupted = [](const std::optional<Outcome>& one) {
             const auto failure = one ? one->recording.failure : std::nullopt;
             return failure && failure->kind == Failure::Kind::interrupted;
         };
-        if (!is_interrupt(std::current_exception()) || std::none_of(outcomes.begin(), outcomes.end(), tells)) throw;
+        const bool any_interrupted = std::any_of(outcomes.begin(), outcomes.end(), was_interrupted);
+        if (!is_interrupt(std::current_exception()) || !any_interrupted) throw;
     }
     nb::typed<nb::list, std::optional<Outcome>> out;
     for (std::optional<Outcome>& one : outcomes) out.append(one ? nb::cast(std::move(*one)) : nb::none());
@@ -222,12 +223,12 @@ void bind_runs(nb::module_& m, nb::class_<Runner>& runner) {
     m.def("methods", [] { return methods(); });
     bind_outcome(m);
     runner
-        .def("simulate", [](Runner& r, const Array& q, const Array& v, const RunOptions& asked, const Tick& tick,
+        .def("simulate", [](Runner& r, const Array& q, const Array& v, const RunOptions& run_options, const Tick& tick,
                             const Save& save, double save_interval, const std::vector<UserEventTuple>& events,
                             const Callback& callback, const Hint& hint) {
-            Options& options = r.read(asked);
+            Options& options = r.read(run_options);
             watch(options, tick);
-            tell(options, hint);
+            set_hint(options, hint);
             keep(options, save, save_interval);
             options.events = user_events(events);
             options.callback = user_callback(callback);
@@ -240,7 +241,7 @@ void bind_runs(nb::module_& m, nb::class_<Runner>& runner) {
             keep(options, save, save_interval);
             return r.resume(state, options);
         }, "state"_a, "options"_a, "tick"_a = nb::none(), "save"_a = nb::none(), "save_interval"_a = 0.0);
-    m.def("nearest_states", &nearest_states, "program"_a, "q"_a, "v"_a, "t"_a, "far"_a, "threads"_a,
+    m.def("nearest_states", &nearest_states, "program"_a, "q"_a, "v"_a, "t"_a, "max_residual"_a, "threads"_a,
           "names"_a, "values"_a);
     m.def("dense_points", [](const std::string& method) { return DenseRecorder::points(method_named(method)); }, "method"_a);
     m.def("inside_steps", &inside_steps, "states"_a, "step"_a, "part"_a);

@@ -21,7 +21,7 @@ namespace {
 
 // Planned number of periods of a stepper's run, and number of samples at events after which the samples are cleared.
 constexpr double planned_periods = 1e6;
-constexpr size_t most_samples = 100;
+constexpr size_t max_event_samples = 100;
 constexpr double no_sample_interval = 1e300;  // the time to the next sample [s]
 
 Options options_of(const std::string& method, double period, double dt, double rtol, const Array& atol) {
@@ -65,7 +65,7 @@ struct SteppedRunOwner {
         clear(*p, w, first);
         w.now.has_override = !torque.is_none();
         if (w.now.has_override) w.now.override_torque = tau;
-        forget_samples();
+        clear_samples();
         out.events.clear();
     }
 
@@ -81,7 +81,7 @@ struct SteppedRunOwner {
 
     void advance(nb::handle torque) {
         if (!torque.is_none()) read_buffer(torque, tau);
-        if (out.t.size() > most_samples) forget_samples();
+        if (out.t.size() > max_event_samples) clear_samples();
         attempt([&] {
             if (!torque.is_none()) run->set_torque(tau);
             run->advance(period);
@@ -100,7 +100,7 @@ struct SteppedRunOwner {
         }
     }
 
-    void forget_samples() {
+    void clear_samples() {
         for (std::vector<double>* samples : {&out.t, &out.q, &out.v, &out.violation, &out.violation_rate, &out.z})
             samples->clear();
         out.modes.clear();

@@ -40,7 +40,7 @@ std::optional<int> ExternalRun::singular_onset() {
         if (friction.dim == 1 || !at_rest(p, w, e, system.v)) continue;
         const FrictionProblem problem(p, w, {e});
         const double by_friction = w.now.limit[e] * problem.W.trace() / friction.dim;
-        if (slip_rate_along_mode(p, w, e) < parameters.least_onset * by_friction) return e;
+        if (slip_rate_along_mode(p, w, e) < parameters.min_onset_acceleration * by_friction) return e;
     }
     return std::nullopt;
 }

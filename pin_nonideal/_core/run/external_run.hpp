@@ -17,7 +17,7 @@ struct ExternalRunParameters {
     // Minimum slip acceleration at an onset, relative to the acceleration by friction alone. The inverse ratio is the
     // rate at which the slip direction relaxes, times the time since the onset. Implicit steps resolve inverse ratios
     // up to about 30.
-    double least_onset = 1.0 / 30.0;
+    double min_onset_acceleration = 1.0 / 30.0;
 };
 
 class ExternalRun : public Simulation {
@@ -37,7 +37,7 @@ public:
 
     // Return the latest end time of the integrator's next step: the next break of a time function, at most `end`.
     double stop_before(double end) {
-        if (p.searches_breaks) breaks.look(end);
+        if (p.searches_breaks) breaks.find_in_step(end);
         return std::min(end, breaks.next());
     }
 

@@ -34,8 +34,8 @@ struct Options {
     double max_wall = 0.0;   // maximum wall time [s], 0: no limit
     std::vector<UserEvent> events;
     // Called between two steps. Can end the run, or replace the actuation torques of later steps.
-    enum class Told { go_on, stop, torque };
-    std::function<Told(double t, const VecX& q, const VecX& v, VecX& torque)> callback;
+    enum class CallbackResult { proceed, stop, torque };
+    std::function<CallbackResult(double t, const VecX& q, const VecX& v, VecX& torque)> callback;
     std::function<void(double t)> tick;  // progress and interruption, called every few steps
     // Called once if the run will be slow because its steps resolve a fast motion.
     // Arguments: time [s], dof whose force contributes most to the motion, rate of the motion [1/s], true if the motion

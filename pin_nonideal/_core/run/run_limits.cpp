@@ -19,13 +19,13 @@ bool RunLimits::is_late() const {
 // Runs are saved only here, because the state between two steps is all that the next step needs.
 void RunLimits::check() {
     try {
-        if (options_.tick && ++ticks_ % parameters.steps_a_tick == 0) options_.tick(progress_.t);
+        if (options_.tick && ++ticks_ % parameters.steps_per_tick == 0) options_.tick(progress_.t);
     } catch (...) {
         save();
         throw;
     }
     if (options_.save && Clock::now() >= next_save_) save();
-    if (out_.steps == parameters.early_steps && progress_.t - options_.t0 < parameters.least_progress * options_.duration)
+    if (out_.steps == parameters.early_steps && progress_.t - options_.t0 < parameters.min_progress * options_.duration)
         throw Failure(Failure::Kind::step_size, progress_.t, {}, static_cast<double>(out_.steps));
     if (options_.max_steps > 0 && out_.steps >= options_.max_steps)
         throw Failure(Failure::Kind::steps, progress_.t, {}, static_cast<double>(out_.steps));

@@ -7,10 +7,10 @@
 namespace pn {
 
 struct RunLimitsParameters {
-    long early_steps = 20000;       // number of steps after which the progress is checked
-    double least_progress = 1e-10;  // minimum progress, relative to the duration; slower runs raise a Failure
+    long early_steps = 20000;     // number of steps after which the progress is checked
+    double min_progress = 1e-10;  // minimum progress, relative to the duration; slower runs raise a Failure
     // Number of steps between two progress reports.
-    long steps_a_tick = 16;
+    long steps_per_tick = 16;
 };
 
 class RunLimits {

@@ -77,15 +77,16 @@ void Simulation::run() {
     while (!done() && between_steps()) {
         if (in_time) {
             time_stepping.step(options.dt, t_end, t_end);
-            growth.look();
+            growth.check_step();
             continue;
         }
         Proposal proposal;
-        try {
+        const auto failure = attempt([&] {
             proposal = propose();
             while (!control_error(proposal, integrate(proposal)) || !locate_event(proposal)) proposal = propose();
-        } catch (const Failure& failure) {
-            if (!goes_on(failure)) throw;
+        });
+        if (failure) {
+            if (!recover(*failure)) throw *failure;
             continue;
         }
         accept(proposal, event);
@@ -101,7 +102,7 @@ void Simulation::run() {
 
 bool Simulation::between_steps() {
     run_limits.check();
-    return !options.callback || torques.ask_callback();
+    return !options.callback || torques.call_callback();
 }
 
 void Simulation::restore(const std::string& state) {
@@ -116,13 +117,13 @@ Simulation::Proposal Simulation::propose() {
     torques.sample();
     const bool adaptive = options.method.adaptive();
     const std::optional<double> before_hand_over = to_hand_over();
-    if (p.searches_breaks) breaks.look(std::min(t_end, progress.t + (adaptive ? progress.h : options.dt)), adaptive);
+    if (p.searches_breaks) breaks.find_in_step(std::min(t_end, progress.t + (adaptive ? progress.h : options.dt)), adaptive);
     double stop = torques.next_stop(progress.t, t_end);
     if (!adaptive)  // stay on the fixed grid, also after an event inside a step
         stop = std::min(stop, options.t0 + (whole_lengths(progress.t - options.t0, options.dt) + 1.0) * options.dt);
     const double remaining = stop - progress.t;
     double size = adaptive ? progress.h : remaining;
-    if (adaptive && p.asks_functions && (system.velocity(progress.y).array() == 0.0).all()) {
+    if (adaptive && p.calls_functions && (system.velocity(progress.y).array() == 0.0).all()) {
         const double since = out.events.empty() ? options.t0 : out.events.back().time;
         size = std::min(size, std::max(parameters.rest_step, parameters.rest_part_step * (progress.t - since)));
     }
@@ -151,7 +152,7 @@ std::optional<double> Simulation::to_hand_over() {
     const bool adaptive = options.method.adaptive();
     hand_over_ahead = false;
     if (system.ng == 0 || (adaptive && !progress.may_hand_over)) return std::nullopt;
-    bool asks = true;
+    bool may_release = true;
     for (;;) {
         const double size =
             std::min(adaptive ? progress.h : options.dt, torques.next_stop(progress.t, t_end) - progress.t);
@@ -161,7 +162,7 @@ std::optional<double> Simulation::to_hand_over() {
         if (hand_over.is_reached(next->time)) {
             hand_over.pass(next->time);
             progress.hand_over_time = progress.t;
-        } else if (!std::exchange(asks, false) || !hand_over.is_unloaded(next->gap)) {
+        } else if (!std::exchange(may_release, false) || !hand_over.is_unloaded(next->gap)) {
             hand_over_ahead = true;
             return HandOver::step_before(next->time);
         }
@@ -186,20 +187,17 @@ std::optional<double> Simulation::integrate(const Proposal& proposal) {
     stepper.y0.head(system.ns) = progress.y.head(system.ns);
     stepper.y0.segment(system.ns, active - system.ns).setZero();  // watch entries integrate over one step only
     stepper.start_rate().head(active) = progress.rate.head(active);
-    try {
-        return try_step(proposal);
-    } catch (const Failure& failure) {
-        // A stage can leave the domain if the step is too long. A shorter step shows if the motion itself fails. If the
-        // motion diverges, no step is short enough, and the step-size failure is reported.
-        const double tiny = tiny_step_at(progress.t);
-        const bool runs_away = tiny * system.velocity(progress.rate).norm() > system.velocity(progress.y).norm();
-        if (!options.method.adaptive() || (proposal.size < tiny && !runs_away) ||
-            failure.kind == Failure::Kind::interrupted)
-            throw;
-        if (failure.kind == Failure::Kind::closure) open_loop = failure;
-        back_to_start();  // rows and warm starts of the failed step do not serve the next trial
-        return failed_error;
-    }
+    std::optional<double> error;
+    const auto failure = attempt([&] { error = try_step(proposal); });
+    if (!failure) return error;
+    // A stage can leave the domain if the step is too long. A shorter step shows if the motion itself fails. If the motion
+    // diverges, no step is short enough, and the step-size failure is reported.
+    const double tiny = tiny_step_at(progress.t);
+    const bool runs_away = tiny * system.velocity(progress.rate).norm() > system.velocity(progress.y).norm();
+    if (!options.method.adaptive() || (proposal.size < tiny && !runs_away)) throw *failure;
+    if (failure->kind == Failure::Kind::closure) open_loop = failure;
+    back_to_start();  // rows and warm starts of the failed step do not serve the next trial
+    return failed_error;
 }
 
 // Take one step. If its error is accepted, project and evaluate its end.
@@ -218,7 +216,7 @@ std::optional<double> Simulation::try_step(const Proposal& proposal) {
     const bool needs_end = options.method.first_same_as_last && !stepper.collocates();
     double error = needs_end ? 0.0 : stepper.error();
     if (!(error <= 1.0)) {
-        w.state.seeks_directions &= !stepper.collocates() || size > parameters.shortest_sought;
+        w.state.solves_directions &= !stepper.collocates() || size > parameters.shortest_sought;
         return error;
     }
     const bool measures = p.driven_exactly && options.method.adaptive() &&
@@ -237,7 +235,7 @@ std::optional<double> Simulation::try_step(const Proposal& proposal) {
         projection_move -= stepper.y1;
         error = std::max(error, norm.of_projection(projection_move, stepper.y0, stepper.y1, progress.t, size));
     }
-    choice.look();
+    choice.check_step();
     return error;
 }
 
@@ -249,7 +247,7 @@ bool Simulation::control_error(const Proposal& proposal, std::optional<double> e
     else ++out.rejected;
     progress.may_hand_over |= !accepted;
     const double spacing = std::abs(std::nextafter(progress.t, t_end) - progress.t);
-    if (accepted || !error || progress.h >= parameters.least_spacings * spacing) return accepted;
+    if (accepted || !error || progress.h >= parameters.min_step_spacings * spacing) return accepted;
     if (open_loop) throw *open_loop;
     throw Failure(Failure::Kind::step_size, progress.t);
 }
@@ -265,16 +263,12 @@ void Simulation::find_event() {
 }
 
 bool Simulation::locate_event(const Proposal& proposal) {
-    stiffness.look();
-    floor.look();
-    try {
-        find_event();
-        return true;
-    } catch (const Failure& failure) {
-        // The repeated step failed although the whole step did not, so the step is too long.
-        const double tiny = tiny_step_at(progress.t);
-        if (!options.method.adaptive() || proposal.size < tiny || failure.kind == Failure::Kind::interrupted) throw;
-    }
+    stiffness.check_step();
+    floor.check_step();
+    const auto failure = attempt([&] { find_event(); });
+    if (!failure) return true;
+    // The repeated step failed although the whole step did not, so the step is too long.
+    if (!options.method.adaptive() || proposal.size < tiny_step_at(progress.t)) throw *failure;
     ++out.rejected;
     progress.may_hand_over = true;
     progress.h = parameters.shortened * proposal.size;
@@ -286,25 +280,24 @@ bool Simulation::locate_event(const Proposal& proposal) {
 // acceleration at the step's end.
 bool Simulation::leaves_rate(const Proposal& proposal) const {
     return stops_there && proposal.last && proposal.stop >= t_end && !options.method.adaptive() &&
-           !system.has_events() && system.nz == 0 && !p.asks_functions && value_events.empty() &&
+           !system.has_events() && system.nz == 0 && !p.calls_functions && value_events.empty() &&
            !options.record.evaluates() && !options.record.dense && !options.callback && !options.save;
 }
 
 // If no step is short enough, continue from the step's start with other modes or by time stepping. Return false if
 // neither applies.
-bool Simulation::goes_on(const Failure& failure) {
+bool Simulation::recover(const Failure& failure) {
     const bool can_switch_modes = modes.can_switch_modes(failure);
     const bool at_hand_over = hand_over_ahead || progress.t - progress.hand_over_time <= ChatterDetector::parameters.window;
-    const bool of_hand_over = at_hand_over && ModeChanges::of_closed_contacts(failure);
+    const bool of_hand_over = at_hand_over && ModeChanges::is_of_closed_contacts(failure);
     const bool is_recoverable = of_hand_over || ModeChanges::is_recoverable(failure);
     if (!can_switch_modes && !is_recoverable) return false;
-    try {
+    bool has_switched = false;
+    attempt([&] {  // a failure means that the current modes have no motion at the step's start
         back_to_start();
-        if (can_switch_modes && modes.force_switch()) return true;
-    } catch (const Failure& at_start) {  // the current modes have no motion at the step's start
-        if (at_start.kind == Failure::Kind::interrupted) throw;
-    }
-    return is_recoverable && modes.step_over(failure, of_hand_over);
+        has_switched = can_switch_modes && modes.force_switch();
+    });
+    return has_switched || modes.bridge_with_time_stepping(failure, of_hand_over);
 }
 
 // Restore the modes and the dependent rows and forces of the step's start.
@@ -330,11 +323,11 @@ void Simulation::accept(const Proposal& proposal, const std::optional<FoundEvent
     remember_directions(system, progress.slip_at_start, arrives ? event->index : -1);
     progress.y.head(stepper.active) = stepper.y1.head(stepper.active);
     progress.rate.head(stepper.active) = stepper.end_rate().head(stepper.active);
-    growth.look();
+    growth.check_step();
     output.configured_now();
     impacts.remember_gaps(!event);
     output.keep_step();
-    value_events.tell(progress.t, out.events);
+    value_events.append_events(progress.t, out.events);
     if (!event || !event->changes_modes()) warnings.pulls(event);
     output.inside_step(warnings.several(true));
     stepper.end_directions();
@@ -344,7 +337,7 @@ void Simulation::accept(const Proposal& proposal, const std::optional<FoundEvent
     warnings.several(false);
     if (event->kind != FoundEvent::Kind::reversal) return;
     chatter.count();
-    modes.bridge(event->index);
+    modes.bridge_chatter(event->index);
 }
 
 // --- Record ---------------------------------------------------------------------------------------------------------

@@ -28,7 +28,7 @@ struct SimulationParameters {
     // Constraints that turn or open in a shorter step are detected in the next one.
     double shortest_measured = 1e-7;
     // Minimum step, in floating-point spacings of the time. Smaller steps raise a Failure.
-    double least_spacings = 4.0;
+    double min_step_spacings = 4.0;
     // Step after one that ended before a rest, relative to the time to the rest. The rest then lies inside the step.
     double past_rest = 1.02;
     // If collocation fails in steps shorter than this [s], the selected method takes the next trial.
@@ -70,7 +70,7 @@ protected:
     // Return the length of a step up to the next hand-over of a closed contact, after passing the hand-overs at this time.
     std::optional<double> to_hand_over();
     void find_event();
-    bool goes_on(const Failure& failure);
+    bool recover(const Failure& failure);
     void back_to_start();
 
     std::optional<double> try_step(const Proposal& proposal);

@@ -4,11 +4,11 @@ namespace pn {
 
 void SteppedRun::begin(const VecX& q0, const VecX& v0, double period, bool only) {
     progress = at_first_;
-    stepper.forget();
-    stiffness.forget();
+    stepper.reset_warm_start();
+    stiffness.reset();
     event.reset();
     open_loop.reset();
-    choice.forget();
+    choice.reset();
     out.steps = 0;  // the guards against runs without progress count from zero
     periods_ = 0;
     t_end = options.t0 + period;

@@ -24,13 +24,13 @@ void Torques::sample() {
     sampled->function(progress_.t, system_.q, system_.v, w.state.held_torque);
     w.state.has_held = true;
     progress_.next_period = static_cast<long>(whole_lengths(progress_.t - options_.t0, sampled->period)) + 1;
-    take_rate_anew();
+    recompute_rate();
 }
 
-bool Torques::ask_callback() {
+bool Torques::call_callback() {
     system_.read(progress_.y);
-    const Options::Told told = options_.callback(progress_.t, system_.q, system_.v, w.scratch.work);
-    if (told != Options::Told::torque) return told == Options::Told::go_on;
+    const Options::CallbackResult result = options_.callback(progress_.t, system_.q, system_.v, w.scratch.work);
+    if (result != Options::CallbackResult::torque) return result == Options::CallbackResult::proceed;
     set(w.scratch.work);
     return true;
 }
@@ -39,11 +39,11 @@ void Torques::set(const VecX& torque) {
     w.now.has_override = true;
     w.now.override_torque = torque;
     system_.read(progress_.y);
-    take_rate_anew();
+    recompute_rate();
 }
 
 // Recompute the rate at the state that was read last.
-void Torques::take_rate_anew() {
+void Torques::recompute_rate() {
     begin_step(p, w, progress_.t, system_.q, system_.v);
     system_.rate_of_evaluation(progress_.t, progress_.y, progress_.rate);
     output_.configured_now();

@@ -23,7 +23,7 @@ public:
     // Sample the sampled control if its next period begins now.
     void sample();
     // Call the user's callback, and set the torques that it returns. Return false if the callback ends the run.
-    bool ask_callback();
+    bool call_callback();
     // Replace the actuation torques from now on.
     void set(const VecX& torque);
     // Return the next time after the given one at which the actuation jumps or kinks or a time function breaks. It is at
@@ -31,7 +31,7 @@ public:
     double next_stop(double after, double t_end) const;
 
 private:
-    void take_rate_anew();
+    void recompute_rate();
 
     const Program& p;
     Workspace& w;

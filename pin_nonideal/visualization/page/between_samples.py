@@ -148,19 +148,19 @@ class Cubics:
         return steps[k], rates[k]
 
 
-def _closest(program: core.Program, q: Array, v: Array, t: Array, far: float) -> tuple[Array, Array]:
+def _closest(program: core.Program, q: Array, v: Array, t: Array, max_residual: float) -> tuple[Array, Array]:
     """Return configurations with closed loops, (n, nq), and their largest residuals or NaN, (n,).
 
-    Newton's method starts from residuals up to `far`; others are returned as they are.
+    Newton's method starts from residuals up to `max_residual`; others are returned as they are.
     """
     if not any(block.moves_in_time for block in program.constraints):
         no_values: Any = np.zeros((len(q), 0))
         closed, _, after, _ = core.nearest_states(
-            program, q, v, t=float(t[0]), far=far, threads=1, names=[], values=no_values
+            program, q, v, t=float(t[0]), max_residual=max_residual, threads=1, names=[], values=no_values
         )
         return np.array(closed).reshape(q.shape), np.asarray(after)
     projected, residual, runner = q.copy(), np.full(len(q), np.nan), program.runner()
     for i in range(len(q)):
         with suppress(PinNonidealError, core.CoreFailure):
-            projected[i], _, _, residual[i], _ = runner.project(q[i], v[i], float(t[i]), far)
+            projected[i], _, _, residual[i], _ = runner.project(q[i], v[i], float(t[i]), max_residual)
     return projected, residual

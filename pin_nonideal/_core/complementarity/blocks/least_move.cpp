@@ -15,7 +15,7 @@ bool LeastMove::pose() {
     immobile_.assign(problem.nodes.size(), 0);
     for (int i = 0; i < islands_.size(); ++i)
         for (int node : islands_[i].nodes) island_of_[node] = i;
-    weight_.assign(islands_.size(), parameters.most_weight);
+    weight_.assign(islands_.size(), parameters.max_weight);
     own_response_.resize(problem.rows);
     if (scaled_.size() < problem.rows) scaled_.resize(problem.rows);
     G_.assign(9 * problem.elements.size(), 0.0);
@@ -83,7 +83,7 @@ void LeastMove::exert(int i, const VecX& r, VecX& move) {
 // Compute the move of an island. Lower the weights while it is too long.
 bool LeastMove::seek(int i, const VecX& r, VecX& move) {
     double longest = -1.0;
-    for (; weight_[i] >= 1.0; weight_[i] *= parameters.less_weight, factored_[i] = 0) {
+    for (; weight_[i] >= 1.0; weight_[i] *= parameters.weight_ratio, factored_[i] = 0) {
         if (!factor(i)) return false;
         double size = 0.0, residual = 0.0;
         for (int n : islands_[i].nodes) move.segment(problem.nodes[n].first, problem.nodes[n].size).setZero();
@@ -146,7 +146,7 @@ void LeastMove::probe(int i) {
         const double* M = problem.M.data() + node.M;
         immobile_[n] = 1;
         for (int k = 0; k < node.size; ++k)
-            if (!(std::abs(probe_[node.first + k]) * std::sqrt(M[k * (node.size + 1)]) <= parameters.most_left))
+            if (!(std::abs(probe_[node.first + k]) * std::sqrt(M[k * (node.size + 1)]) <= parameters.max_unheld_part))
                 immobile_[n] = 0;
     }
 }

@@ -12,13 +12,13 @@ namespace pn {
 
 struct LeastMoveParameters {
     // Weight of a row, relative to the inertia that it moves, and the ratio of the next lower one.
-    double most_weight = 1e8, less_weight = 1e-2;
+    double max_weight = 1e8, weight_ratio = 1e-2;
     // A move longer than this many times the longest move of a single row resolves no gap: rows contradict each other.
     double max_move_ratio = 10.0;
     // Lever [m] below which the length of single moves is computed to judge a move.
     double short_lever = 0.1;
     // Largest part of a probing motion that rows leave to a node without freedom.
-    double most_left = 1e-3;
+    double max_unheld_part = 1e-3;
 };
 
 class LeastMove {

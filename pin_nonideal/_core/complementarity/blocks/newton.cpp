@@ -280,7 +280,8 @@ bool BlockNewton::has_changed_piece(const Island& island) const {
     return std::any_of(island.elements.begin(), island.elements.end(), [&](int i) { return there_[i].piece != piece_[i]; });
 }
 
-double BlockNewton::stiffen(const BlockProblem& p, const Island& island, BlockFactor& factor, VecX& f, VecX& x, VecX& w) {
+double BlockNewton::solve_without_compliance(const BlockProblem& p, const Island& island, BlockFactor& factor, VecX& f,
+                                             VecX& x, VecX& w) {
     keeps_factor_ = yielding_ > 0.0;
     const double error = solve(p, island, factor, Search::bold, 0.0, f, x, w);
     keeps_factor_ = false;
@@ -297,20 +298,21 @@ double BlockNewton::solve(const BlockProblem& p, const Island& island, BlockFact
     };
     if (!keeps_factor_) yielding_ = 0.0;
     double merit, error = begin(p, island, f, x, w, merit), least = error;
-    if (error <= parameters.solved) return error;
+    if (error <= parameters.tolerance) return error;
     keeps_factor_ = keeps_factor_ && !has_changed_piece(island);
     if (!keeps_factor_) {
         factor.analyse(p, island);
         for (int i : island.elements) piece_[i] = Piece::unknown;
     }
     each_row([&](int r) { f_best_[r] = f[r]; });
-    const auto cautious = [&] { return std::clamp(error, parameters.proximal, parameters.most_proximal); };
-    double weight = keeps_factor_ ? yielding_ : bold ? parameters.proximal : cautious();
+    const auto cautious = [&] { return std::clamp(error, parameters.min_proximal, parameters.max_proximal); };
+    double weight = keeps_factor_ ? yielding_ : bold ? parameters.min_proximal : cautious();
     double factored = keeps_factor_ ? weight : 0.0, recent[4] = {merit, merit, merit, merit};
     int refusals = 0, unguarded = 0, stagnant_steps = 0;
-    for (int step = 0; step < parameters.steps && error > parameters.solved; ++step, ++steps_) {
+    for (int step = 0; step < parameters.max_steps && error > parameters.tolerance; ++step, ++steps_) {
         if (!bold) weight = cautious();
-        const bool anew = !(weight >= parameters.kept_from * factored && weight <= parameters.kept_to * factored);
+        const bool anew =
+            !(weight >= parameters.min_kept_ratio * factored && weight <= parameters.max_kept_ratio * factored);
         bool symmetric = true;
         if (anew) factored = weight;
         keeps_factor_ = keeps_factor_ && !has_changed_piece(island);
@@ -324,16 +326,16 @@ double BlockNewton::solve(const BlockProblem& p, const Island& island, BlockFact
         const double before = error, merit_before = merit;
         const double bound = bold ? merit : std::max({recent[0], recent[1], recent[2], recent[3]});
         const bool accepted = shorten(p, island, f, w, bound, bold ? 2 : 6, length, error, merit);
-        if (!accepted && bold && refusals < parameters.most_refusals &&
-            weight < parameters.kept_from * parameters.most_proximal) {
+        if (!accepted && bold && refusals < parameters.max_refusals &&
+            weight < parameters.min_kept_ratio * parameters.max_proximal) {
             error = evaluate(p, island, f, w, merit);
-            weight = step == 0 ? cautious() : std::min(parameters.most_proximal, parameters.more_proximal * weight);
+            weight = step == 0 ? cautious() : std::min(parameters.max_proximal, parameters.proximal_growth * weight);
             ++refusals;
             factored = 0.0;
             continue;
         }
         if (!accepted) {
-            if (++unguarded > parameters.most_unguarded) {
+            if (++unguarded > parameters.max_unguarded_steps) {
                 error = before;
                 break;
             }
@@ -354,14 +356,14 @@ double BlockNewton::solve(const BlockProblem& p, const Island& island, BlockFact
             refusals = 0;
             keeps_factor_ = keeps_factor_ && merit < parameters.fast_decrease * merit_before;
             if (!keeps_factor_)
-                weight = std::max({parameters.proximal, weight * (merit < 0.1 * merit_before ? 0.01 : 0.3),
-                                   std::min(1e-3 * error, parameters.most_proximal)});
+                weight = std::max({parameters.min_proximal, weight * (merit < 0.1 * merit_before ? 0.01 : 0.3),
+                                   std::min(1e-3 * error, parameters.max_proximal)});
         }
         if (error < least) {
             least = error;
             each_row([&](int r) { f_best_[r] = f[r]; });
         }
-        if (least < parameters.stall_tolerance && error > parameters.stagnant * before && ++stagnant_steps > 1) break;
+        if (least < parameters.stall_tolerance && error > parameters.stall_ratio * before && ++stagnant_steps > 1) break;
     }
     if (error > least || !(error < HUGE_VAL)) each_row([&](int r) { f[r] = f_best_[r]; });
     move(p, island, f, x, w);

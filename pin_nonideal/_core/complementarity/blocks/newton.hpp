@@ -16,19 +16,20 @@ namespace pn {
 
 // Errors are relative to an element's forces, as `solve` returns them.
 struct BlockNewtonParameters {
-    double solved = 1e-12;          // error that needs no further step
+    double tolerance = 1e-12;       // error that needs no further step
     double stall_tolerance = 1e-9;  // error near the solution: steps without progress end, and rounding is removed
-    double stagnant = 0.25;         // ratio of two errors that counts as no progress near the solution
-    int steps = 40;                 // maximum number of steps
+    double stall_ratio = 0.25;      // ratio of two errors that counts as no progress near the solution
+    int max_steps = 40;             // maximum number of steps
     double decrease = 0.01;         // required part of the predicted decrease of the squared error
-    int most_refusals = 4;          // refused steps, each with a larger proximal term
-    int most_unguarded = 3;         // full steps without decrease
-    double proximal = 1e-8;         // least weight d of the proximal term: the root of the unit roundoff
-    double most_proximal = 0.1;     // largest weight of the proximal term
-    double more_proximal = 5.0;     // growth of the weight after a refused step
-    double fast_decrease = 1e-4;    // ratio of two squared errors after which `stiffen` keeps its factor
+    int max_refusals = 4;           // refused steps, each with a larger proximal term
+    int max_unguarded_steps = 3;    // full steps without decrease
+    double min_proximal = 1e-8;     // minimum weight d of the proximal term: the root of the unit roundoff
+    double max_proximal = 0.1;      // largest weight of the proximal term
+    double proximal_growth = 5.0;   // growth of the weight after a refused step
+    // Ratio of two squared errors after which `solve_without_compliance` keeps its factor.
+    double fast_decrease = 1e-4;
     // Least and largest change of the weight that keeps the factor.
-    double kept_from = 0.3, kept_to = 3.0;
+    double min_kept_ratio = 0.3, max_kept_ratio = 3.0;
 };
 
 class BlockNewton {
@@ -48,7 +49,8 @@ public:
     double solve(const BlockProblem& p, const Island& island, BlockFactor& factor, Search search, double compliance,
                  VecX& f, VecX& x, VecX& w);
     // Solve the laws without compliance from the forces of the last solution, which had a small one, with its factor.
-    double stiffen(const BlockProblem& p, const Island& island, BlockFactor& factor, VecX& f, VecX& x, VecX& w);
+    double solve_without_compliance(const BlockProblem& p, const Island& island, BlockFactor& factor, VecX& f, VecX& x,
+                                    VecX& w);
     // Return the error of the forces f, with their x and w.
     double error(const BlockProblem& p, const Island& island, const VecX& f, VecX& x, VecX& w);
     // Improve f and x by sweeps of the projected Gauss-Seidel method: each element in turn solves its own laws, with the

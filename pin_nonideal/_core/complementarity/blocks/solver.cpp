@@ -31,27 +31,27 @@ bool BlockSolver::attempt(int island, VecX& f) {
         least_ = error;
         best_ = f;
     }
-    return least_ <= parameters.accepted;
+    return least_ <= parameters.tolerance;
 }
 
 // Reduce a compliance of all elements to zero, from no forces. Each problem on the way has a solution close to that of
 // the last one, so the path ends at one solution of several.
-bool BlockSolver::stiffen(int island, VecX& f) {
+bool BlockSolver::compliance_continuation(int island, VecX& f) {
     for (int i : islands_[island].elements) f.segment(problem.elements[i].row, problem.elements[i].dim()).setZero();
     on_path_ = f;
-    double compliance = parameters.first_compliance, factor = parameters.first_factor;
-    for (int stage = 0; stage < parameters.most_stages && compliance > parameters.min_compliance; ++stage) {
+    double compliance = parameters.first_compliance, factor = parameters.first_compliance_ratio;
+    for (int stage = 0; stage < parameters.max_compliances && compliance > parameters.min_compliance; ++stage) {
         f = on_path_;
         const auto search = stage == 0 ? BlockNewton::Search::patient : BlockNewton::Search::bold;
-        if (newton(island, search, compliance, f) <= parameters.compliance_path_tolerance) {
+        if (newton(island, search, compliance, f) <= parameters.path_tolerance) {
             on_path_ = f;
-            if (compliance <= parameters.attempted_from && attempt(island, f)) return true;
+            if (compliance <= parameters.max_attempted_compliance && attempt(island, f)) return true;
             compliance *= factor;
         } else {  // a shorter step from the last compliance
             if (stage == 0) return false;
             compliance /= factor;
             factor = std::sqrt(factor);
-            if (factor > parameters.last_factor) return false;
+            if (factor > parameters.last_compliance_ratio) return false;
             compliance *= factor;
         }
     }
@@ -61,10 +61,10 @@ bool BlockSolver::stiffen(int island, VecX& f) {
 // Alternate sweeps and Newton's method. Newton's method may cycle between sets of sliding elements, which sweeps leave.
 bool BlockSolver::settle(int island, VecX& f) {
     on_path_ = best_;
-    for (int round = 0; round < parameters.most_sweep_rounds; ++round) {
-        newton_.sweep(problem, islands_[island], parameters.sweeps_a_round, on_path_, x_, w_);
+    for (int round = 0; round < parameters.max_sweep_rounds; ++round) {
+        newton_.sweep(problem, islands_[island], parameters.sweeps_per_round, on_path_, x_, w_);
         f = on_path_;
-        if (attempt(island, f) || least_ <= parameters.tolerated) return true;
+        if (attempt(island, f) || least_ <= parameters.path_free_tolerance) return true;
     }
     return false;
 }
@@ -73,9 +73,9 @@ bool BlockSolver::settle(int island, VecX& f) {
 // true if f solves the laws.
 bool BlockSolver::share(int island, VecX& f) {
     const double error = newton(island, BlockNewton::Search::bold, parameters.shared_compliance, f);
-    if (error > parameters.compliance_path_tolerance) return false;
-    least_ = newton_.stiffen(problem, islands_[island], factors_[island], f, x_, w_);
-    return least_ <= parameters.accepted;
+    if (error > parameters.path_tolerance) return false;
+    least_ = newton_.solve_without_compliance(problem, islands_[island], factors_[island], f, x_, w_);
+    return least_ <= parameters.tolerance;
 }
 
 // Copy the forces of an island.
@@ -126,11 +126,11 @@ double BlockSolver::solve(int island, VecX& f) {
     const bool many = static_cast<int>(on.elements.size()) >= parameters.min_sharing, alone = many && on.nodes.size() == 1;
     if (alone) {
         least_ = newton_.error(problem, on, f, x_, w_);
-        if (least_ <= BlockNewton::parameters.solved || share(island, f)) return least_;
+        if (least_ <= BlockNewton::parameters.tolerance || share(island, f)) return least_;
         copy(on, guess_, f);
     }
     least_ = newton(island, BlockNewton::Search::bold, 0.0, f);
-    if (least_ <= parameters.accepted && many && !alone && unloads(island, f)) {
+    if (least_ <= parameters.tolerance && many && !alone && unloads(island, f)) {
         const double error = least_;
         best_ = f;
         copy(on, guess_, f);
@@ -139,9 +139,10 @@ double BlockSolver::solve(int island, VecX& f) {
         least_ = error;
         newton_.move(problem, on, f, x_, w_);
     }
-    if (least_ <= parameters.accepted) return least_;
+    if (least_ <= parameters.tolerance) return least_;
     best_ = f;
-    if (!attempt(island, f) && least_ > parameters.tolerated && !settle(island, f)) stiffen(island, f);
+    if (!attempt(island, f) && least_ > parameters.path_free_tolerance && !settle(island, f))
+        compliance_continuation(island, f);
     f = best_;
     newton_.move(problem, islands_[island], f, x_, w_);
     return least_;
@@ -150,8 +151,8 @@ double BlockSolver::solve(int island, VecX& f) {
 // Solve an island. Forces that are far from a solution, or that add energy, are replaced by forces of sweeps.
 double BlockSolver::solve_within_energy(int island, VecX& f) {
     const double error = solve(island, f);
-    if (error <= parameters.swept_from && !adds_energy(island, f)) return error;
-    return std::max(sweep(island, f), parameters.swept_from);
+    if (error <= parameters.min_swept_error && !adds_energy(island, f)) return error;
+    return std::max(sweep(island, f), parameters.min_swept_error);
 }
 
 double BlockSolver::solve(VecX& f) {

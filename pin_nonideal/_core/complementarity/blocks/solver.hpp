@@ -7,20 +7,20 @@
 namespace pn {
 
 struct BlockSolverParameters {
-    double accepted = 1e-9;  // error of a solution. Newton stops at rounding, far below in most problems
+    double tolerance = 1e-9;  // error of a solution. Newton stops at rounding, far below in most problems
     // Error that is not worth the path of compliances, which costs a hundred Newton steps.
-    double tolerated = 1e-8;
-    double compliance_path_tolerance = 1e-6;               // error on the path of compliances
-    double first_compliance = 1.0, min_compliance = 1e-7;  // relative to an element's own response
-    double first_factor = 0.1, last_factor = 0.95;         // ratio of successive compliances
+    double path_free_tolerance = 1e-8;
+    double path_tolerance = 1e-6;                                       // error on the path of compliances
+    double first_compliance = 1.0, min_compliance = 1e-7;               // relative to an element's own response
+    double first_compliance_ratio = 0.1, last_compliance_ratio = 0.95;  // ratio of successive compliances
     double shared_compliance = 1e-4;  // compliance that decides shares of a load, relative to an element's own response
     int min_sharing = 4;              // least number of elements on a single node whose shares are decided
-    double attempted_from = 1e-2;                          // largest compliance from which a solution is attempted
-    int most_stages = 30;                                  // maximum number of compliances on the path
+    double max_attempted_compliance = 1e-2;  // largest compliance from which a solution is attempted
+    int max_compliances = 30;                // maximum number of compliances on the path
     // Maximum rounds of sweeps, and sweeps of a round.
-    int most_sweep_rounds = 8, sweeps_a_round = 50;
+    int max_sweep_rounds = 8, sweeps_per_round = 50;
     // Error from which sweeps from no forces replace the best forces found, and the number of these sweeps.
-    double swept_from = 1e-2;
+    double min_swept_error = 1e-2;
     int last_sweeps = 400;
 };
 
@@ -34,7 +34,7 @@ public:
     // Prepare the problem once its nodes and elements are set. Returns false if an inertia is not positive definite.
     bool pose();
     // Solve for the forces f from a guess, usually those of the last step. Return the largest error of an element,
-    // relative to its forces, and at least `swept_from` for forces of sweeps. The contacts of a single node share its
+    // relative to its forces, and at least `min_swept_error` for forces of sweeps. The contacts of a single node share its
     // load as equally compliant contacts do, so that their forces depend on the problem alone. Between several nodes
     // shares stay close to the guess.
     double solve(VecX& f);
@@ -61,7 +61,7 @@ private:
     void copy(const Island& island, const VecX& from, VecX& to) const;
     bool unloads(int island, const VecX& f) const;
     bool settle(int island, VecX& f);
-    bool stiffen(int island, VecX& f);
+    bool compliance_continuation(int island, VecX& f);
     bool attempt(int island, VecX& f);
     bool adds_energy(int island, const VecX& f);
     double sweep(int island, VecX& f);

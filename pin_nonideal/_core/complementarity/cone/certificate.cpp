@@ -51,9 +51,9 @@ bool no_forces(const ConeProblem& p, VecX& y) {
         const ConeElement& element = p.elements[e];
         const auto ue = u.segment(p.at[e], element.dim);
         if (element.is(ConeKind::contact) &&
-            (outside_dual(element, ue) > certificate_parameters.shown || y[p.at[e]] < 0.0))
+            (outside_dual(element, ue) > certificate_parameters.zero_tolerance || y[p.at[e]] < 0.0))
             return false;
-        if (element.is(ConeKind::equality) && ue.cwiseAbs().maxCoeff() > certificate_parameters.shown) return false;
+        if (element.is(ConeKind::equality) && ue.cwiseAbs().maxCoeff() > certificate_parameters.zero_tolerance) return false;
         if (element.is(ConeKind::box)) margin -= element.bound * ue.norm();
     }
     return margin > certificate_parameters.min_margin;
@@ -66,7 +66,7 @@ void sharpen(const ConeProblem& p, const MatX& E, double near_edge, VecX& y) {
     MatX J = MatX::Zero(rank + 3 * p.size(), p.n);
     VecX miss = VecX::Zero(J.rows());
     J.topRows(rank) = E.transpose();
-    for (int it = 0; it < certificate_parameters.most_sharpenings; ++it) {
+    for (int it = 0; it < certificate_parameters.max_sharpenings; ++it) {
         miss.head(rank) = E.transpose() * y;
         for (int e = 0; e < p.size(); ++e) {
             const ConeElement& element = p.elements[e];
@@ -82,7 +82,7 @@ void sharpen(const ConeProblem& p, const MatX& E, double near_edge, VecX& y) {
             }
             miss.segment(row, 3) = J.middleRows(row, 3) * y;
         }
-        y -= least_squares(J, miss, certificate_parameters.dependent);
+        y -= least_squares(J, miss, certificate_parameters.rank_threshold);
     }
 }
 
@@ -90,14 +90,14 @@ void sharpen(const ConeProblem& p, const MatX& E, double near_edge, VecX& y) {
 bool squeezes(const ConeProblem& p, VecX& y) {
     if (!(y.norm() > 0.0 && y.norm() < HUGE_VAL)) return false;
     y.normalize();
-    if ((p.W().transpose() * y).cwiseAbs().maxCoeff() > certificate_parameters.shown ||
+    if ((p.W().transpose() * y).cwiseAbs().maxCoeff() > certificate_parameters.zero_tolerance ||
         -y.dot(p.w0()) < certificate_parameters.min_margin)
         return false;
     for (int e = 0; e < p.size(); ++e) {
         const int i = p.at[e], tails = p.elements[e].dim - 1;
         if (!p.elements[e].is(ConeKind::contact)) continue;
-        if (y[i] < -certificate_parameters.shown ||
-            y.segment(i + 1, tails).norm() > p.elements[e].bound * y[i] + certificate_parameters.shown)
+        if (y[i] < -certificate_parameters.zero_tolerance ||
+            y.segment(i + 1, tails).norm() > p.elements[e].bound * y[i] + certificate_parameters.zero_tolerance)
             return false;
     }
     return true;
@@ -126,7 +126,7 @@ bool squeezed(const ConeProblem& p, VecX& y) {
     nearest.pose(M, r, elements);
     ConeInteriorPoint().follow(nearest, f, ConeInteriorPoint::Slip::stands);
     f = f.cwiseProduct(nearest.scale()).eval();
-    for (const double edge : certificate_parameters.near_edges) {
+    for (const double edge : certificate_parameters.zero_force_parts) {
         y = f.tail(n);
         if (!(y.norm() > 0.0 && y.norm() < HUGE_VAL)) return false;
         sharpen(p, E, edge, y);

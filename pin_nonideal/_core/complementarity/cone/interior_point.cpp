@@ -169,7 +169,7 @@ void ConeInteriorPoint::follow(const ConeProblem& p, Eigen::Ref<VecX> f, Slip sl
         }
         direction(p, sigma * now, sigma);
         const double a = std::min(1.0, max_boundary_part * length(p));
-        if (!(a > parameters.least_step)) return;
+        if (!(a > parameters.min_step)) return;
         kept = f;
         f += a * step;
         bool inside = true;

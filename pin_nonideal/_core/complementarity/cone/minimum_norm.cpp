@@ -48,11 +48,11 @@ Nearest of_ball(const Vector3d& z, double radius) {
 Nearest nearest(const ConeElement& element, const Vector3d& z, const Vector3d& w, const Vector3d& given) {
     if (element.is(ConeKind::equality)) return {z, Matrix3d::Identity()};
     if (element.is(ConeKind::box))
-        return w.norm() > MinimumNormForces::parameters.at_rest ? Nearest{given, Matrix3d::Zero()}
+        return w.norm() > MinimumNormForces::parameters.rest_velocity ? Nearest{given, Matrix3d::Zero()}
                                                                : of_ball(z, element.bound);
-    if (w[0] > MinimumNormForces::parameters.at_rest) return {};
+    if (w[0] > MinimumNormForces::parameters.rest_velocity) return {};
     Vector3d slip(0.0, w[1], w[2]);
-    if (element.bound == 0.0 || slip.norm() == 0.0 || slip.norm() <= MinimumNormForces::parameters.at_rest)
+    if (element.bound == 0.0 || slip.norm() == 0.0 || slip.norm() <= MinimumNormForces::parameters.rest_velocity)
         return of_cone(z, element.bound);
     return of_ray(z, Vector3d::UnitX() - element.bound / slip.norm() * slip);
 }
@@ -101,7 +101,7 @@ double MinimumNormForces::miss(const ConeProblem& p, const Eigen::Ref<const VecX
     z.noalias() = E * y;
     project(p, z, g, false);
     auto miss = miss_.vector(rank);
-    miss = -told_.vector(rank);
+    miss = -target_.vector(rank);
     miss.noalias() += E.transpose() * g;
     return miss.norm();
 }
@@ -111,11 +111,11 @@ bool MinimumNormForces::minimize_norm(const ConeProblem& p, Eigen::Ref<VecX> f) 
     const auto E = basis_.matrix(p.n, rank);
     auto w = w_.vector(p.n), given = given_.vector(p.n);
     auto DE = DE_.matrix(p.n, rank), J = J_.matrix(rank, rank);
-    auto y = y_.vector(rank), told = told_.vector(rank), step = step_.vector(rank), ahead = ahead_.vector(rank);
+    auto y = y_.vector(rank), target = target_.vector(rank), step = step_.vector(rank), ahead = ahead_.vector(rank);
     p.respond(f, w);
     given = p.scale().cwiseProduct(f);
-    told.noalias() = E.transpose() * given;
-    y = told;
+    target.noalias() = E.transpose() * given;
+    y = target;
     const double size = given.norm();
     double now = miss(p, y, rank);
     for (int it = 0; it < parameters.max_steps && now > parameters.tolerance * size; ++it) {

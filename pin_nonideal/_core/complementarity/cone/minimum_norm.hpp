@@ -7,7 +7,7 @@
 namespace pn {
 
 struct MinimumNormForcesParameters {
-    double at_rest = 1e-9;           // w below this part of the largest w0 counts as zero
+    double rest_velocity = 1e-9;     // w below this part of the largest w0 counts as zero
     double tolerance = 3e-15;        // relative to the forces
     double stall_tolerance = 1e-12;  // the same if steps make no progress
     double damping = 1e-10;          // damping of Newton's method, relative to the residual
@@ -31,7 +31,7 @@ private:
     double miss(const ConeProblem& problem, const Eigen::Ref<const VecX>& y, int rank);
 
     DenseSolver solver_;
-    Buffer basis_, transpose_, D_, DE_, J_, y_, ahead_, step_, told_, miss_, z_, g_, w_, given_;
+    Buffer basis_, transpose_, D_, DE_, J_, y_, ahead_, step_, target_, miss_, z_, g_, w_, given_;
 };
 
 }  // namespace pn

@@ -58,7 +58,7 @@ double ConeNewton::evaluate(const ConeProblem& p, const Eigen::Ref<const VecX>& 
 double ConeNewton::relative(const ConeProblem& p, const Eigen::Ref<const VecX>& f) {
     auto size = size_.vector(p.size());
     const auto F = F_.vector(p.n);
-    p.forces_in_play(f, size);
+    p.force_scales(f, size);
     double error = 0.0;
     for (int e = 0; e < p.size(); ++e) {
         const double miss = F.segment(p.at[e], p.elements[e].dim).cwiseAbs().maxCoeff();
@@ -124,17 +124,17 @@ bool ConeNewton::advance(const ConeProblem& p, Eigen::Ref<VecX> f, double& merit
             return true;
         }
     }
-    if (++blind_ > parameters.most_blind) return false;
+    if (++blind_ > parameters.max_blind_steps) return false;
     f -= step;
     merit = evaluate(p, f);
     return merit < HUGE_VAL;
 }
 
 // Check if the equations at f differ from those factored last. A slipping element has different equations at every point.
-bool ConeNewton::changes_piece(const ConeProblem& p, const Eigen::Ref<const VecX>& f) {
+bool ConeNewton::update_modes(const ConeProblem& p, const Eigen::Ref<const VecX>& f) {
     constexpr signed char curved = -1, unknown = -2;
     const auto w = w_.vector(p.n);
-    piece_.resize(p.size(), unknown);
+    mode_.resize(p.size(), unknown);
     bool changes = false;
     for (int e = 0; e < p.size(); ++e) {
         const ConeElement& element = p.elements[e];
@@ -147,13 +147,13 @@ bool ConeNewton::changes_piece(const ConeProblem& p, const Eigen::Ref<const VecX
             now = disk.dim == 0 || sticks || disk.radius == 0.0 ? static_cast<signed char>(1 + 2 * closed + sticks)
                                                                 : curved;
         }
-        changes |= now == curved || now != piece_[e];
-        piece_[e] = now;
+        changes |= now == curved || now != mode_[e];
+        mode_[e] = now;
     }
     return changes;
 }
 
-double ConeNewton::solve(const ConeProblem& p, Eigen::Ref<VecX> f, int most_steps) {
+double ConeNewton::solve(const ConeProblem& p, Eigen::Ref<VecX> f, int max_steps) {
     auto best = best_.vector(p.n), step = step_.vector(p.n), F = F_.vector(p.n);
     auto J = J_.matrix(p.n, p.n);
     double merit = evaluate(p, f), last = relative(p, f), least = last;
@@ -161,8 +161,8 @@ double ConeNewton::solve(const ConeProblem& p, Eigen::Ref<VecX> f, int most_step
     blind_ = 0;
     int stalled = 0;
     regular_ = false;
-    for (int it = 0; it < most_steps && last > parameters.tolerance; ++it, ++steps_) {
-        if (changes_piece(p, f) || it == 0) {
+    for (int it = 0; it < max_steps && last > parameters.tolerance; ++it, ++steps_) {
+        if (update_modes(p, f) || it == 0) {
             differentiate(p, f);
             solver_.factor(J);
             regular_ = solver_.regular();
@@ -174,7 +174,7 @@ double ConeNewton::solve(const ConeProblem& p, Eigen::Ref<VecX> f, int most_step
             least = now;
             best = f;
         }
-        if (least < parameters.stall_tolerance && now > 0.25 * last && ++stalled > parameters.most_stalled) break;
+        if (least < parameters.stall_tolerance && now > 0.25 * last && ++stalled > parameters.max_stalled_steps) break;
         last = now;
     }
     f = best;

@@ -10,10 +10,10 @@ namespace pn {
 struct ConeNewtonParameters {
     // Errors that end the iteration. The second one ends it if steps make no progress.
     double tolerance = 1e-15, stall_tolerance = 1e-11;
-    double decrease = 1e-4;  // required part of the predicted decrease
-    int max_halvings = 7;    // maximum halvings of a step that does not decrease the squared error
-    int most_blind = 3;      // steps without decrease that let the modes change
-    int most_stalled = 2;    // steps at rounding without progress
+    double decrease = 1e-4;     // required part of the predicted decrease
+    int max_halvings = 7;       // maximum halvings of a step that does not decrease the squared error
+    int max_blind_steps = 3;    // steps without decrease that let the modes change
+    int max_stalled_steps = 2;  // steps at rounding without progress
 };
 
 class ConeNewton {
@@ -22,7 +22,7 @@ public:
     static constexpr Parameters parameters{};
 
     // Iterate from f, and set f to the best point found. Returns the largest relative error of the equations.
-    double solve(const ConeProblem& problem, Eigen::Ref<VecX> f, int most_steps);
+    double solve(const ConeProblem& problem, Eigen::Ref<VecX> f, int max_steps);
     // Return the relative error of f.
     double error(const ConeProblem& problem, const Eigen::Ref<const VecX>& f);
     bool regular() const { return regular_; }  // the last equations had full rank
@@ -33,11 +33,11 @@ private:
     double relative(const ConeProblem& problem, const Eigen::Ref<const VecX>& f);
     void differentiate(const ConeProblem& problem, const Eigen::Ref<const VecX>& f);
     bool advance(const ConeProblem& problem, Eigen::Ref<VecX> f, double& merit);
-    bool changes_piece(const ConeProblem& problem, const Eigen::Ref<const VecX>& f);
+    bool update_modes(const ConeProblem& problem, const Eigen::Ref<const VecX>& f);
 
     DenseSolver solver_;
     Buffer J_, F_, w_, step_, ahead_, best_, size_;
-    std::vector<signed char> piece_;  // by element: mode of the factored equations, if these are linear
+    std::vector<signed char> mode_;  // by element: mode of the factored equations, if these are linear
     bool regular_ = false;
     int steps_ = 0, blind_ = 0;
 };

@@ -38,7 +38,7 @@ void ConeProblem::measure() {
     }
 }
 
-void ConeProblem::forces_in_play(const Eigen::Ref<const VecX>& f, Eigen::Ref<VecX> size_of) const {
+void ConeProblem::force_scales(const Eigen::Ref<const VecX>& f, Eigen::Ref<VecX> size_of) const {
     for (int e = 0; e < size(); ++e) {
         double most = 0.0;
         for (int i = at[e]; i < at[e] + elements[e].dim; ++i)

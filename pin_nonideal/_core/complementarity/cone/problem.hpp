@@ -65,7 +65,7 @@ public:
     }
     // Compute the scale of the errors of each element's equations: the response to the largest w0, plus the rounding of
     // much larger forces. Forces that only squeeze do not make an error small.
-    void forces_in_play(const Eigen::Ref<const VecX>& f, Eigen::Ref<VecX> size) const;
+    void force_scales(const Eigen::Ref<const VecX>& f, Eigen::Ref<VecX> size) const;
 
 private:
     void measure();

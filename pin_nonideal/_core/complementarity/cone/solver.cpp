@@ -15,20 +15,21 @@ ConeStatus ConeComplementarity::solve(const Eigen::Ref<const MatX>& W, const Eig
     auto x = even_.vector(n);
     if (warm) x = f.cwiseQuotient(problem_.scale()) / problem_.force_unit();
     else x.setZero();
-    least_miss_ = HUGE_VAL;
+    best_residual_ = HUGE_VAL;
     bool found = search(x, warm);
     if (!found && brief_) return ConeStatus::failed;
     ConeStatus status = found ? ConeStatus::solved : find_certificate(problem_, certificate_);
-    if (status == ConeStatus::jammed) found = grow_friction(x);  // a solution may still exist
-    if (status == ConeStatus::failed) found = grow_friction(x) || scatter(x) || take_nearest(x);
-    if (found && uniform_compliance_) stiffen(x);
+    if (status == ConeStatus::jammed) found = friction_continuation(x);  // a solution may still exist
+    if (status == ConeStatus::failed) found = friction_continuation(x) || random_restarts(x) || accept_best(x);
+    if (found && uniform_compliance_) compliance_continuation(x);
     unique_shares_ = newton_.regular();
     const bool as_it_was = warm && may_keep_shares && newton_.steps() == steps;
     if (found && !unique_shares_ && !as_it_was) {
         auto even = f_.vector(n);
         even = x;
         const bool shorter = minimum_norm_.minimize_norm(problem_, even);
-        if (shorter && newton_.solve(problem_, even, parameters.few_steps) <= std::max(parameters.evened, error_))
+        const double allowed = std::max(parameters.minimum_norm_tolerance, error_);
+        if (shorter && newton_.solve(problem_, even, parameters.few_steps) <= allowed)
             x = even;
     }
     if (found) tidy(x);
@@ -48,13 +49,13 @@ bool ConeComplementarity::hold(const Eigen::Ref<const MatX>& W, const Eigen::Ref
     interior_point_.follow(grown_, x, ConeInteriorPoint::Slip::stands);
     if (!x.allFinite()) return false;
     problem_.respond(x, w);
-    if (w.cwiseAbs().maxCoeff() > parameters.held) return false;
+    if (w.cwiseAbs().maxCoeff() > parameters.path_rest_velocity) return false;
     if (!polish(x, parameters.more_steps) || !stands_still(x)) return false;
     unique_shares_ = newton_.regular();
     auto even = f_.vector(problem_.n);
     even = x;
     if (!unique_shares_ && minimum_norm_.minimize_norm(problem_, even) &&
-        newton_.solve(problem_, even, parameters.few_steps) <= std::max(parameters.evened, error_))
+        newton_.solve(problem_, even, parameters.few_steps) <= std::max(parameters.minimum_norm_tolerance, error_))
         x = even;
     tidy(x);
     f = problem_.force_unit() * problem_.scale().cwiseProduct(x);
@@ -73,7 +74,7 @@ bool ConeComplementarity::stands_still(const Eigen::Ref<const VecX>& f) {
             speed = std::max(speed, std::abs(w[i]));
             terms = std::max(terms, std::abs(problem_.w0()[i]) + problem_.W().row(i).cwiseAbs().dot(f.cwiseAbs()));
         }
-        return speed <= parameters.still * terms + parameters.velocity_rounding * all;
+        return speed <= parameters.rest_velocity * terms + parameters.velocity_rounding * all;
     };
     for (int e = 0; e < problem_.size(); ++e) {
         const int begin = problem_.at[e], end = begin + problem_.elements[e].dim;
@@ -84,10 +85,10 @@ bool ConeComplementarity::stands_still(const Eigen::Ref<const VecX>& f) {
 }
 
 // Run Newton's method from f. f changes only if the result is a solution.
-bool ConeComplementarity::polish(Eigen::Ref<VecX> f, int most_steps) {
+bool ConeComplementarity::polish(Eigen::Ref<VecX> f, int max_steps) {
     auto there = f_.vector(problem_.n);
     there = f;
-    error_ = newton_.solve(problem_, there, most_steps);
+    error_ = newton_.solve(problem_, there, max_steps);
     if (!(error_ <= parameters.tolerance) || there.cwiseAbs().maxCoeff() > parameters.no_force) return false;
     f = there;
     return true;
@@ -102,16 +103,16 @@ bool ConeComplementarity::search(Eigen::Ref<VecX> f, bool warm) {
     }
     interior_point_.follow(problem_, f, ConeInteriorPoint::Slip::follows);
     if (polish(f, parameters.more_steps)) return true;
-    return !brief_ && (approach(f) || alternate(f) || relax(f));
+    return !brief_ && (proximal_point(f) || alternate(f) || projected_gauss_seidel(f));
 }
 
 // Solve with compliance to the whole forces that decreases to its limit. f is kept if this gives no solution.
-bool ConeComplementarity::stiffen(Eigen::Ref<VecX> f) {
+bool ConeComplementarity::compliance_continuation(Eigen::Ref<VecX> f) {
     grown_ = problem_;
     auto there = x_.vector(problem_.n);
     there.setZero();
     for (double compliance = parameters.first_compliance; compliance >= parameters.min_compliance;
-         compliance *= parameters.softer) {
+         compliance *= parameters.compliance_ratio) {
         grown_.W() = problem_.W();
         grown_.W().diagonal().array() += compliance;
         if (newton_.solve(grown_, there, parameters.more_steps) <= parameters.tolerance) continue;
@@ -147,12 +148,12 @@ void ConeComplementarity::tidy(Eigen::Ref<VecX> f) const {
 // Proximal point algorithm (Rockafellar, SIAM J. Control Optim. 14, 1976). Each element yields in proportion to the
 // change of its force. Every problem on the way is then regular, however many elements share a load. Forces that no
 // longer change cause no compliance.
-bool ConeComplementarity::approach(Eigen::Ref<VecX> f) {
+bool ConeComplementarity::proximal_point(Eigen::Ref<VecX> f) {
     grown_ = problem_;
-    auto last = x_.vector(problem_.n), nearest = nearest_.vector(problem_.n);
+    auto last = x_.vector(problem_.n), best = best_.vector(problem_.n);
     last.setZero();
     double compliance = parameters.first_compliance, before = HUGE_VAL;
-    for (int turn = 0; turn < parameters.most_approaches && !(least_miss_ <= parameters.unchangeable); ++turn) {
+    for (int turn = 0; turn < parameters.max_proximal_steps && !(best_residual_ <= parameters.stalled_residual); ++turn) {
         grown_.W() = problem_.W();
         grown_.W().diagonal().array() += compliance;
         grown_.w0() = problem_.w0() - compliance * last;
@@ -171,20 +172,20 @@ bool ConeComplementarity::approach(Eigen::Ref<VecX> f) {
         last = f;
         if (polish(f, parameters.few_steps)) return true;
         error = newton_.error(problem_, f);
-        if (error > parameters.lasts * before && error < least_miss_) {
-            nearest = f;
-            least_miss_ = error;
+        if (error > parameters.stall_ratio * before && error < best_residual_) {
+            best = f;
+            best_residual_ = error;
         }
         before = error;
     }
-    return least_miss_ <= parameters.unchangeable && take_nearest(f);
+    return best_residual_ <= parameters.stalled_residual && accept_best(f);
 }
 
 // Set f to the stored forces of smallest residual, if this residual is accepted.
-bool ConeComplementarity::take_nearest(Eigen::Ref<VecX> f) {
-    if (!(least_miss_ <= most_miss_)) return false;
-    f = nearest_.vector(problem_.n);
-    error_ = least_miss_;
+bool ConeComplementarity::accept_best(Eigen::Ref<VecX> f) {
+    if (!(best_residual_ <= max_residual_)) return false;
+    f = best_.vector(problem_.n);
+    error_ = best_residual_;
     return true;
 }
 
@@ -201,12 +202,12 @@ bool ConeComplementarity::alternate(Eigen::Ref<VecX> f) {
 }
 
 // Projected Gauss-Seidel: set one element after the other to the nearest force in its cone.
-bool ConeComplementarity::relax(Eigen::Ref<VecX> f) {
+bool ConeComplementarity::projected_gauss_seidel(Eigen::Ref<VecX> f) {
     auto w = w_.vector(problem_.n), x = x_.vector(problem_.n);
     f.setZero();
     problem_.respond(f, w);
-    for (int round = 0; round < parameters.most_rounds; ++round) {
-        for (int sweep = 0; sweep < parameters.sweeps; ++sweep)
+    for (int round = 0; round < parameters.max_sweep_rounds; ++round) {
+        for (int sweep = 0; sweep < parameters.sweeps_per_round; ++sweep)
             for (int e = 0; e < problem_.size(); ++e) {
                 const ConeElement& element = problem_.elements[e];
                 const int i = problem_.at[e], d = element.dim, head = element.is(ConeKind::contact);
@@ -227,17 +228,17 @@ bool ConeComplementarity::relax(Eigen::Ref<VecX> f) {
 }
 
 // Continuation from zero friction, where the problem is convex, to full friction.
-bool ConeComplementarity::grow_friction(Eigen::Ref<VecX> f) {
+bool ConeComplementarity::friction_continuation(Eigen::Ref<VecX> f) {
     grown_ = problem_;
     double reached = 0.0, stretch = parameters.first_friction_part;
     auto there = x_.vector(problem_.n);
     f.setZero();
-    for (int tried = 0; tried < parameters.most_stretches && stretch > parameters.min_friction_part; ++tried) {
+    for (int tried = 0; tried < parameters.max_stretches && stretch > parameters.min_friction_part; ++tried) {
         const double next = std::min(1.0, reached + stretch);
         for (int e = 0; e < problem_.size(); ++e) grown_.elements[e].bound = next * problem_.elements[e].bound;
         there = f;
         double error = newton_.solve(grown_, there, parameters.more_steps);
-        for (int turn = 0; turn < parameters.few_turns && !(error <= parameters.tolerance); ++turn) {
+        for (int turn = 0; turn < parameters.alternations_per_stretch && !(error <= parameters.tolerance); ++turn) {
             interior_point_.follow(grown_, there,
                                    turn == 0 ? ConeInteriorPoint::Slip::follows : ConeInteriorPoint::Slip::stands);
             if (!there.allFinite()) break;
@@ -259,9 +260,9 @@ bool ConeComplementarity::grow_friction(Eigen::Ref<VecX> f) {
 }
 
 // Random starts with a fixed seed.
-bool ConeComplementarity::scatter(Eigen::Ref<VecX> f) {
+bool ConeComplementarity::random_restarts(Eigen::Ref<VecX> f) {
     std::minstd_rand lot(1);
-    for (int start = 0; start < parameters.most_starts; ++start) {
+    for (int start = 0; start < parameters.max_random_starts; ++start) {
         for (int i = 0; i < problem_.n; ++i) f[i] = 4.0 * (lot() / double(std::minstd_rand::max()) - 0.5);
         for (int e = 0; e < problem_.size(); ++e)
             if (problem_.elements[e].is(ConeKind::contact)) f[problem_.at[e]] = 2.0 * std::abs(f[problem_.at[e]]);

@@ -14,28 +14,28 @@
 namespace pn {
 
 struct ConeComplementarityParameters {
-    double tolerance = 1e-11;          // error of a solution
-    double no_force = 1e10;            // larger forces, in the problem's units, only squeeze
-    double held = 1e-7;                // velocity of rest at the end of the central path, relative to the largest w0
-    double still = 1e-12;              // velocity of rest of a solution, relative to its terms
-    double velocity_rounding = 1e-14;  // rounding relative to the largest velocity
-    double evened = 1e-13;             // error of a minimum-norm solution
+    double tolerance = 1e-11;               // error of a solution
+    double no_force = 1e10;                 // larger forces, in the problem's units, only squeeze
+    double path_rest_velocity = 1e-7;       // velocity of rest at the end of the central path, relative to the largest w0
+    double rest_velocity = 1e-12;           // velocity of rest of a solution, relative to its terms
+    double velocity_rounding = 1e-14;       // rounding relative to the largest velocity
+    double minimum_norm_tolerance = 1e-13;  // error of a minimum-norm solution
     // Newton steps from near a solution, from a guess, and from the end of the central path or of a continuation.
     int few_steps = 3, first_steps = 20, more_steps = 30;
-    int max_alternations = 30;          // maximum alternations of slip speeds and forces
-    int most_rounds = 40, sweeps = 40;  // rounds of projected Gauss-Seidel sweeps, and sweeps of a round
-    double relaxation = 0.7;            // part of an element's own step that a sweep takes
-    int most_starts = 100;              // random starts
+    int max_alternations = 30;                         // maximum alternations of slip speeds and forces
+    int max_sweep_rounds = 40, sweeps_per_round = 40;  // rounds of projected Gauss-Seidel sweeps, and sweeps of a round
+    double relaxation = 0.7;                           // part of an element's own step that a sweep takes
+    int max_random_starts = 100;                       // random starts
     // Alternations at one part of the friction, and number of parts on the way to full friction.
-    int few_turns = 10, most_stretches = 60;
+    int alternations_per_stretch = 10, max_stretches = 60;
     // Compliance of elements relative to their own response. It halves from the first value to the last.
     double first_compliance = 1e-2, min_compliance = 1e-9;
-    int most_approaches = 40;  // proximal steps, of which 24 reach the last compliance
-    double softer = 0.1;       // ratio of successive compliances, if only the limit is needed
+    int max_proximal_steps = 40;    // proximal steps, of which 24 reach the last compliance
+    double compliance_ratio = 0.1;  // ratio of successive compliances, if only the limit is needed
     // Residual below which the search ends if residuals are accepted, and ratio of successive residuals that counts as
     // stagnation. If the residual stagnates while elements stiffen, no forces change it. Elements that share a load,
     // such as the corners of a turning foot, then have contradicting velocities.
-    double unchangeable = 1e-9, lasts = 0.9;
+    double stalled_residual = 1e-9, stall_ratio = 0.9;
     double first_friction_part = 0.1, min_friction_part = 1e-5;  // parts of the way from no friction to full friction
 };
 
@@ -55,9 +55,9 @@ public:
     bool hold(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const VecX>& w0,
               const std::vector<ConeElement>& elements, Eigen::Ref<VecX> f);
 
-    // Accept a relative residual up to `most` if no forces meet the laws to rounding. The caller then reports the
+    // Accept a relative residual up to `max_residual` if no forces meet the laws to rounding. The caller then reports the
     // residual. By default no residual is accepted.
-    void take_misses(double most) { most_miss_ = most; }
+    void accept_residual(double max_residual) { max_residual_ = max_residual; }
 
     // Use a uniform compliance. If friction depends on shares of a load that W does not determine, several motions may
     // solve the problem. This option selects the motion of equally compliant elements, in the limit of stiff ones. It
@@ -75,24 +75,24 @@ public:
 
 private:
     bool search(Eigen::Ref<VecX> f, bool warm);
-    bool polish(Eigen::Ref<VecX> f, int most_steps);
+    bool polish(Eigen::Ref<VecX> f, int max_steps);
     bool stands_still(const Eigen::Ref<const VecX>& f);
-    bool approach(Eigen::Ref<VecX> f);
-    bool take_nearest(Eigen::Ref<VecX> f);
-    bool stiffen(Eigen::Ref<VecX> f);
+    bool proximal_point(Eigen::Ref<VecX> f);
+    bool accept_best(Eigen::Ref<VecX> f);
+    bool compliance_continuation(Eigen::Ref<VecX> f);
     bool alternate(Eigen::Ref<VecX> f);
-    bool relax(Eigen::Ref<VecX> f);
-    bool grow_friction(Eigen::Ref<VecX> f);
-    bool scatter(Eigen::Ref<VecX> f);
+    bool projected_gauss_seidel(Eigen::Ref<VecX> f);
+    bool friction_continuation(Eigen::Ref<VecX> f);
+    bool random_restarts(Eigen::Ref<VecX> f);
     void tidy(Eigen::Ref<VecX> f) const;
 
     ConeProblem problem_, grown_;
     ConeNewton newton_;
     ConeInteriorPoint interior_point_;
     MinimumNormForces minimum_norm_;
-    Buffer even_, x_, f_, w_, nearest_;
+    Buffer even_, x_, f_, w_, best_;
     VecX certificate_;
-    double error_ = 0.0, least_miss_ = 0.0, most_miss_ = 0.0;
+    double error_ = 0.0, best_residual_ = 0.0, max_residual_ = 0.0;
     bool unique_shares_ = false, uniform_compliance_ = false, brief_ = false;
 };
 

@@ -68,7 +68,7 @@ bool ReactionNewton::solve(const ReactionEquation& equation, VecX& y) {
         residual = image - y;
         const double error = residual.cwiseAbs().maxCoeff(), size = y.cwiseAbs().maxCoeff();
         if (!std::isfinite(error)) return false;
-        if (error <= parameters.rounding * size || (error >= last && error <= parameters.stall_tolerance * size))
+        if (error <= parameters.tolerance * size || (error >= last && error <= parameters.stall_tolerance * size))
             return true;
         last = error;
         factorize(equation, y);
@@ -80,18 +80,18 @@ bool ReactionNewton::solve(const ReactionEquation& equation, VecX& y) {
 }
 
 // For any positive u, max (L u)_i / u_i is such a bound (Collatz and Wielandt).
-double growth(const MatX& L) {
+double spectral_bound(const MatX& L) {
     double best = L.rowwise().sum().maxCoeff();
-    if (best <= growth_bound_parameters.min_improved) return best;
+    if (best <= spectral_bound_parameters.min_improved) return best;
     VecX u = VecX::Ones(L.rows());
-    for (int pass = 0; pass < growth_bound_parameters.passes; ++pass) {
+    for (int pass = 0; pass < spectral_bound_parameters.max_passes; ++pass) {
         const VecX next = L * u;
         const double before = best;
         best = std::min(best, next.cwiseQuotient(u).maxCoeff());
-        if (best <= growth_bound_parameters.min_improved ||
-            (pass > 0 && before - best <= growth_bound_parameters.settled * best))
+        if (best <= spectral_bound_parameters.min_improved ||
+            (pass > 0 && before - best <= spectral_bound_parameters.settled * best))
             break;
-        u = next + growth_bound_parameters.kept_weight * best * u;
+        u = next + spectral_bound_parameters.kept_weight * best * u;
         u /= u.maxCoeff();
     }
     return best;

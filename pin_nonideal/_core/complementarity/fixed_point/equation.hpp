@@ -10,14 +10,14 @@
 
 namespace pn {
 
-struct GrowthBoundParameters {
-    int passes = 200;           // maximum passes of the power iteration
+struct SpectralBoundParameters {
+    int max_passes = 200;       // maximum passes of the power iteration
     double min_improved = 0.5;  // smaller bounds are not improved
     double settled = 1e-4;      // relative improvement of the bound by a pass that ends the iteration
     double kept_weight = 1e-2;  // part of the previous weights that stays, so that none becomes zero or alternates
 };
 
-inline constexpr GrowthBoundParameters growth_bound_parameters{};
+inline constexpr SpectralBoundParameters spectral_bound_parameters{};
 
 struct ReactionEquation {
     VecX constant;             // c
@@ -44,7 +44,7 @@ struct ReactionEquation {
 };
 
 struct ReactionNewtonParameters {
-    double rounding = 1e-15;         // residual relative to the solution
+    double tolerance = 1e-15;        // residual relative to the solution
     double stall_tolerance = 1e-12;  // the same for worse rounding, if the residual no longer falls
     // Maximum number of steps of Newton's method for a solution of the equation.
     int max_steps = 30;
@@ -67,6 +67,6 @@ struct ReactionNewton {
 
 // Return a bound on the largest eigenvalue of a nonnegative matrix, exact in the limit. If it is below 1 for L, g
 // contracts in lengths with positive weights. Then there is one solution.
-double growth(const MatX& L);
+double spectral_bound(const MatX& L);
 
 }  // namespace pn

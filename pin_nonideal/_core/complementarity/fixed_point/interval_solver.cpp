@@ -19,7 +19,7 @@ private:
 
     struct Part {
         int fixed;  // coordinate that is one, while the others run from zero to one
-        std::array<double, parameters.most_halved + 1> center, half;  // by bisected unknown, then of s
+        std::array<double, parameters.max_bisected + 1> center, half;  // by bisected unknown, then of s
     };
 
     void divide();
@@ -75,13 +75,13 @@ Search::Search(const ReactionEquation& given) : eq_(given), n_(given.size()) {
 // contracts best.
 void Search::divide() {
     for (int i = 0; i < n_; ++i) following_.push_back(i);
-    while (!following_.empty() && growth(among(L_, following_, following_)) > parameters.max_followed_growth) {
+    while (!following_.empty() && spectral_bound(among(L_, following_, following_)) > parameters.max_followed_growth) {
         size_t best = 0;
         double least = HUGE_VAL;
         for (size_t i = 0; i < following_.size(); ++i) {
             std::vector<int> rest = following_;
             rest.erase(rest.begin() + i);
-            const double left = rest.empty() ? 0.0 : growth(among(L_, rest, rest));
+            const double left = rest.empty() ? 0.0 : spectral_bound(among(L_, rest, rest));
             if (left < least) { least = left; best = i; }
         }
         halved_.push_back(following_[best]);
@@ -99,7 +99,7 @@ bool Search::follow(VecX& z, double s) const {
     MatX J;
     double before = HUGE_VAL;
     VecX trial = z;
-    for (int pass = 0; pass < parameters.follow_passes; ++pass) {
+    for (int pass = 0; pass < parameters.max_follow_passes; ++pass) {
         eq_.image(trial, s, g);
         for (int i = 0; i < m; ++i) residual[i] = g[following_[i]] - trial[following_[i]];
         const double error = residual.cwiseAbs().maxCoeff();
@@ -192,7 +192,7 @@ void Search::keep(const VecX& z, double s) {
     }
     MatX J;
     eq_.slope(z, s, J);
-    if (std::abs(determinant(MatX::Identity(n_, n_) - J)) < parameters.least_determinant) found_.at_edge = true;
+    if (std::abs(determinant(MatX::Identity(n_, n_) - J)) < parameters.min_determinant) found_.at_edge = true;
     found_.y.push_back(y.cwiseProduct(scale_));
 }
 
@@ -239,7 +239,7 @@ bool Search::is_settled(const Part& part) {
 }
 
 ReactionRoots Search::run() {
-    if (halved() > parameters.most_halved) {
+    if (halved() > parameters.max_bisected) {
         found_.complete = false;
     } else {
         for (int fixed = 0; fixed <= halved(); ++fixed) {
@@ -253,7 +253,7 @@ ReactionRoots Search::run() {
     }
     const double work = 1.0 + n_ * n_ * n_ / 64.0;
     for (int count = 0; !parts_.empty(); ++count) {
-        if (count * work > parameters.most_work) {
+        if (count * work > parameters.max_work) {
             found_.complete = false;
             break;
         }

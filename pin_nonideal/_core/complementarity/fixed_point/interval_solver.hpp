@@ -8,18 +8,18 @@
 namespace pn {
 
 struct IntervalSolverParameters {
-    int most_halved = 3;                // bisected unknowns
-    double most_work = 20000.0;         // parts of the box, weighted by the size of the matrices
+    int max_bisected = 3;               // bisected unknowns
+    double max_work = 20000.0;          // parts of the box, weighted by the size of the matrices
     double max_followed_growth = 0.9;   // largest growth of the unknowns that follow
     double min_box_part = 1e-7;         // smallest part of the box (its square is rounding, where two solutions merge)
     double alone = 0.9;                 // size to which Newton's interval form must shrink a part, relative to it
     double margin = 1e-9;               // relative enlargement of a part and its bounds
     double residual_tolerance = 1e-13;  // residual relative to its terms
     double same_root = 1e-9;            // relative distance of equal solutions
-    double least_determinant = 1e-8;    // smaller determinants count as zero
+    double min_determinant = 1e-8;      // smaller determinants count as zero
     double infinite_solution_scale = 1e-9;  // s below which a solution counts as infinite
-    double far_newton_start = 100.0;    // start of Newton's method beyond the bends of g
-    int follow_passes = 1000;           // maximum passes for the unknowns that follow: 350 contract by 0.9 to rounding
+    double far_newton_start = 100.0;  // start of Newton's method beyond the bends of g
+    int max_follow_passes = 1000;     // maximum passes for the unknowns that follow: 350 contract by 0.9 to rounding
 };
 
 struct ReactionRoots {

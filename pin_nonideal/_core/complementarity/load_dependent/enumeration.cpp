@@ -12,7 +12,7 @@ namespace pn {
 
 namespace {
 
-constexpr int max_unknowns = most_searched + 1;  // forces, and tau
+constexpr int max_unknowns = max_searched_forces + 1;  // forces, and tau
 using Point = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, max_unknowns, 1>;
 using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, max_unknowns, max_unknowns>;
 using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, max_unknowns>;  // rows of one element or vector
@@ -64,7 +64,7 @@ struct Element {
     bool may_stick;
     int row, dim;
     Short direction;
-    Rows force, response, asked;  // x, rho alpha, x - rho alpha
+    Rows force, response, argument;  // x, rho alpha, x - rho alpha
     double constant;
     std::vector<Rows> vectors;
 
@@ -93,13 +93,13 @@ struct Element {
     }
 
     // Return the residual of the equation in the middle of a box. `slopes` bounds its derivatives anywhere in the box.
-    Short lack(const Point& x, const Point& radius, Slopes& slopes) const {
+    Short residual(const Point& x, const Point& radius, Slopes& slopes) const {
         const Limit limit = this->limit(x, radius);
         if (!may_stick) {
             slopes = {force + direction * limit.slopes.middle, direction.cwiseAbs() * limit.slopes.radius};
             return force * x + limit.size.middle * direction;
         }
-        const VectorInterval point(asked, x, radius);
+        const VectorInterval point(argument, x, radius);
         const bool inside = point.length.lower() <= limit.size.upper(),
                    outside = point.length.upper() >= limit.size.lower();
         if (inside) slopes = {response, Rows::Zero(dim, x.size())};
@@ -122,8 +122,8 @@ struct Element {
         const Turned across = Turned::Identity(dim, dim) - p.along * p.along.transpose();
         const Turned across_radius =
             part_radius * across.cwiseAbs() + 2.0 * upper * p.turn * Turned::Ones(dim, dim);
-        out.middle -= part * across * asked;
-        out.radius += across_radius * asked.cwiseAbs();
+        out.middle -= part * across * argument;
+        out.radius += across_radius * argument.cwiseAbs();
         return out;
     }
 };
@@ -172,7 +172,7 @@ struct Search {
         e.force.middleCols(from.row, from.dim).setIdentity();
         e.response = homogeneous(equation.W.middleRows(from.row, from.dim), equation.alpha0.segment(from.row, from.dim),
                                  own * from.rho);
-        e.asked = e.force - e.response;
+        e.argument = e.force - e.response;
         for (int k = from.vector; k < from.vector + from.vectors; ++k)
             e.vectors.push_back(homogeneous(equation.loads.middleRows(3 * k, 3), equation.still.segment(3 * k, 3),
                                             own * from.factor));
@@ -219,13 +219,13 @@ struct Search {
 
     // Krawczyk's test. Returns true if the box is done. Otherwise the box may have shrunk.
     bool decide(Box& box) {
-        const Point radius = (enumeration_parameters.inflated * box.radius).array() +
+        const Point radius = (enumeration_parameters.box_overlap * box.radius).array() +
                              enumeration_parameters.radius_rounding * (box.radius.array() > 0.0).cast<double>();
         Square J(n, n), J_radius(n, n);
-        Point lack(n);
+        Point residual(n);
         for (const Element& e : elements) {
             Slopes slopes;
-            lack.segment(e.row, e.dim) = e.lack(box.middle, radius, slopes);
+            residual.segment(e.row, e.dim) = e.residual(box.middle, radius, slopes);
             for (int k = 0, at = 0; k <= n; ++k) {
                 if (k == box.face) continue;
                 J.block(e.row, at, e.dim, 1) = slopes.middle.col(k);
@@ -235,7 +235,7 @@ struct Search {
         const Eigen::PartialPivLU<Square> lu(J);
         const Square inverse = lu.inverse();
         if (!inverse.allFinite()) return false;
-        const Point shift = -inverse * lack, side = free(radius, box.face);
+        const Point shift = -inverse * residual, side = free(radius, box.face);
         const Point reach = (inverse.cwiseAbs() * J_radius + (Square::Identity(n, n) - inverse * J).cwiseAbs()) * side;
         if ((shift.cwiseAbs().array() > (side + reach).array()).any()) return true;
         if ((shift.cwiseAbs() + reach).cwiseQuotient(side).maxCoeff() < 1.0) {
@@ -253,7 +253,7 @@ struct Search {
             box.middle[k] += 0.5 * (low + high);
             box.radius[k] = std::min(box.radius[k], 0.5 * (high - low));
         }
-        if (box.widest() < enumeration_parameters.shrinks * before) {
+        if (box.widest() < enumeration_parameters.max_shrink_ratio * before) {
             open.push_back(box);
             return true;
         }
@@ -261,7 +261,7 @@ struct Search {
     }
 
     void halve(Box box) {
-        if (box.widest() < enumeration_parameters.least_box) {
+        if (box.widest() < enumeration_parameters.min_box_part) {
             if (undecided++ < 3) take(box.middle);
             return;
         }
@@ -276,8 +276,8 @@ struct Search {
     }
 
     void run() {
-        for (int count = 0; !open.empty() && undecided < enumeration_parameters.most_undecided; ++count) {
-            if (count >= enumeration_parameters.most_boxes) return;
+        for (int count = 0; !open.empty() && undecided < enumeration_parameters.max_undecided; ++count) {
+            if (count >= enumeration_parameters.max_boxes) return;
             Box box = open.back();
             open.pop_back();
             const bool excluded = std::any_of(elements.begin(), elements.end(), [&](const Element& e) {
@@ -292,13 +292,13 @@ struct Search {
 }  // namespace
 
 bool is_searched(const RestEquation& equation) {
-    if (equation.ask || equation.n > most_searched) return false;
+    if (equation.evaluate_laws || equation.n > max_searched_forces) return false;
     for (const RestElement& e : equation.elements)
         if (e.middle != 0.0) return false;
     Cholesky cholesky;
     if (!cholesky.compute(equation.W)) return false;  // redundant elements have infinitely many shares
     const auto pivots = cholesky.factor().diagonal().array().square();
-    return (pivots > enumeration_parameters.least_pivot * equation.W.diagonal().array()).all();
+    return (pivots > enumeration_parameters.min_pivot * equation.W.diagonal().array()).all();
 }
 
 AllMotions all_motions(const RestEquation& equation) {

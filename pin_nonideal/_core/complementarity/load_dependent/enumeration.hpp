@@ -8,21 +8,21 @@
 namespace pn {
 
 struct EnumerationParameters {
-    double inflated = 1.05;               // boxes overlap, so that no solution lies on a border
-    double least_box = 1e-9;              // smaller boxes stay undecided
+    double box_overlap = 1.05;            // boxes overlap, so that no solution lies on a border
+    double min_box_part = 1e-9;           // smaller boxes stay undecided
     double radius_rounding = 1e-14;       // rounding in a box, added to its radius
     double infinite_solution_tau = 1e-9;  // tau of a solution at infinity
     double same_motion = 1e-7;            // relative difference below which forces are equal
-    double shrinks = 0.8;                 // reduction of a box's widest side that justifies another pass
-    double least_pivot = 1e-10;           // pivot of W relative to its diagonal
-    int most_undecided = 100;             // undecided boxes that end the search
-    int most_boxes = 20000;               // maximum number of boxes, which bounds the time of a search
+    double max_shrink_ratio = 0.8;        // reduction of a box's widest side that justifies another pass
+    double min_pivot = 1e-10;             // pivot of W relative to its diagonal
+    int max_undecided = 100;              // undecided boxes that end the search
+    int max_boxes = 20000;                // maximum number of boxes, which bounds the time of a search
 };
 
 inline constexpr EnumerationParameters enumeration_parameters{};
 
 // Maximum number of forces of a problem that is searched.
-constexpr int most_searched = 6;
+constexpr int max_searched_forces = 6;
 
 struct AllMotions {
     std::vector<VecX> forces;  // forces of each solution

@@ -42,8 +42,8 @@ bool energy_factor(const RestEquation& equation, MatX& G, MatX& loads) {
 
 void RestEquation::respond(const VecX& x, VecX& alpha, FrictionLimits& limits) const {
     limits = FrictionLimits(static_cast<int>(elements.size()), n);
-    if (ask) {
-        ask(x, alpha, limits);
+    if (evaluate_laws) {
+        evaluate_laws(x, alpha, limits);
     } else {
         alpha = alpha0;
         alpha.noalias() += W * x;
@@ -71,7 +71,7 @@ void RestEquation::differentiate(const VecX& x, MatX& dalpha, MatX& dlimits, Mat
     const int count = static_cast<int>(elements.size());
     dlimits.setZero(count, n);
     dmiddle.setZero(n, n);
-    if (ask) {
+    if (evaluate_laws) {
         dalpha.resize(n, n);
         VecX alpha, alpha_there(n), shifted = x;
         FrictionLimits limits, limits_there;
@@ -113,15 +113,15 @@ VecX RestEquation::residual(const VecX& x) const {
             out.segment(e.row, e.dim) = part(from_middle, e) + limits[i] * e.direction;
             continue;
         }
-        const VecX asked = part(from_middle, e) - e.rho * part(alpha, e);
-        const double length = asked.norm();
+        const VecX argument = part(from_middle, e) - e.rho * part(alpha, e);
+        const double length = argument.norm();
         if (length <= limits[i]) out.segment(e.row, e.dim) = e.rho * part(alpha, e);
-        else out.segment(e.row, e.dim) = part(from_middle, e) - limits[i] / length * asked;
+        else out.segment(e.row, e.dim) = part(from_middle, e) - limits[i] / length * argument;
     }
     return out;
 }
 
-double RestEquation::force_in_play(size_t i, const VecX& x, const FrictionLimits& limits) const {
+double RestEquation::force_scale(size_t i, const VecX& x, const FrictionLimits& limits) const {
     const RestElement& e = elements[i];
     return std::max({limits[i], part(x, e).norm(), e.rho * part(alpha0, e).norm(), min_scale});
 }
@@ -130,10 +130,10 @@ double RestEquation::error(const VecX& x) const {
     VecX alpha;
     FrictionLimits limits;
     respond(x, alpha, limits);
-    const VecX lack = residual(x);
+    const VecX r = residual(x);
     double worst = 0.0;
     for (size_t i = 0; i < elements.size(); ++i)
-        worst = std::max(worst, part(lack, elements[i]).norm() / force_in_play(i, x, limits));
+        worst = std::max(worst, part(r, elements[i]).norm() / force_scale(i, x, limits));
     return std::isfinite(worst) ? worst : HUGE_VAL;
 }
 
@@ -149,14 +149,14 @@ MatX RestEquation::jacobian(const VecX& x) const {
         const RestElement& e = elements[i];
         auto rows = J.middleRows(e.row, e.dim);
         const MatX unit = slope.middleRows(e.row, e.dim);
-        const VecX asked = part(from_middle, e) - e.rho * part(alpha, e);
-        const double length = asked.norm();
+        const VecX argument = part(from_middle, e) - e.rho * part(alpha, e);
+        const double length = argument.norm();
         if (!e.may_stick) {
             rows = unit + e.direction * dlimits.row(i);
         } else if (length <= limits[i]) {
             rows = e.rho * dalpha.middleRows(e.row, e.dim);
         } else {
-            const VecX along = asked / length;
+            const VecX along = argument / length;
             const MatX across = MatX::Identity(e.dim, e.dim) - along * along.transpose();
             rows = unit - along * dlimits.row(i) -
                    limits[i] / length * across * (unit - e.rho * dalpha.middleRows(e.row, e.dim));
@@ -177,7 +177,7 @@ VecX RestEquation::holding_forces() const {
     }
     const VecX driven = alpha0 + W * x;
     const MatX own = W(rows, rows);
-    x(rows) = least_norm_solution(own, -driven(rows));
+    x(rows) = minimum_norm_solution(own, -driven(rows));
     return x;
 }
 
@@ -191,7 +191,7 @@ std::vector<bool> RestEquation::sticks(const VecX& x) const {
         const RestElement& e = elements[i];
         out.push_back(e.may_stick &&
                       (part(from_middle, e) - e.rho * part(alpha, e)).norm() <=
-                       limits[i] * (1.0 + parameters.sticking_limit_rounding));
+                       limits[i] * (1.0 + parameters.limit_rounding));
     }
     return out;
 }
@@ -211,7 +211,7 @@ double RestEquation::determinant_far_away() const {
     MatX dalpha, dlimits, dmiddle;
     const int count = static_cast<int>(elements.size());
     double least = HUGE_VAL;
-    for (int signs = 0; signs < 1 << std::min(count, parameters.most_signs); ++signs) {
+    for (int signs = 0; signs < 1 << std::min(count, parameters.max_signed_elements); ++signs) {
         VecX x = VecX::Zero(n);
         for (int i = 0; i < count; ++i) {
             const RestElement& e = elements[i];
@@ -233,10 +233,10 @@ double RestEquation::determinant_far_away() const {
     return least;
 }
 
-double contraction(const RestEquation& equation) {
-    if (!equation.loaded()) return 0.0;
+double contraction_bound(const RestEquation& equation) {
+    if (!equation.is_load_dependent()) return 0.0;
     MatX G, loads;
-    if (equation.ask || !energy_factor(equation, G, loads)) return HUGE_VAL;
+    if (equation.evaluate_laws || !energy_factor(equation, G, loads)) return HUGE_VAL;
     const int count = static_cast<int>(equation.elements.size());
     VecX l = VecX::Zero(count), g(count);
     for (int i = 0; i < count; ++i) {

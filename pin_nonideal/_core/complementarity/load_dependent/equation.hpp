@@ -27,13 +27,13 @@ struct RestElement {
 };
 
 struct RestEquationParameters {
-    double difference_step = 1e-7;          // relative to the forces: square root of the rounding, with a margin
-    double min_response_pivot = 1e-8;       // pivot of the Cholesky factor of W, relative to its diagonal
-    double null_response = 1e-13;           // eigenvalues of W below this part of the largest count as zero
-    double unmoved = 1e-9;                  // part of the loads that forces without motion may change
-    double sticking_limit_rounding = 1e-9;  // relative excess of a sticking force over its limit
-    double unbounded_force = 1e9;           // unbounded forces, relative to those of limits and accelerations
-    int most_signs = 6;                     // elements with all combinations of slip signs
+    double difference_step = 1e-7;     // relative to the forces: square root of the rounding, with a margin
+    double min_response_pivot = 1e-8;  // pivot of the Cholesky factor of W, relative to its diagonal
+    double null_response = 1e-13;      // eigenvalues of W below this part of the largest count as zero
+    double unmoved = 1e-9;             // part of the loads that forces without motion may change
+    double limit_rounding = 1e-9;      // relative excess of a sticking force over its limit
+    double unbounded_force = 1e9;      // unbounded forces, relative to those of limits and accelerations
+    int max_signed_elements = 6;       // elements with all combinations of slip signs
 };
 
 struct RestEquation {
@@ -47,12 +47,12 @@ struct RestEquation {
     VecX still;  // load vectors without friction,
     MatX loads;  // and per unit of each force
     // Set if laws are known only as functions: computes slip accelerations, and limits before `factor`, for the forces x.
-    std::function<void(const VecX& x, VecX& alpha, FrictionLimits& limits)> ask;
+    std::function<void(const VecX& x, VecX& alpha, FrictionLimits& limits)> evaluate_laws;
     // Part of the limits that comes from `fixed` instead of the load (continuation parameter).
     double frozen = 0.0;
     FrictionLimits fixed;
 
-    bool loaded() const { return ask || loads.rows() > 0; }
+    bool is_load_dependent() const { return evaluate_laws || loads.rows() > 0; }
     void respond(const VecX& x, VecX& alpha, FrictionLimits& limits) const;
     // Compute derivatives of alpha (n, n), of the limits' sizes (elements, n) and of their middles (n, n).
     void differentiate(const VecX& x, MatX& dalpha, MatX& dlimits, MatX& dmiddle) const;
@@ -60,7 +60,7 @@ struct RestEquation {
     VecX residual(const VecX& x) const;
     double error(const VecX& x) const;
     // Return the largest of an element's force, of its limit and of the force that would stop it.
-    double force_in_play(size_t element, const VecX& x, const FrictionLimits& limits) const;
+    double force_scale(size_t element, const VecX& x, const FrictionLimits& limits) const;
     // Return d residual / dx on the branch of x.
     MatX jacobian(const VecX& x) const;
 
@@ -77,6 +77,6 @@ struct RestEquation {
 // Return a bound on the contraction of the limits. If it is below 1, the motion is unique: the difference of the limits
 // of two motions would shrink to this part of itself. With W = G G^T and u = G^T (x - y) for two solutions x, y,
 // |u|^2 <= sum_i |G_i u| |limit_i(x) - limit_i(y)|, and |limit_i(x) - limit_i(y)| <= l_i |u|.
-double contraction(const RestEquation& equation);
+double contraction_bound(const RestEquation& equation);
 
 }  // namespace pn

@@ -32,28 +32,28 @@ struct Alternation {
 
     // Given x, compute the forces of slipping elements, the limits of sticking candidates, and the accelerations left
     // for the candidates.
-    void ask(const VecX& x, VecX& out, FrictionLimits& held, VecX& own) {
+    void evaluate(const VecX& x, VecX& out, FrictionLimits& sticking_limits, VecX& rhs) {
         equation.respond(x, alpha, limits);
         out = x;
-        held.size.resize(dims.size());
-        held.middle = limits.middle(rows);
+        sticking_limits.size.resize(dims.size());
+        sticking_limits.middle = limits.middle(rows);
         int free = 0;
         for (size_t i = 0; i < equation.elements.size(); ++i) {
             const RestElement& e = equation.elements[i];
-            if (e.may_stick) held.size[free++] = limits[i];
+            if (e.may_stick) sticking_limits.size[free++] = limits[i];
             else out.segment(e.row, e.dim) = limits.middle.segment(e.row, e.dim) - limits[i] * e.direction;
         }
         VecX before = out;
         for (int r : rows) before[r] = 0.0;
-        own = (alpha + equation.W * (before - x))(rows);
+        rhs = (alpha + equation.W * (before - x))(rows);
     }
 
     // Return the forces that the limits under x allow.
     VecX next(const VecX& x) {
-        VecX out, own;
-        FrictionLimits held;
-        ask(x, out, held, own);
-        out(rows) = friction_program(W, own, dims, held);
+        VecX out, rhs;
+        FrictionLimits sticking_limits;
+        evaluate(x, out, sticking_limits, rhs);
+        out(rows) = friction_program(W, rhs, dims, sticking_limits);
         return out;
     }
 
@@ -71,13 +71,13 @@ struct Alternation {
     }
 };
 
-VecX newton_step(const RestEquation& equation, const VecX& x, const VecX& lack) {
+VecX newton_step(const RestEquation& equation, const VecX& x, const VecX& residual) {
     const MatX J = equation.jacobian(x);
     LU lu;
     lu.compute(J);
-    if (!(lu.reciprocal_condition() > response_rank_threshold)) return least_squares(J, lack, response_rank_threshold);
+    if (!(lu.reciprocal_condition() > response_rank_threshold)) return least_squares(J, residual, response_rank_threshold);
     VecX step;
-    lu.solve(lack, step);
+    lu.solve(residual, step);
     return step;
 }
 
@@ -104,14 +104,14 @@ bool follow_path(const RestEquation& equation, VecX& x) {
     return true;
 }
 
-double largest_force_in_play(const RestEquation& equation, const VecX& x, const FrictionLimits& limits) {
+double largest_force_scale(const RestEquation& equation, const VecX& x, const FrictionLimits& limits) {
     double size = 0.0;
-    for (size_t i = 0; i < equation.elements.size(); ++i) size = std::max(size, equation.force_in_play(i, x, limits));
+    for (size_t i = 0; i < equation.elements.size(); ++i) size = std::max(size, equation.force_scale(i, x, limits));
     return size;
 }
 
 // Compute the residual of rest: accelerations that are left, as forces, and forces beyond a limit. J is its derivative.
-void lack_of_rest(const RestEquation& equation, const VecX& x, VecX& lack, MatX& J) {
+void rest_residual(const RestEquation& equation, const VecX& x, VecX& residual, MatX& J) {
     VecX alpha;
     FrictionLimits limits;
     MatX dalpha, dlimits, dmiddle;
@@ -120,25 +120,25 @@ void lack_of_rest(const RestEquation& equation, const VecX& x, VecX& lack, MatX&
     const VecX from_middle = x - limits.middle;
     const MatX slope = MatX::Identity(equation.n, equation.n) - dmiddle;
     const int n = equation.n, count = static_cast<int>(equation.elements.size());
-    const double no_limit = load_dependent_parameters.tolerance * largest_force_in_play(equation, x, limits);
-    lack.setZero(2 * n);
+    const double no_limit = load_dependent_parameters.tolerance * largest_force_scale(equation, x, limits);
+    residual.setZero(2 * n);
     J.setZero(2 * n, n);
     for (int i = 0; i < count; ++i) {
         const RestElement& e = equation.elements[i];
         const auto force = from_middle.segment(e.row, e.dim);
         if (!e.may_stick) {
-            lack.segment(e.row, e.dim) = force + limits[i] * e.direction;
+            residual.segment(e.row, e.dim) = force + limits[i] * e.direction;
             J.middleRows(e.row, e.dim) = slope.middleRows(e.row, e.dim) + e.direction * dlimits.row(i);
             continue;
         }
-        lack.segment(e.row, e.dim) = e.rho * alpha.segment(e.row, e.dim);
+        residual.segment(e.row, e.dim) = e.rho * alpha.segment(e.row, e.dim);
         J.middleRows(e.row, e.dim) = e.rho * dalpha.middleRows(e.row, e.dim);
         const double size = force.norm();
         if (limits[i] <= no_limit) {  // |x| has a kink at zero, x has none
-            lack.segment(n + e.row, e.dim) = force;
+            residual.segment(n + e.row, e.dim) = force;
             J.middleRows(n + e.row, e.dim) = slope.middleRows(e.row, e.dim);
         } else if (size > limits[i]) {
-            lack[n + e.row] = size - limits[i];
+            residual[n + e.row] = size - limits[i];
             J.row(n + e.row) = force.transpose() / size * slope.middleRows(e.row, e.dim) - dlimits.row(i);
         }
     }
@@ -148,27 +148,27 @@ void lack_of_rest(const RestEquation& equation, const VecX& x, VecX& lack, MatX&
 
 // Gauss-Newton method. If limits are linear in the forces (contacts), the residual is convex.
 bool hold_at_rest(const RestEquation& equation, VecX& x) {
-    VecX lack, there, ahead;
+    VecX residual, there, ahead;
     MatX J, J_there;
-    lack_of_rest(equation, x, lack, J);
+    rest_residual(equation, x, residual, J);
     for (int it = 0; it < load_dependent_parameters.max_newton; ++it) {
         VecX alpha;
         FrictionLimits limits;
         equation.respond(x, alpha, limits);
-        if (lack.cwiseAbs().maxCoeff() <= load_dependent_parameters.within * largest_force_in_play(equation, x, limits))
-            return true;
-        const VecX step = least_squares(J, lack, response_rank_threshold);
-        const double now = lack.norm();
+        const double allowed = load_dependent_parameters.limit_rounding * largest_force_scale(equation, x, limits);
+        if (residual.cwiseAbs().maxCoeff() <= allowed) return true;
+        const VecX step = least_squares(J, residual, response_rank_threshold);
+        const double now = residual.norm();
         double length = 1.0;
         bool gains = false;
         for (int halving = 0; halving < load_dependent_parameters.max_halvings && !gains; ++halving, length *= 0.5) {
             ahead = x - length * step;
-            lack_of_rest(equation, ahead, there, J_there);
+            rest_residual(equation, ahead, there, J_there);
             gains = there.norm() < (1.0 - load_dependent_parameters.min_residual_gain * length) * now;
         }
         if (!gains) return false;
         x = ahead;
-        lack = there;
+        residual = there;
         J = J_there;
     }
     return false;
@@ -194,11 +194,11 @@ bool refine_rest(const RestEquation& equation, VecX& x) {
 
 VecX onset_accelerations(const RestEquation& equation, const VecX& x) {
     Alternation turns(equation);
-    VecX out, own;
-    FrictionLimits held;
-    turns.ask(x, out, held, own);
+    VecX out, rhs;
+    FrictionLimits sticking_limits;
+    turns.evaluate(x, out, sticking_limits, rhs);
     VecX accelerations = turns.alpha;
-    accelerations(turns.rows) = onset_accelerations(turns.W, own, turns.dims, held);
+    accelerations(turns.rows) = onset_accelerations(turns.W, rhs, turns.dims, sticking_limits);
     return accelerations;
 }
 

@@ -10,7 +10,7 @@ struct LoadDependentParameters {
     double tolerance = 1e-13;            // largest error of the equation, relative to each element's forces
     double stall_tolerance = 1e-10;      // the same if no step reduces the error
     double max_alternation_ratio = 0.5;  // error ratio of the alternation, above which Newton's method takes over
-    double within = 1e-13;               // excess of a sticking force over its limit, relative to the largest force
+    double limit_rounding = 1e-13;       // excess of a sticking force over its limit, relative to the largest force
     double min_residual_gain = 1e-3;     // required relative decrease of the residual by a step
     int max_alternations = 40;           // maximum alternations of forces and limits
     int max_newton = 40;                 // maximum Newton steps

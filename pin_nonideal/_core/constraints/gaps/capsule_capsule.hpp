@@ -10,7 +10,7 @@
 namespace pn {
 
 struct CapsuleCapsuleRow {
-    static constexpr const char* name = "capsules";
+    static constexpr const char* name = "capsule_capsule";
     static constexpr Role role = Role::contact;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr int pressing = 0;
@@ -46,7 +46,7 @@ struct CapsuleCapsuleRow {
         out.rate[0] = p.n.dot(m.u);
         const auto du = s.a.acceleration(p.c1) + s.a.omega().cross(m.along1) - s.b.acceleration(p.c2) -
                         s.b.omega().cross(m.along2);
-        out.drift[0] = p.n.dot(du) + m.dn.dot(m.u);
+        out.bias[0] = p.n.dot(du) + m.dn.dot(m.u);
     }
 };
 

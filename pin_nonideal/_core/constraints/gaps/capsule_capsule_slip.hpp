@@ -10,7 +10,7 @@
 namespace pn {
 
 struct CapsuleCapsuleSlipRows : SlipDirections {
-    static constexpr const char* name = "capsules_slip";
+    static constexpr const char* name = "capsule_capsule_slip";
 
     Frame frame1, frame2;
     double half1, half2, radius1;

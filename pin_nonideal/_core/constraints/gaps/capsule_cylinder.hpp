@@ -10,7 +10,7 @@
 namespace pn {
 
 struct CapsuleCylinderRow {
-    static constexpr const char* name = "line";
+    static constexpr const char* name = "capsule_cylinder";
     static constexpr Role role = Role::contact;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr int pressing = 0;
@@ -44,7 +44,7 @@ struct CapsuleCylinderRow {
         const NearestAlongLine<Sides> p(s, solid, half1);
         const AlongLineMotion<Sides> m(s, p);
         out.rate[0] = p.at.n.dot(m.u);
-        out.drift[0] = m.drift;
+        out.bias[0] = m.bias;
     }
 };
 

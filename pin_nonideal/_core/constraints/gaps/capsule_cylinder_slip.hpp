@@ -11,7 +11,7 @@
 namespace pn {
 
 struct CapsuleCylinderSlipRows : SlipDirections {
-    static constexpr const char* name = "line_slip";
+    static constexpr const char* name = "capsule_cylinder_slip";
 
     Frame frame1, frame2;
     Revolved solid;

@@ -10,7 +10,7 @@
 namespace pn {
 
 struct CylinderCylinderRow {
-    static constexpr const char* name = "rims";
+    static constexpr const char* name = "cylinder_cylinder";
     static constexpr Role role = Role::contact;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr int pressing = 0;
@@ -45,7 +45,7 @@ struct CylinderCylinderRow {
         const NearestOfCylinders<Sides> p(s, first, second);
         const CylindersMotion<Sides> m(p.mover(s), p.found);
         out.rate[0] = p.found.at.n.dot(m.u);
-        out.drift[0] = m.drift;
+        out.bias[0] = m.bias;
     }
 };
 

@@ -11,7 +11,7 @@
 namespace pn {
 
 struct CylinderCylinderSlipRows : SlipDirections {
-    static constexpr const char* name = "rims_slip";
+    static constexpr const char* name = "cylinder_cylinder_slip";
 
     Frame frame1, frame2;
     Revolved first, second;

@@ -10,7 +10,7 @@
 namespace pn {
 
 struct DiskHullRow {
-    static constexpr const char* name = "rim";
+    static constexpr const char* name = "disk_hull";
     static constexpr Role role = Role::contact;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr int pressing = 0;
@@ -50,7 +50,7 @@ struct DiskHullRow {
         }
         const AlongLineMotion<Sides> m(p.from_hull(s), *p.line);
         out.rate[0] = p.line->at.n.dot(m.u);
-        out.drift[0] = m.drift;
+        out.bias[0] = m.bias;
     }
 };
 

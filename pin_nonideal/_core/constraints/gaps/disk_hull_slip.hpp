@@ -11,7 +11,7 @@
 namespace pn {
 
 struct DiskHullSlipRows : SlipDirections {
-    static constexpr const char* name = "rim_slip";
+    static constexpr const char* name = "disk_hull_slip";
 
     Frame frame1, frame2;
     Hull solid;

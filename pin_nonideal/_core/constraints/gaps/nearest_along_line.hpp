@@ -18,7 +18,7 @@ struct SegmentSearchParameters {
     // Slope at the nearest point beyond which this point is a kink of the distance, inside the solid.
     double kink = 1e-9;
     // Maximum number of evaluations. Bisection alone ends within this number, and Newton's method takes three to eight.
-    int most_looks = 100;
+    int max_samples = 100;
 };
 
 inline constexpr SegmentSearchParameters segment_search_parameters{};
@@ -41,8 +41,8 @@ struct NearestAlongLine {
         if (half == 0.0) return;
         Scalar low = -half, high = half, steepest = HUGE_VAL;
         bool low_seen = false, high_seen = false;
-        for (int look = 0; look < segment_search_parameters.most_looks; ++look) {
-            if (look > 0) at = OnSolid(there(s), solid);
+        for (int iteration = 0; iteration < segment_search_parameters.max_samples; ++iteration) {
+            if (iteration > 0) at = OnSolid(there(s), solid);
             const Scalar slope = e.dot(at.n), steep = slope < 0.0 ? -slope : slope;
             bend = e.dot(at.turning(e));
             if (!(steep > segment_search_parameters.level)) break;
@@ -103,10 +103,10 @@ struct AlongLineMotion {
     Vec u;       // velocity of body 1 against body 2 at the nearest point of the segment
     Scalar slides;  // velocity of the nearest point along the segment
     Vec dn;      // rate of the normal
-    Scalar drift;   // bias of the distance: its second rate at zero acceleration
+    Scalar bias;   // bias of the distance: its second rate at zero acceleration
 
     AlongLineMotion(const Sides& s, const NearestAlongLine<Sides>& p)
-        : u(), slides(0.0), dn(), drift(0.0) {
+        : u(), slides(0.0), dn(), bias(0.0) {
         const Vec c = p.place();
         u = s.a.velocity(c) - s.b.velocity(c);
         const Vec turning = p.at.turning(u);
@@ -115,7 +115,7 @@ struct AlongLineMotion {
         if (p.free) slides = -rate / p.bend;
         dn = s.b.omega().cross(p.at.n) + turning + slides * p.at.turning(p.e);
         const Vec du = s.a.acceleration(c) - s.b.acceleration(c) - 2.0 * s.b.omega().cross(u);
-        drift = p.at.n.dot(du) + turning.dot(u) + slides * rate;
+        bias = p.at.n.dot(du) + turning.dot(u) + slides * rate;
     }
 };
 

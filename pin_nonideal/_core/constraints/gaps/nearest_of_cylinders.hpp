@@ -114,9 +114,9 @@ struct CylindersMotion {
     Vec u;       // relative velocity at the point, fixed to its body
     Vec slides;  // sliding velocity of the point along its body
     Vec dn;      // rate of the normal
-    Scalar drift;  // bias of the distance: its second rate at zero acceleration
+    Scalar bias;  // bias of the distance: its second rate at zero acceleration
 
-    CylindersMotion(const Sides& s, const NearestToRevolved<Sides>& p) : u(), slides(), dn(), drift(0.0) {
+    CylindersMotion(const Sides& s, const NearestToRevolved<Sides>& p) : u(), slides(), dn(), bias(0.0) {
         const Vec& c = p.place;
         u = s.a.velocity(c) - s.b.velocity(c);
         const Vec turning = p.at.turning(u), omega = s.a.omega() - s.b.omega();
@@ -130,7 +130,7 @@ struct CylindersMotion {
         }
         dn = s.b.omega().cross(p.at.n) + turning + p.at.turning(slides);
         const Vec du = s.a.acceleration(c) - s.b.acceleration(c) - 2.0 * s.b.omega().cross(u);
-        drift = p.at.n.dot(du) + turning.dot(u) + slides.dot(turning) + p.at.n.dot(omega.cross(slides));
+        bias = p.at.n.dot(du) + turning.dot(u) + slides.dot(turning) + p.at.n.dot(omega.cross(slides));
     }
 };
 

@@ -20,9 +20,9 @@ struct RimSearchParameters {
     // Slope at the nearest point beyond which this point is a kink of the distance, inside the solid.
     double kink = 1e-9;
     // Maximum number of evaluations. Bisection alone ends within this number, and Newton's method takes three to eight.
-    int most_looks = 80;
-    int most_chords = 40;         // bisections over the chords of a disk
-    double beside_chords = 1e-3;  // half angle [rad] of the arc in which Newton's method continues from their result
+    int max_samples = 80;
+    int max_chord_bisections = 40;  // bisections over the chords of a disk
+    double beside_chords = 1e-3;    // half angle [rad] of the arc in which Newton's method continues from their result
 };
 
 inline constexpr RimSearchParameters rim_search_parameters{};
@@ -72,7 +72,7 @@ struct NearestAroundRim {
         Direction now = start(s, out.at);
         Arc arc{{now.y, -now.x}, {-now.y, now.x}};
         Scalar steepest = HUGE_VAL;
-        for (int look = 0; look < rim_search_parameters.most_looks; ++look) {
+        for (int iteration = 0; iteration < rim_search_parameters.max_samples; ++iteration) {
             const OnSolid at = nearest(s, solid, now);
             const Direction slope = slope_of(at);
             if (!(dot(slope, slope) > rim_search_parameters.level * rim_search_parameters.level))
@@ -134,7 +134,7 @@ private:
         const Vec along = out(direction), beside = around(direction);
         Direction found = direction;
         double low = -1.0, high = 1.0;
-        for (int look = 0; look < rim_search_parameters.most_chords; ++look) {
+        for (int iteration = 0; iteration < rim_search_parameters.max_chord_bisections; ++iteration) {
             const double part = 0.5 * (low + high), half = radius * std::sqrt(1.0 - part * part);
             const NearestAlongLine<Sides> line(s, solid, middle + radius * part * beside, along, half);
             const bool inside = half > line.part && -half < line.part;

@@ -9,7 +9,7 @@
 namespace pn {
 
 struct PlanePointRow {
-    static constexpr const char* name = "contact";
+    static constexpr const char* name = "plane_point";
     static constexpr Role role = Role::contact;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr DisplayKind shown = DisplayKind::contact;

@@ -9,7 +9,7 @@
 namespace pn {
 
 struct PlanePointSlipRows : SlipDirections {
-    static constexpr const char* name = "contact_slip";
+    static constexpr const char* name = "plane_point_slip";
 
     Frame frame1, frame2;
     double radius;

@@ -11,7 +11,7 @@
 namespace pn {
 
 struct PlaneEllipsoidRow {
-    static constexpr const char* name = "ellipsoid";
+    static constexpr const char* name = "plane_ellipsoid";
     static constexpr Role role = Role::contact;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr int pressing = 0;

@@ -10,7 +10,7 @@
 namespace pn {
 
 struct PlaneEllipsoidSlipRows : SlipDirections {
-    static constexpr const char* name = "ellipsoid_slip";
+    static constexpr const char* name = "plane_ellipsoid_slip";
 
     Frame frame1, frame2;
     Vec3 semiaxes, tangent1, tangent2, normal;

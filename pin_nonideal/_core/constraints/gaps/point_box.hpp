@@ -10,7 +10,7 @@
 namespace pn {
 
 struct PointBoxRow {
-    static constexpr const char* name = "box";
+    static constexpr const char* name = "point_box";
     static constexpr Role role = Role::contact;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr int pressing = 0;
@@ -43,7 +43,7 @@ struct PointBoxRow {
         const NearestOnBox<Sides> p(s, half);
         const PointMotion<typename Sides::Pose> motion(s);
         out.rate[0] = p.n.dot(motion.u);
-        out.drift[0] = p.n.dot(motion.du) + p.turning(motion.u).dot(motion.u);
+        out.bias[0] = p.n.dot(motion.du) + p.turning(motion.u).dot(motion.u);
     }
 };
 

@@ -11,7 +11,7 @@
 namespace pn {
 
 struct PointBoxSlipRows : SlipDirections {
-    static constexpr const char* name = "box_slip";
+    static constexpr const char* name = "point_box_slip";
 
     Frame frame1, frame2;
     Vec3 half;

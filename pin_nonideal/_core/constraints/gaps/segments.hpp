@@ -115,7 +115,7 @@ PN_INLINE void slide(const Sides& s, Out& out, const TurningTangents<Sides>& alo
                     s.b.omega().cross(moves - vb);
     for (int k = 0; k < 2; ++k) {
         out.rate[k] = along.t[k].dot(u);
-        out.drift[k] = along.t[k].dot(du) + along.dt[k].dot(u);
+        out.bias[k] = along.t[k].dot(du) + along.dt[k].dot(u);
     }
 }
 

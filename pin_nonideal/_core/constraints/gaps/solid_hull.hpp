@@ -48,7 +48,7 @@ struct SolidHullRow {
         const auto p = nearest(s);
         const PointMotion<typename Sides::Pose> motion(s);
         out.rate[0] = p.n.dot(motion.u);
-        out.drift[0] = p.n.dot(motion.du) + p.turning(motion.u).dot(motion.u);
+        out.bias[0] = p.n.dot(motion.du) + p.turning(motion.u).dot(motion.u);
     }
 };
 

@@ -34,7 +34,7 @@ struct UserGapRow {
     template <class State, class Out>
     PN_INLINE void rows(const State& s, Out& out) const {
         function(s.t, s.q, s.v, out.A, out.b);
-        out.drift[0] = -out.b[0];
+        out.bias[0] = -out.b[0];
     }
     template <class State, class Out>
     PN_INLINE void rate_and_bias(const State& s, Out& out) const {

@@ -46,8 +46,8 @@ struct DistanceRows {
         const auto n = direction(d, distance);
         const Scalar along = n.dot(u);
         out.rate[0] = along + out.phi_t[0];
-        out.drift[0] = n.dot(s.a.acceleration(s.a.x) - s.b.acceleration(s.b.x)) + out.phi_tt[0];
-        if (distance > 0.0) out.drift[0] += (u.squaredNorm() - along * along) / distance;
+        out.bias[0] = n.dot(s.a.acceleration(s.a.x) - s.b.acceleration(s.b.x)) + out.phi_tt[0];
+        if (distance > 0.0) out.bias[0] += (u.squaredNorm() - along * along) / distance;
     }
 
 private:

@@ -64,7 +64,7 @@ struct FrameRows {
         for (int k = 0; k < 3; ++k) {
             point.row(out, k, s.b.R.col(k));
             out.rate[k + 3] = s.b.R.col(k).dot(omega);
-            out.drift[k + 3] = s.b.R.col(k).dot(alpha);
+            out.bias[k + 3] = s.b.R.col(k).dot(alpha);
         }
     }
 };

@@ -67,7 +67,7 @@ private:
         const auto e = s.a.R * axis, w = e.cross(n);
         const auto dw = s.a.omega().cross(e).cross(n) + e.cross(s.b.omega().cross(n));
         out.rate[k] = w.dot(s.a.omega() - s.b.omega());
-        out.drift[k] = w.dot(s.a.alpha() - s.b.alpha()) + dw.dot(s.a.omega() - s.b.omega());
+        out.bias[k] = w.dot(s.a.alpha() - s.b.alpha()) + dw.dot(s.a.omega() - s.b.omega());
     }
 };
 

@@ -28,7 +28,7 @@ struct HingeSlipRows : SlipDirections {
     PN_INLINE void rate_and_bias(const Sides& s, Out& out) const {
         const auto e = s.a.R * axis, omega = s.a.omega() - s.b.omega();
         out.rate[0] = e.dot(omega);
-        out.drift[0] = e.dot(s.a.alpha() - s.b.alpha()) + s.a.omega().cross(e).dot(omega);
+        out.bias[0] = e.dot(s.a.alpha() - s.b.alpha()) + s.a.omega().cross(e).dot(omega);
     }
 };
 

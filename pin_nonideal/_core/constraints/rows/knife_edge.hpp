@@ -9,7 +9,7 @@
 namespace pn {
 
 struct KnifeEdgeRows {
-    static constexpr const char* name = "knife";
+    static constexpr const char* name = "knife_edge";
     static constexpr Role role = Role::constraint;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr DisplayKind shown = DisplayKind::edge;
@@ -34,7 +34,7 @@ struct KnifeEdgeRows {
     PN_INLINE void rate_and_bias(const Sides& s, Out& out) const {
         const auto e = s.a.R * axis, u = s.a.velocity(s.a.x);
         out.rate[0] = e.dot(u);  // Eq. (2)
-        out.drift[0] = e.dot(s.a.acceleration(s.a.x)) + s.a.omega().cross(e).dot(u);
+        out.bias[0] = e.dot(s.a.acceleration(s.a.x)) + s.a.omega().cross(e).dot(u);
     }
 };
 

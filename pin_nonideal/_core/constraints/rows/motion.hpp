@@ -43,7 +43,7 @@ struct MotionRows {
     template <class State, class Out>
     PN_INLINE void rate_and_bias(const State& s, Out& out) const {
         out.rate[0] = s.v[s.mechanism.joints[joint].iv] + out.phi_t[0];
-        out.drift[0] = out.phi_tt[0];
+        out.bias[0] = out.phi_tt[0];
     }
 };
 

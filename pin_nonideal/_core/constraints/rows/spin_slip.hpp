@@ -11,7 +11,7 @@
 namespace pn {
 
 struct SpinSlipRows : SlipDirections {
-    static constexpr const char* name = "turn_slip";
+    static constexpr const char* name = "spin_slip";
 
     Frame frame1, frame2;
     std::vector<int> axes;
@@ -31,7 +31,7 @@ struct SpinSlipRows : SlipDirections {
         const auto omega = s.a.omega() - s.b.omega(), alpha = s.a.alpha() - s.b.alpha() - s.b.omega().cross(omega);
         for (size_t k = 0; k < axes.size(); ++k) {
             out.rate[k] = s.b.R.col(axes[k]).dot(omega);
-            out.drift[k] = s.b.R.col(axes[k]).dot(alpha);
+            out.bias[k] = s.b.R.col(axes[k]).dot(alpha);
         }
     }
 };

@@ -41,7 +41,7 @@ struct UserRows {
     template <class State, class Out>
     PN_INLINE void rows(const State& s, Out& out) const {
         function(s.t, s.q, s.v, out.A, out.b);
-        for (int k = 0; k < count; ++k) out.drift[k] = -out.b[k];
+        for (int k = 0; k < count; ++k) out.bias[k] = -out.b[k];
     }
     template <class State, class Out>
     PN_INLINE void rate_and_bias(const State& s, Out& out) const {

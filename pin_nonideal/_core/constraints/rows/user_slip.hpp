@@ -51,7 +51,7 @@ struct UserSlipRows {
         directions(s.t - h, ahead, before);
         for (int k = 0; k < count; ++k) {
             out.rate[k] = out.A.row(k).dot(s.v);
-            out.drift[k] = (after.segment(k * nv, nv).dot(s.v) - before.segment(k * nv, nv).dot(s.v)) / (2.0 * h);
+            out.bias[k] = (after.segment(k * nv, nv).dot(s.v) - before.segment(k * nv, nv).dot(s.v)) / (2.0 * h);
         }
     }
 };

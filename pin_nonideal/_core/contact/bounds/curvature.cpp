@@ -123,7 +123,7 @@ double CurvatureBounds::of(const Workspace&, const LimitRow& kind) const {
     return acceleration_[p.mechanism.joints[kind.joint].iv];
 }
 
-double CurvatureBounds::bound(const Workspace& w, int gap) const {
+double CurvatureBounds::lower_bound(const Workspace& w, int gap) const {
     const Kind& kind = p.blocks[p.gaps[gap].block].kind;
     if (const auto* contact = std::get_if<PlanePointRow>(&kind)) return of(w, *contact);
     if (const auto* capsules = std::get_if<CapsuleCapsuleRow>(&kind)) return of(w, *capsules);
@@ -183,34 +183,35 @@ double CurvatureBounds::speed(int gap) const {
     return std::visit([&](const auto& kind) { return speed(kind); }, p.blocks[p.gaps[gap].block].kind);
 }
 
-bool CurvatureBounds::knows(const Program& p, int gap) { return !p.is_users(gap); }
+bool CurvatureBounds::has_bounds(const Program& p, int gap) { return !p.is_users(gap); }
 
 // Points that pass each other at distance d with relative speed u separate with acceleration u^2 / d. A change of the
 // nearest points only reduces this. reach1 and reach2 are the extents of the contact's geometry from its frames.
-double CurvatureBounds::rise(double reach1, double reach2, const Frame& frame1, const Frame& frame2, double radius) const {
+double CurvatureBounds::upper_bound(double reach1, double reach2, const Frame& frame1, const Frame& frame2,
+                                    double radius) const {
     const Bound a = frame_bound(frame1), b = frame_bound(frame2);
     const double velocity = a.velocity + b.velocity + reach1 * a.spin + reach2 * b.spin;
     return velocity * velocity / radius;
 }
 
-double CurvatureBounds::rise(const Workspace& w, int gap) const {
+double CurvatureBounds::upper_bound(const Workspace& w, int gap) const {
     const Kind& kind = p.blocks[p.gaps[gap].block].kind;
     double passing = 0.0;
     if (const auto* c = std::get_if<CapsuleCapsuleRow>(&kind))
-        passing = rise(c->half1, c->half2, c->frame1, c->frame2, c->radius);
+        passing = upper_bound(c->half1, c->half2, c->frame1, c->frame2, c->radius);
     else if (const auto* box = std::get_if<PointBoxRow>(&kind))
-        passing = rise(0.0, box->half.norm(), box->frame1, box->frame2, box->radius);
+        passing = upper_bound(0.0, box->half.norm(), box->frame1, box->frame2, box->radius);
     else if (const auto* hull = std::get_if<HullRow>(&kind))
-        passing = rise(0.0, hull->solid.reach, hull->frame1, hull->frame2, hull->radius);
+        passing = upper_bound(0.0, hull->solid.reach, hull->frame1, hull->frame2, hull->radius);
     else if (const auto* revolved = std::get_if<RevolvedRow>(&kind))
-        passing = rise(0.0, revolved->solid.reach, revolved->frame1, revolved->frame2, revolved->radius);
+        passing = upper_bound(0.0, revolved->solid.reach, revolved->frame1, revolved->frame2, revolved->radius);
     else if (const auto* line = std::get_if<CapsuleCylinderRow>(&kind))
-        passing = rise(line->half1, line->solid.reach, line->frame1, line->frame2, line->radius);
+        passing = upper_bound(line->half1, line->solid.reach, line->frame1, line->frame2, line->radius);
     else if (const auto* rim = std::get_if<DiskHullRow>(&kind))
-        passing = rise(rim->rim, rim->solid.reach, rim->frame1, rim->frame2, rim->radius);
+        passing = upper_bound(rim->rim, rim->solid.reach, rim->frame1, rim->frame2, rim->radius);
     else if (const auto* rims = std::get_if<CylinderCylinderRow>(&kind))
-        passing = rise(rims->first.reach, rims->second.reach, rims->frame1, rims->frame2, rims->radius);
-    return bound(w, gap) + passing;
+        passing = upper_bound(rims->first.reach, rims->second.reach, rims->frame1, rims->frame2, rims->radius);
+    return lower_bound(w, gap) + passing;
 }
 
 }  // namespace pn

@@ -17,13 +17,13 @@ public:
     void bound_bodies(const Workspace& w, const VecX& speed, const VecX& acceleration, double h);
     // Over that step the second derivative of a gap is at least -bound. For round bodies this holds for the distance of
     // any two material points (contact/bounds/distance.hpp).
-    double bound(const Workspace& w, int gap) const;
+    double lower_bound(const Workspace& w, int gap) const;
     // Check if bounds exist. User gaps have none.
-    static bool knows(const Program& p, int gap);
+    static bool has_bounds(const Program& p, int gap);
     // Upper bound of the second derivative of a gap while the gap is open.
-    double rise(const Workspace& w, int gap) const;
+    double upper_bound(const Workspace& w, int gap) const;
     // Maximum change of a gap over the step. Infinite if unknown.
-    double travel(int gap) const { return h_ * speed(gap); }
+    double max_change(int gap) const { return h_ * speed(gap); }
     // Maximum relative speed of a contact's points. Infinite if unknown.
     double speed(int gap) const;
 
@@ -54,7 +54,7 @@ private:
     template <class Solid> double speed(const SolidHullRow<Solid>& kind) const;
     double speed(const LimitRow& kind) const { return speed_[p.mechanism.joints[kind.joint].iv]; }
     template <class K> double speed(const K&) const { return HUGE_VAL; }
-    double rise(double reach1, double reach2, const Frame& frame1, const Frame& frame2, double radius) const;
+    double upper_bound(double reach1, double reach2, const Frame& frame1, const Frame& frame2, double radius) const;
 
     const Program& p;
     std::vector<int> joints_;  // joints that move contacts, each after its parent

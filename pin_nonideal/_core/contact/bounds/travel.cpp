@@ -64,13 +64,13 @@ TravelBound::TravelBound(const Program& program)
         } else if (const auto [first, second] = frames(block.kind); first && !p.is_users(static_cast<int>(gap))) {
             pair.first = ends[0] = first->joint;
             pair.second = ends[1] = second->joint;
-            pair.turns = has_plane(block.kind) && may_turn[pair.second];
+            pair.plane_rotates = has_plane(block.kind) && may_turn[pair.second];
             const Extents reach = extents(block.kind);
             pair.reach = reach.first;
             extent_[pair.first] = std::max(extent_[pair.first], first->p.norm() + reach.first);
             extent_[pair.second] = std::max(extent_[pair.second], second->p.norm() + reach.second);
         } else {
-            pair.unknown = true;
+            pair.is_unknown = true;
         }
         for (int joint : ends) needed[joint] = 1;
     }
@@ -117,22 +117,22 @@ void TravelBound::set_levers(const Terms& terms, TravelState& travel) const {
         const int i = moved->joint, parent = moved->parent;
         if (parent == 0) continue;
         const Body &own = terms.body[i], &before = terms.body[parent];
-        double apart = (own.ref + own.p - before.ref - before.p).norm();
+        double distance = (own.ref + own.p - before.ref - before.p).norm();
         if (slides(moved->kind)) {
             const double room =
-                parameters.room_ahead * apart + parameters.steps_ahead * (travel.slid_step[i] + travel.turned_step[i]);
+                parameters.room_ahead * distance + parameters.steps_ahead * (travel.slid_step[i] + travel.turned_step[i]);
             travel.slid_until[i] = travel.joint[i] + room;
-            apart += room;
+            distance += room;
         }
-        travel.lever[parent] = std::max(travel.lever[parent], apart + travel.lever[i]);
+        travel.lever[parent] = std::max(travel.lever[parent], distance + travel.lever[i]);
     }
     travel.placed = true;
 }
 
 // Travel not yet summed uses the old levers.
 void TravelBound::step(const Terms& terms, const VecX& speed, double h, TravelState& travel) const {
-    const double time = parameters.way_factor * h;
-    bool far = !travel.placed;
+    const double time = parameters.travel_factor * h;
+    bool slid_out = !travel.placed;
     for (const Moved& moved : moved_) {
         const int i = moved.joint;
         const Speeds of = speeds(moved, speed);
@@ -140,9 +140,9 @@ void TravelBound::step(const Terms& terms, const VecX& speed, double h, TravelSt
         travel.turned_step[i] = time * of.turn;
         if (!moved.drifts) continue;
         const double come = travel.joint[i] + travel.slid[i] + travel.turned[i];
-        far |= !(come + travel.slid_step[i] + travel.turned_step[i] <= travel.slid_until[i]);
+        slid_out |= !(come + travel.slid_step[i] + travel.turned_step[i] <= travel.slid_until[i]);
     }
-    if (far) {
+    if (slid_out) {
         sum_up(travel);
         set_levers(terms, travel);
     }
@@ -175,7 +175,7 @@ void TravelBound::sum_up(TravelState& travel) const {
     travel.summed = true;
 }
 
-double TravelBound::apart(const Terms& terms, int gap) const {
+double TravelBound::distance(const Terms& terms, int gap) const {
     const auto& [first, second] = frames(p.blocks[p.gaps[gap].block].kind);
     const Pose one(p.mechanism, terms, *first), other(p.mechanism, terms, *second);
     return (one.x - other.x).norm() + pairs_[gap].reach;

@@ -32,7 +32,7 @@ struct TravelState {
 
 struct TravelBoundParameters {
     // Safety factor of the travel, for the moves of projections.
-    double way_factor = 2.0;
+    double travel_factor = 2.0;
     // Sliding joints get a margin before levers are recomputed: this fraction of the distance, plus this many steps.
     double room_ahead = 0.5, steps_ahead = 4.0;
     // Factor that makes a floating-point sum an upper bound.
@@ -60,27 +60,27 @@ public:
     // Bodies or joint that change a gap.
     struct Pair {
         int first = 0, second = 0, joint = 0;
-        double reach = 0.0;    // extent of the first body's geometry from its frame [m]
-        bool turns = false;    // the second body has a plane that may rotate: its speed grows with the distance
-        bool unknown = false;  // user function
+        double reach = 0.0;  // extent of the first body's geometry from its frame [m]
+        bool plane_rotates = false;  // the second body has a plane that may rotate: its speed grows with the distance
+        bool is_unknown = false;  // user function
     };
     const Pair& pair(int gap) const { return pairs_[gap]; }
     // Maximum change of a gap for the travel since its last evaluation, with the distance of its bodies at that time.
-    static double change(const Pair& pair, double way, double turn, double apart) {
-        return pair.turns ? way + turn * (apart + way) : way;
+    static double max_change(const Pair& pair, double path_length, double turn, double distance) {
+        return pair.plane_rotates ? path_length + turn * (distance + path_length) : path_length;
     }
     // Scene travel over which a gap may change by `width`. Zero for a rotating plane, whose travel depends on the
     // distance.
-    static double least_way(const Pair& pair, double width) {
-        return pair.turns ? 0.0 : pair.first == 0 || pair.second == 0 ? width : 0.5 * width;
+    static double min_scene_travel(const Pair& pair, double width) {
+        return pair.plane_rotates ? 0.0 : pair.first == 0 || pair.second == 0 ? width : 0.5 * width;
     }
     // Distance of the bodies of a gap, needed for rotating planes only.
-    double apart(const Terms& terms, int gap) const;
-    double way(const TravelState& travel, int gap) const {
+    double distance(const Terms& terms, int gap) const;
+    double path_length(const TravelState& travel, int gap) const {
         const Pair& pair = pairs_[gap];
         return travel.body[pair.first] + travel.body[pair.second] + travel.joint[pair.joint];
     }
-    double way_of_step(const TravelState& travel, int gap) const {
+    double step_path_length(const TravelState& travel, int gap) const {
         const Pair& pair = pairs_[gap];
         return travel.body_step[pair.first] + travel.body_step[pair.second] + travel.joint_step[pair.joint];
     }

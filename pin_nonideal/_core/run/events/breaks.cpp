@@ -129,7 +129,7 @@ void Breaks::jump(const std::vector<double>& before, const std::vector<double>& 
     VecX impulse = VecX::Zero(w.now.lam.size());
     for (int i : w.now.rows.blocks) multiply(p.blocks[i], w.now.A, change, w.scratch.r);
     solve_rows(w.now.rows, w.scratch.r, impulse);
-    tell(before, after, v_minus, impulse);
+    append_event(before, after, v_minus, impulse);
     system_.write(progress_.y);
     if (system_.energy) system_.work(progress_.y)[constraint_power] += work;
     else progress_.numerical_energy += work;
@@ -137,8 +137,8 @@ void Breaks::jump(const std::vector<double>& before, const std::vector<double>& 
     if (!p.frictions.empty()) set_modes(p, w, modes);
 }
 
-void Breaks::tell(const std::vector<double>& before, const std::vector<double>& after, const VecX& v_minus,
-                  const VecX& impulse) {
+void Breaks::append_event(const std::vector<double>& before, const std::vector<double>& after, const VecX& v_minus,
+                          const VecX& impulse) {
     const double allowed = parameters.rate_rounding * (1.0 + v_minus.cwiseAbs().maxCoeff());
     for (size_t i = 0; i < motions_.size(); ++i) {
         if (!(std::abs(after[i] - before[i]) > allowed)) continue;
@@ -149,7 +149,7 @@ void Breaks::tell(const std::vector<double>& before, const std::vector<double>& 
     }
 }
 
-void Breaks::look(double end, bool adaptive) {
+void Breaks::find_in_step(double end, bool adaptive) {
     const int intervals = adaptive ? parameters.adaptive_intervals : 1;
     end = w.now.row_time(end);
     for (const Motion& motion : motions_) {

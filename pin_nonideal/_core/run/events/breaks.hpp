@@ -46,7 +46,7 @@ public:
     bool pass();
     // Search for a break of a user function in a step from the current time to `end`. A pulse inside one interval of
     // the search is not detected (16 intervals for adaptive steps, else 1).
-    void look(double end, bool adaptive = true);
+    void find_in_step(double end, bool adaptive = true);
 
 private:
     struct Motion {
@@ -56,8 +56,8 @@ private:
 
     std::vector<double> rates(double t) const;
     void jump(const std::vector<double>& before, const std::vector<double>& after);
-    void tell(const std::vector<double>& before, const std::vector<double>& after, const VecX& v_minus,
-              const VecX& impulse);
+    void append_event(const std::vector<double>& before, const std::vector<double>& after, const VecX& v_minus,
+                      const VecX& impulse);
 
     const Program& p;
     Workspace& w;

@@ -9,13 +9,13 @@ ChatterDetector::ChatterDetector(System& system, Progress& progress, const Optio
     : w(system.w), progress_(progress), options_(options), stiffness_(stiffness), time_stepping_(time_stepping),
       out_(out) {}
 
-bool ChatterDetector::bridge(int element, double t_end) {
+bool ChatterDetector::bridge_chatter(int element, double t_end) {
     std::vector<double>& recent = progress_.recent_event_times;
     if (recent.size() > parameters.events) recent.erase(recent.begin());
     if (recent.size() < parameters.events || progress_.t - recent.front() > parameters.window) return false;
     if (!options_.method.outside()) {
         stiffness_.require_time_steps(next_stretch() / parameters.steps);
-        step_over(element, t_end);
+        bridge_stretch(element, t_end);
         return true;
     }
     recent.clear();  // steps of SciPy's methods continue without event location
@@ -43,14 +43,14 @@ double ChatterDetector::next_stretch() const {
     return again ? std::min(parameters.growth * progress_.bridged_time, parameters.longest) : parameters.window;
 }
 
-void ChatterDetector::step_over(int element, double t_end) {
+void ChatterDetector::bridge_stretch(int element, double t_end) {
     progress_.bridged_time = next_stretch();
     progress_.recent_event_times.clear();
     progress_.mode_change_times.clear();
     const double dt = progress_.bridged_time / parameters.steps;
     out_.events.push_back({progress_.t, Event::Kind::chatter, element});
     const double stop = std::min(t_end, progress_.t + progress_.bridged_time);
-    w.state.seeks_directions = false;
+    w.state.solves_directions = false;
     while (progress_.t < stop) time_stepping_.step(dt, stop, t_end);
     progress_.bridged_end = progress_.t;
 }

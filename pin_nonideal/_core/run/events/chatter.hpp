@@ -32,12 +32,12 @@ public:
     void remember();
     // Bridge a stretch by time stepping if events accumulate. `element`: friction element of the last event. Return
     // true if a stretch was bridged. The caller must then select the modes.
-    bool bridge(int element, double t_end);
+    bool bridge_chatter(int element, double t_end);
     // Check if an event without a known motion ends an accumulation of mode changes. A step cannot resolve the
     // remaining time until rest.
     bool is_zeno() const;
     // Bridge one stretch by time stepping.
-    void step_over(int element, double t_end);
+    void bridge_stretch(int element, double t_end);
 
 private:
     double next_stretch() const;

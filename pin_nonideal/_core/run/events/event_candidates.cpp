@@ -24,23 +24,23 @@ double EventCandidates::allowance(int e) const {
 
 // Check if a sticking element is beyond its limit at the step's end, or may have been between two stages.
 bool EventCandidates::may_reach_limit(int e) {
-    const std::vector<Stepper::Look>& looks = stepper_.looks();
-    const auto share = [&](size_t k) { return system_.share(*looks[k].rate, e); };
+    const std::vector<Stepper::RateSample>& rate_samples = stepper_.rate_samples();
+    const auto share = [&](size_t k) { return system_.share(*rate_samples[k].rate, e); };
     double least = share(0), most = least, rise = 0.0;
-    for (size_t k = 1; k < looks.size(); ++k) {
+    for (size_t k = 1; k < rate_samples.size(); ++k) {
         least = std::min(least, share(k));
         most = std::max(most, share(k));
     }
     const double range = most - least;
     if (range <= parameters.share_rounding)
         return most > 1.0 + parameters.share_rounding || least < -1.0 - parameters.share_rounding;
-    for (size_t k = 2; k < looks.size(); ++k) {
-        const double t0 = looks[k - 2].part, t1 = looks[k - 1].part, t2 = looks[k].part;
+    for (size_t k = 2; k < rate_samples.size(); ++k) {
+        const double t0 = rate_samples[k - 2].part, t1 = rate_samples[k - 1].part, t2 = rate_samples[k].part;
         rise = std::max({rise, rise_between(t0, share(k - 2), t1, share(k - 1), t2, share(k)),
                          rise_between(t0, -share(k - 2), t1, -share(k - 1), t2, -share(k))});
     }
     return std::max(most, -least) + parameters.times_parabola * rise + parameters.range_between * range >
-           1.0 + parameters.release_limit_rounding;
+           1.0 + parameters.limit_rounding;
 }
 
 // Check if a slipping element has reversed at the step's end, or may have done so inside.
@@ -50,23 +50,23 @@ bool EventCandidates::may_stop(int e) const { return slip_along_mode(p, w, e) + 
 // The minima of the cubics through them decide.
 bool EventCandidates::dips(int e) const {
     if (stepper_.method.order < 2) return false;
-    const std::vector<Stepper::Look>& looks = stepper_.looks();
+    const std::vector<Stepper::RateSample>& rate_samples = stepper_.rate_samples();
     const double allowed = allowance(e), below_rest = -noise();
-    const auto speed = [&](size_t k) { return system_.slip(*looks[k].rate, e) + allowed; };
+    const auto speed = [&](size_t k) { return system_.slip(*rate_samples[k].rate, e) + allowed; };
     double least = HUGE_VAL, most = -HUGE_VAL;
     bool below = false;
-    for (size_t k = 0; k < looks.size(); ++k) {
+    for (size_t k = 0; k < rate_samples.size(); ++k) {
         least = std::min(least, speed(k));
         most = std::max(most, speed(k));
-        below |= k > 0 && k + 1 < looks.size() && speed(k) < below_rest;
+        below |= k > 0 && k + 1 < rate_samples.size() && speed(k) < below_rest;
     }
     if (below) return true;
     if (most <= allowed - below_rest) return false;  // held by sticking elements, it never left rest
     const double dip = parameters.dip_part * (most - least);
-    for (size_t k = 0; k + 1 < looks.size(); ++k) {
-        const double length = (looks[k + 1].part - looks[k].part) * stepper_.h;
-        const double from = speed(k), to = speed(k + 1), leaves = length * system_.slip_rate(*looks[k].rate, e),
-                     comes = length * system_.slip_rate(*looks[k + 1].rate, e);
+    for (size_t k = 0; k + 1 < rate_samples.size(); ++k) {
+        const double length = (rate_samples[k + 1].part - rate_samples[k].part) * stepper_.h;
+        const double from = speed(k), to = speed(k + 1), leaves = length * system_.slip_rate(*rate_samples[k].rate, e),
+                     comes = length * system_.slip_rate(*rate_samples[k + 1].rate, e);
         if (lower_bound_inside(from, leaves, to, comes) < dip && min_inside(from, leaves, to, comes) < dip) return true;
     }
     return false;
@@ -79,28 +79,29 @@ void EventCandidates::add_pulls(std::vector<Watch>& list) {
     int first = 0;
     while (first < n && !may_pull(first)) ++first;
     if (first == n) return;
-    std::vector<char> told = pulls_;
+    std::vector<char> is_reported = pulls_;
     for (int i = first; i < n; ++i) {
-        if (told[i] || !may_pull(i)) continue;
+        if (is_reported[i] || !may_pull(i)) continue;
         const PullMargin found = contact_pull_margin(p, w, i);
-        if (found.must_pull && std::none_of(found.sharing.begin(), found.sharing.end(), [&](int j) { return told[j]; }))
+        const auto reported = [&](int j) { return is_reported[j] != 0; };
+        if (found.must_pull && std::none_of(found.sharing.begin(), found.sharing.end(), reported))
             list.push_back({Watch::Kind::contact, i});
-        for (int j : found.sharing) told[j] = 1;
+        for (int j : found.sharing) is_reported[j] = 1;
     }
 }
 
 // Check if the normal force of a closed contact is negative at the step's end, or may have been between two stages.
 bool EventCandidates::may_pull(int gap) {
-    const std::vector<Stepper::Look>& looks = stepper_.looks();
-    const auto load = [&](size_t k) { return system_.load(*looks[k].rate, gap); };
+    const std::vector<Stepper::RateSample>& rate_samples = stepper_.rate_samples();
+    const auto load = [&](size_t k) { return system_.load(*rate_samples[k].rate, gap); };
     double least = load(0), most = least, fall = 0.0;
-    for (size_t k = 1; k < looks.size(); ++k) {
+    for (size_t k = 1; k < rate_samples.size(); ++k) {
         least = std::min(least, load(k));
         most = std::max(most, load(k));
     }
-    for (size_t k = 2; k < looks.size(); ++k)
-        fall = std::max(fall, rise_between(looks[k - 2].part, -load(k - 2), looks[k - 1].part, -load(k - 1),
-                                           looks[k].part, -load(k)));
+    for (size_t k = 2; k < rate_samples.size(); ++k)
+        fall = std::max(fall, rise_between(rate_samples[k - 2].part, -load(k - 2), rate_samples[k - 1].part, -load(k - 1),
+                                           rate_samples[k].part, -load(k)));
     return least - parameters.times_parabola * fall - parameters.range_between * (most - least) <
            -load_rounding(p, w, gap);
 }
@@ -108,7 +109,7 @@ bool EventCandidates::may_pull(int gap) {
 std::vector<Watch> EventCandidates::find() {
     std::vector<Watch> list;
     if (stepper_.method.order > 1) add_pulls(list);
-    for (int e : w.now.loaded) {
+    for (int e : w.now.loaded_elements) {
         if (w.state.mode[e] != sticking) {
             if (may_stop(e)) list.push_back({Watch::Kind::slip, e});
         } else if (!w.state.is_hyperstatic && may_reach_limit(e)) {
@@ -117,7 +118,7 @@ std::vector<Watch> EventCandidates::find() {
     }
     if (p.gaps.empty()) return list;
     if (!w.now.rows.redundant)  // redundant loads are checked together
-        for (int i : w.now.touching)
+        for (int i : w.now.closed_gaps)
             if (!is_bare(p, i) && may_pull(i)) list.push_back({Watch::Kind::load, i});
     for (const GapSearch::Candidate& candidate : gaps_.find_candidates())
         list.push_back({Watch::Kind::gap, candidate.gap});

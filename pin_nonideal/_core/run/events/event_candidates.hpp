@@ -32,7 +32,7 @@ struct EventCandidatesParameters {
     // The error of the cubics through the stages is smaller.
     double dip_part = 0.02;
     // Rounding of the margin of a sticking element under a constant force, relative to the friction limit.
-    double release_limit_rounding = 1e-12;
+    double limit_rounding = 1e-12;
     // Slip that may remain if sticking rows are almost redundant, relative to 1 + the largest speed of the scene [rad/s
     // or m/s]. Such rows amplify rounding.
     double raised_rest_speed = 1e-9;

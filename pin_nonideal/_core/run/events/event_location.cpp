@@ -21,7 +21,7 @@ EventLocator::EventLocator(System& system, Stepper& stepper, ErrorNorm& norm, co
       search_(system, stepper, pulls, watch), releases_(system, stepper) {}
 
 double EventLocator::shorten_toward_rest(const VecX& rate, double size) {
-    const double least = parameters.least_shortened * size;
+    const double least = parameters.min_shortened_part * size;
     for (int e : w.now.slipping) {
         const Friction& f = p.frictions[e];
         if (f.dim == 1) continue;
@@ -104,7 +104,7 @@ void EventLocator::correct_instant(const Crossing& crossing, double full) {
     // only rounding.
     double size = stepper_.h, here = margin_at_end(watch), low = 0.0, high = full;
     const double still = of_gap ? rest_speed * (1.0 + system_.velocity(stepper_.y1).cwiseAbs().maxCoeff()) : 0.0;
-    for (int it = 0; it < parameters.correction_passes; ++it) {
+    for (int it = 0; it < parameters.max_correction_passes; ++it) {
         if (of_gap) rate = gap_rate(p, w, watch.index);
         else if (known_rate) rate = slip_rate_along_mode(p, w, watch.index);
         if (!(rate < -still)) return;  // the margin grows from here on, and no root lies ahead
@@ -138,7 +138,7 @@ std::optional<FoundEvent> EventLocator::locate() {
     time_to_rest_.reset();
     std::optional<Crossing> crossing = search_.first();
     if (crossing) step_onto(*crossing);
-    for (int k = 0; k < parameters.most_closed_before && crossing; ++k) {
+    for (int k = 0; k < parameters.max_closed_before && crossing; ++k) {
         const std::optional<Crossing> before = search_.deepest_penetration(crossing->watch);
         if (!before) break;
         crossing = before;

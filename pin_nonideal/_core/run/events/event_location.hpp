@@ -21,15 +21,15 @@ struct EventLocationParameters {
     // `passing_speed`.
     double rest_part = 0.05, passing_speed = 1e-6;
     // Length of a fixed step toward a rest: relative to the time to the rest, and minimum relative to the full step.
-    double part_toward_rest = 0.5, least_shortened = 1e-3;
+    double part_toward_rest = 0.5, min_shortened_part = 1e-3;
     // A step that misses a rest ends before it, by `part_before_rest` of the time to the rest. If slip begins with
     // fewer than `negligible_slip` tolerances, the step may end at the rest.
     double part_before_rest = 0.1, negligible_slip = 10.0;
     // --- Repeated step
-    int correction_passes = 12;  // maximum Newton steps and secants for the instant
+    int max_correction_passes = 12;  // maximum Newton steps and secants for the instant
     // Maximum number of earlier gaps that replace a crossing. The repeated step differs slightly from its interpolant,
     // so gaps that close almost together can change their order.
-    int most_closed_before = 4;
+    int max_closed_before = 4;
     // Corrections of the instant that end its location: relative to the time, and relative to the step.
     double time_rounding = 2e-16, end_tolerance = 1e-13;
     // Maximum move of the step's end along the rate there, relative to the step. Longer moves repeat the step. A move

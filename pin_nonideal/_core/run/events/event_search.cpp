@@ -30,7 +30,7 @@ double EventSearch::margin(const Watch& watch, double t, const VecX& y) {
     if (watch.kind == Watch::Kind::slip) return slip_along_mode(p, w, watch.index) + candidates_.allowance(watch.index);
     system_.read(y);
     const HoldingForce held = holding_force(p, w, watch.index, t, system_.q, system_.v);
-    return held.limit * (1.0 + EventCandidates::parameters.release_limit_rounding) - held.force.norm();
+    return held.limit * (1.0 + EventCandidates::parameters.limit_rounding) - held.force.norm();
 }
 
 // Only candidate gaps of the step are checked.
@@ -73,13 +73,13 @@ double EventSearch::share_error(int e) const {
     const bool further = method.further_stages > 0;
     double error = 0.0;
     if (stepper_.collocates()) {  // its polynomial differs from the rates only at the step's ends
-        for (const Stepper::Look& look : stepper_.looks())
-            error = std::max(error, std::abs(interpolated_share(e, look.part) - system_.share(*look.rate, e)));
+        for (const Stepper::RateSample& sample : stepper_.rate_samples())
+            error = std::max(error, std::abs(interpolated_share(e, sample.part) - system_.share(*sample.rate, e)));
         return error;
     }
     if (!further)
-        for (const Stepper::Look& look : stepper_.looks())
-            error = std::max(error, parameters.doubted_part * std::abs(system_.share(*look.rate, e) -
+        for (const Stepper::RateSample& sample : stepper_.rate_samples())
+            error = std::max(error, parameters.doubted_part * std::abs(system_.share(*sample.rate, e) -
                                                             system_.share(stepper_.rates[0], e)));
     for (int k = further ? 0 : 1; k < (further ? method.further_stages : method.stages); ++k) {
         const double part = further ? method.C_further[k] : method.C[k];
@@ -95,7 +95,7 @@ double EventSearch::margin_inside(const Watch& watch, Source source, double part
     if (source == Source::shares && !of_element)
         return stepper_.interpolated_rate(part, system_.ns + 2 * system_.ne + watch.index);
     if (source == Source::shares) {
-        return 1.0 + EventCandidates::parameters.release_limit_rounding - share_error_ -
+        return 1.0 + EventCandidates::parameters.limit_rounding - share_error_ -
                std::abs(interpolated_share(watch.index, part));
     }
     if (source == Source::velocities) {
@@ -158,7 +158,7 @@ double EventSearch::first_crossing(const Watch& watch, Source source) {
 // nothing if it does not converge. Return nothing either if the margin there is still near its value at the step's
 // start, since the margin then jumps.
 std::optional<double> EventSearch::confirm(const Watch& watch, double part, double slope, double at_start) {
-    for (int it = 0; it < parameters.confirmations && slope < 0.0; ++it) {
+    for (int it = 0; it < parameters.max_confirmations && slope < 0.0; ++it) {
         const double here = margin_inside(watch, Source::evaluation, part);
         if (!(std::abs(here) < parameters.left_part * std::abs(at_start))) break;
         const double next = part - here / slope;
@@ -199,17 +199,19 @@ Crossing EventSearch::cross(const Watch& watch, Source from) {
 }
 
 // Confirm a crossing of the interpolated rates on the interpolated motion.
-Crossing EventSearch::confirmed(const Crossing& told) {
+Crossing EventSearch::confirmed(const Crossing& interpolated) {
+    const Watch& watch = interpolated.watch;
     system_.read(stepper_.y1);
-    if (told.watch.kind == Watch::Kind::load) {
-        const auto part =
-            confirm(told.watch, told.part, told.slope, system_.load(stepper_.start_rate(), told.watch.index));
-        return part ? Crossing{told.watch, *part, told.slope} : cross(told.watch, Source::evaluation);
+    if (watch.kind == Watch::Kind::load) {
+        const double at_start = system_.load(stepper_.start_rate(), watch.index);
+        const auto part = confirm(watch, interpolated.part, interpolated.slope, at_start);
+        return part ? Crossing{watch, *part, interpolated.slope} : cross(watch, Source::evaluation);
     }
-    const double limit = static_limits(p, w, told.watch.index, stepper_.t0 + stepper_.h, system_.q, system_.v).reach();
-    const double at_start = limit * (1.0 - std::abs(system_.share(stepper_.start_rate(), told.watch.index)));
-    const auto part = confirm(told.watch, told.part, told.slope * limit, at_start);
-    return part ? Crossing{told.watch, *part, told.slope * limit} : cross(told.watch, Source::evaluation);
+    const double limit = static_limits(p, w, watch.index, stepper_.t0 + stepper_.h, system_.q, system_.v).reach();
+    const double at_start = limit * (1.0 - std::abs(system_.share(stepper_.start_rate(), watch.index)));
+    const double slope = interpolated.slope * limit;
+    const auto part = confirm(watch, interpolated.part, slope, at_start);
+    return part ? Crossing{watch, *part, slope} : cross(watch, Source::evaluation);
 }
 
 std::optional<Crossing> EventSearch::first() {

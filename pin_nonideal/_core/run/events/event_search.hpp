@@ -29,7 +29,7 @@ struct EventSearchParameters {
     double leap_part = 1e-3, leap_digits = 1e-15;
     // Error of a force / limit ratio that comes from an interpolant of low order, relative to its change.
     double doubted_part = 1e-2;
-    int confirmations = 3;  // maximum evaluations that confirm an interpolated crossing
+    int max_confirmations = 3;  // maximum evaluations that confirm an interpolated crossing
     // Tolerance of the correction of a crossing, relative to the step. The remaining error is the square of the
     // correction, which the repeated step corrects.
     double confirmed_width = 1e-4;
@@ -70,7 +70,7 @@ private:
     double first_crossing(const Watch& watch, Source source);
     Crossing cross(const Watch& watch, Source source);
     std::optional<Crossing> behind_leap(const Watch& watch, Source source, double part);
-    Crossing confirmed(const Crossing& told);
+    Crossing confirmed(const Crossing& interpolated);
     std::optional<double> confirm(const Watch& watch, double part, double slope, double at_start);
 
     System& system_;

@@ -17,29 +17,29 @@ namespace pn {
 
 namespace {
 
-bool hardly_moves(const System& system, int e) {
+bool has_negligible_speed(const System& system, int e) {
     const double slip = slip_velocity(system.w.now, system.p.frictions[e]).norm();
     return slip <= EventCandidates::parameters.raised_rest_speed * (1.0 + system.v.cwiseAbs().maxCoeff());
 }
 
 // Select the modes of all elements at rest together, and project the state. Elements that turn out to move are removed
 // from the list.
-void resolve_together(System& system, double t, ModeQuestion& asked, bool strikes) {
+void resolve_together(System& system, double t, ModeQuery& mode_query, bool strikes) {
     const Program& p = system.p;
     Workspace& w = system.w;
-    std::vector<int>& resting = asked.at_rest;
+    std::vector<int>& resting = mode_query.at_rest;
     for (;;) {
-        resolve_modes(p, w, t, system.q, system.v, asked);
+        resolve_modes(p, w, t, system.q, system.v, mode_query);
         if (!strikes) restore_motion(p, w, t, system.v);
         // Sticking elements get zero slip velocity, without rounding.
         project(p, w, t, system.q, system.v);
         begin_step(p, w, t, system.q, system.v);
         // Nearly redundant sticking elements can leave a slipping element a velocity that opposes its mode.
         const auto moving = std::stable_partition(resting.begin(), resting.end(), [&](int e) {
-            return hardly_moves(system, e) || slip_along_mode(p, w, e) >= 0.0;
+            return has_negligible_speed(system, e) || slip_along_mode(p, w, e) >= 0.0;
         });
         if (moving == resting.end()) return;
-        std::for_each(moving, resting.end(), [&](int e) { follow_velocity(p, w, e, asked); });
+        std::for_each(moving, resting.end(), [&](int e) { follow_velocity(p, w, e, mode_query); });
         resting.erase(moving, resting.end());
     }
 }
@@ -55,16 +55,16 @@ bool shares_load(System& system, double t, const std::vector<int>& resting, int 
         shares |=
             w.state.mode[e] == sticking &&
             (e == held ||
-             !holding_force(p, w, e, t, system.q, system.v).is_within(event_handling_parameters.held_limit_rounding));
+             !holding_force(p, w, e, t, system.q, system.v).is_within(event_handling_parameters.limit_rounding));
     return shares;
 }
 
 // Request collocation steps if slip in several directions begins from rest. Its velocity does not define a direction
 // yet.
-void seek_directions(System& system, const std::vector<int>& resting, bool sought) {
+void set_direction_search(System& system, const std::vector<int>& resting, bool sought) {
     const auto begins = [&](int e) { return system.p.frictions[e].dim > 1 && slips(system.w.state.mode[e]); };
-    bool& seeks = system.w.state.seeks_directions;
-    seeks = system.seeks_directions &&
+    bool& seeks = system.w.state.solves_directions;
+    seeks = system.can_solve_directions &&
             ((seeks && sought && turning(system)) || std::any_of(resting.begin(), resting.end(), begins));
 }
 
@@ -97,11 +97,11 @@ struct FrictionSwitch {
     double t;
     const std::optional<FoundEvent>& event;  // event that causes the switch, if any
     const std::vector<Mode>& before;
-    ModeQuestion asked;
+    ModeQuery mode_query;
     int held = -1;  // element that has just reached its limit
 
-    // `together`: onset motion of all contacts, if known.
-    void find(const RestingMotion* together) {
+    // `joint_motion`: onset motion of all contacts, if known.
+    void find(const RestingMotion* joint_motion) {
         const Program& p = system.p;
         Workspace& w = system.w;
         if (p.frictions.empty()) {
@@ -110,18 +110,19 @@ struct FrictionSwitch {
         }
         const bool known = event && !event->of_gap();
         const bool strikes = event && event->kind == FoundEvent::Kind::touch;  // sticking elements may move
-        asked = event && !strikes ? question(p, w, system.v, known ? event->index : -1)
-                                  : first_question(p, w, t, system.q, system.v);
+        mode_query = event && !strikes ? make_mode_query(p, w, system.v, known ? event->index : -1)
+                                       : make_first_mode_query(p, w, t, system.q, system.v);
         held = known && before[event->index] == sticking && !is_open(p, w, event->index) ? event->index : -1;
-        if (known && event->kind == FoundEvent::Kind::released_together) asked.breaking = asked.at_rest;
-        else if (held >= 0) asked.breaking = {held};
-        if (together) together->answer(p, w, asked);
-        if (asked.is_solved_jointly || !known || !try_previous_modes(p, w, t, system.q, system.v, asked, event->index))
-            resolve_together(system, t, asked, strikes);
+        if (known && event->kind == FoundEvent::Kind::released_together) mode_query.at_limit = mode_query.at_rest;
+        else if (held >= 0) mode_query.at_limit = {held};
+        if (joint_motion) joint_motion->to_modes(p, w, mode_query);
+        if (mode_query.is_solved_jointly || !known ||
+            !try_previous_modes(p, w, t, system.q, system.v, mode_query, event->index))
+            resolve_together(system, t, mode_query, strikes);
     }
 
     // Return the elements that stuck until they reached their limit at this event.
-    std::vector<int> breaking() const {
+    std::vector<int> at_limit() const {
         std::vector<int> list;
         if (!event || event->of_gap()) return list;
         for (int e = 0; e < system.ne; ++e)
@@ -150,18 +151,18 @@ void close_and_find(System& system, double t, bool starts, FrictionSwitch& frict
     const Program& p = system.p;
     const auto& event = friction.event;
     const bool landing = starts || event->kind == FoundEvent::Kind::touch;
-    ClosingQuestion question;
-    question.rest = system.touching.at(p, system.w, t, system.q, system.v, starts).rest;
-    if (event && event->kind == FoundEvent::Kind::lift) question.opening_gap = event->index;
-    if (event && !event->of_gap()) question.arrived_element = event->index;
-    question.breaking = friction.breaking();
-    question.after_impact = landing;
+    OnsetQuery query;
+    query.rest = system.touching.at(p, system.w, t, system.q, system.v, starts).rest;
+    if (event && event->kind == FoundEvent::Kind::lift) query.opening_gap = event->index;
+    if (event && !event->of_gap()) query.arrived_element = event->index;
+    query.at_limit = friction.at_limit();
+    query.after_impact = landing;
     const VecX q = system.q, v = system.v;
-    close_contacts(p, system.w, t, q, v, question, [&](const RestingMotion* together) {
+    close_contacts(p, system.w, t, q, v, query, [&](const RestingMotion* joint_motion) {
         system.q = q;
         system.v = v;
         update_kinematics(p, system.w, t, q, v);
-        friction.find(together);
+        friction.find(joint_motion);
         if (landing && !p.moves_in_time && system.v.cwiseAbs().maxCoeff() <= rest_speed) rest(system, t);
     });
 }
@@ -200,9 +201,9 @@ std::vector<Event> switch_modes(System& system, double t, VecX& y, VecX& dy, con
     if (let_go && event && (event->kind == FoundEvent::Kind::lift || event->in_vain))
         *let_go = open_unloaded_contacts(system, t);
     if (!p.frictions.empty() || !p.gaps.empty()) {
-        seek_directions(system, friction.asked.at_rest, event.has_value());
+        set_direction_search(system, friction.mode_query.at_rest, event.has_value());
         system.write(y);
-        w.state.is_hyperstatic = shares_load(system, t, friction.asked.at_rest, friction.held);
+        w.state.is_hyperstatic = shares_load(system, t, friction.mode_query.at_rest, friction.held);
     }
     system.rate_of_evaluation(t, y, dy);
     if (!event) return {};
@@ -252,14 +253,14 @@ void remember_directions(System& system, std::vector<double>& slip, int stopped_
     const auto velocity = [&](int e) { return slip_velocity(w.now, system.p.frictions[e]); };
     const double least = stopped_element < 0 ? event_handling_parameters.directed_slip
                                      : std::max(event_handling_parameters.directed_slip, velocity(stopped_element).norm());
-    for (int e : w.now.loaded) {
+    for (int e : w.now.loaded_elements) {
         const Friction& f = system.p.frictions[e];
-        if (w.state.is_sticking_deferred[e] && !hardly_moves(system, e)) w.state.is_sticking_deferred[e] = 0;
+        if (w.state.is_sticking_deferred[e] && !has_negligible_speed(system, e)) w.state.is_sticking_deferred[e] = 0;
         if (!slips(w.state.mode[e]) || f.dim == 1) continue;
         const Vec3 u = velocity(e);
         slip[e] = u.norm();
         const Vec3& n = w.state.last_direction[e];
-        if (w.state.seeks_directions) w.state.slip_direction[e] = n;
+        if (w.state.solves_directions) w.state.slip_direction[e] = n;
         else if (slip[e] > least) w.state.slip_direction[e] = w.state.last_direction[e] = u.normalized();
     }
 }

@@ -13,7 +13,7 @@ struct EventHandlingParameters {
     // Minimum slip speed [rad/s or m/s] that defines a slip direction.
     double directed_slip = 1e-12;
     // Rounding tolerance of the limit of a sticking element, relative to the limit.
-    double held_limit_rounding = 1e-9;
+    double limit_rounding = 1e-9;
 };
 
 inline constexpr EventHandlingParameters event_handling_parameters{};

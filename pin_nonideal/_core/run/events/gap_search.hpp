@@ -13,16 +13,16 @@ namespace pn {
 
 struct GapSearchParameters {
     // Rounding of a closed gap [m], relative to the scene's size.
-    double gap_rounding = 1e-14;
+    double width_rounding = 1e-14;
     // Bound of the accelerations between the stages of an accepted step, relative to the largest one at the stages.
     double between_stages = 2.0;
     // Maximum number of samples of a gap that stays near its plane. After that it counts as closed.
-    int most_looks = 4000;
+    int max_samples = 4000;
     // Parts of a step at which a gap is sampled that may stay on its plane throughout.
     double plane_parts[5] = {0.11, 0.29, 0.5, 0.73, 0.93};
     // Safety factor on the travel of bodies, for the moves of projections.
     double travel_factor = 2.0;
-    double gap_rate_rounding = 1e-12;  // rounding of the change of a constant rate, relative to the rates
+    double rate_rounding = 1e-12;  // rounding of the change of a constant rate, relative to the rates
 };
 
 class GapSearch {
@@ -49,22 +49,21 @@ public:
     double plane(int gap) const { return start_.rate[gap] > 0.0 ? std::min(0.0, start_.width[gap]) : 0.0; }
 
 private:
-    using Look = GapSample;
-    Look look(int gap, double part);
-    Look look_at_start(int gap) const;
+    GapSample sample(int gap, double part);
+    GapSample sample_at_start(int gap) const;
     // Measure a sample from a zero level: the plane, or for round bodies the lowest contact point of the same two
     // bodies.
-    Look above(Look look, double level) const;
+    GapSample above(GapSample sample, double level) const;
     double level_here(int gap, double part) const;
-    bool stays_open(int gap, const Look& a, const Look& b, double bound) const;
-    bool stays_on_plane(int gap, const Look& a, const Look& b);
-    std::optional<Touch> search(int gap, const Look& a, const Look& b, const Bends& bends);
-    Touch between(int gap, const Look& a, const Look& b);
+    bool stays_open(int gap, const GapSample& a, const GapSample& b, double bound) const;
+    bool stays_on_plane(int gap, const GapSample& a, const GapSample& b);
+    std::optional<Touch> search(int gap, const GapSample& a, const GapSample& b, const Bends& bends);
+    Touch between(int gap, const GapSample& a, const GapSample& b);
     void bound_rates();
     bool has_closed_copy(int gap) const;
     bool slides_on(int gap) const;  // the same two bodies touch at another point
-    void look_at_starts(const std::vector<int>& gaps);
-    Bends bends(int gap, const Look& end) const;
+    void sample_starts(const std::vector<int>& gaps);
+    Bends bends(int gap, const GapSample& end) const;
 
     System& system_;
     Stepper& stepper_;
@@ -72,12 +71,12 @@ private:
     Workspace& w;
     GapWatch& watch_;
     GapState& start_;
-    CurvatureBounds reach_;
+    CurvatureBounds curvature_;
     std::vector<Candidate> candidates_;
     std::vector<int> closed_round_;  // closed gaps of round bodies, their next contact point is not lower
     VecX speed_, acceleration_, probe_;
     double rounding_ = 0.0;
-    int looks_ = 0;
+    int samples_ = 0;
 };
 
 }  // namespace pn

@@ -1,4 +1,4 @@
-// Gaps from step to step: their widths, and the far gaps that steps need not sample.
+// Gaps from step to step: their widths, and the wide gaps that steps skip.
 #pragma once
 
 #include <algorithm>
@@ -20,44 +20,45 @@ struct GapSample {
     static GapSample here(const Program& p, const Workspace& w, int gap, double part);
 };
 
-// Gaps at a step's start, as sampled last. A gap is far if it is wide relative to the travel of its bodies in a step.
-// Steps skip far gaps until the travel since the last sample adds up to the width.
+// Gaps at a step's start, as sampled last. Steps skip a gap that is wide relative to the travel of its bodies in a step,
+// until the travel since the last sample adds up to the width. Other open gaps are monitored.
 struct GapState {
     std::vector<double> width, rate;
     std::vector<Separation> separation;
-    static constexpr char from_the_end = 2;  // near, but first sampled at the end of the current step
-    std::vector<char> near, far;           // near: sampled in each step, far: skipped, neither: closed or immovable
-    // Travel of the bodies of far gaps at the last sample (contact/bounds/travel.hpp).
-    std::vector<double> way, turn, apart;
+    static constexpr char from_step_end = 2;  // monitored, but first sampled at the end of the current step
+    std::vector<char> monitored, skipped;     // sampled in each step, or not (neither: closed or immovable)
+    // Travel of the bodies of skipped gaps at the last sample (contact/bounds/travel.hpp).
+    std::vector<double> path_length, turn, distance;
     TravelState travel;
-    double ask = 0.0;            // travel of the scene at which far gaps are rechecked
-    bool current = false;        // the samples belong to the current state, or to the step that led to it
-    std::vector<int> near_gaps;  // indices of near gaps, ascending
+    double recheck_travel = 0.0;      // travel of the scene at which skipped gaps are rechecked
+    bool current = false;             // the samples belong to the current state, or to the step that led to it
+    std::vector<int> monitored_gaps;  // indices of monitored gaps, ascending
     // For a touching gap that the solver left open: time of the first attempt, and time before which it is not retried.
     std::vector<double> blocked_since, retry_time;
 
     // `round`: true if a gap is between round bodies.
     explicit GapState(size_t gaps = 0, bool round = false)
-        : width(gaps, 0.0), rate(gaps, 0.0), separation(round ? gaps : 0), near(gaps, 0), far(gaps, 0), way(gaps, 0.0),
-          turn(gaps, 0.0), apart(gaps, 0.0), blocked_since(gaps, 0.0), retry_time(gaps, -HUGE_VAL) {}
-    void keep(int gap, const GapSample& look);
-    void find_near();
+        : width(gaps, 0.0), rate(gaps, 0.0), separation(round ? gaps : 0), monitored(gaps, 0), skipped(gaps, 0),
+          path_length(gaps, 0.0), turn(gaps, 0.0), distance(gaps, 0.0), blocked_since(gaps, 0.0),
+          retry_time(gaps, -HUGE_VAL) {}
+    void keep(int gap, const GapSample& sample);
+    void list_monitored();
     void defer_retry(int gap, double t);
-    bool is_in_vain(int gap) const { return retry_time[gap] > -HUGE_VAL; }
+    bool is_blocked(int gap) const { return retry_time[gap] > -HUGE_VAL; }
     // Retry all blocked gaps, after a change of contacts.
-    void ask_anew() { std::fill(retry_time.begin(), retry_time.end(), -HUGE_VAL); }
+    void retry_all() { std::fill(retry_time.begin(), retry_time.end(), -HUGE_VAL); }
 };
 
 struct GapWatchParameters {
-    // Minimum width of a far gap, in travels of one step. Narrower gaps would be rechecked at once.
-    double steps_of_far = 2.0;
-    // Factors on the travel since a far gap's last sample, and on the travel in one step. The gap is monitored again if
-    // their sum can close it.
-    double asked_again = 2.0, steps_ahead = 2.0;
+    // Minimum width of a skipped gap, in travels of one step. Narrower gaps would be rechecked at once.
+    double min_skipped_steps = 2.0;
+    // Factors on the travel since a skipped gap's last sample, and on the travel in one step. The gap is monitored again
+    // if their sum can close it.
+    double recheck_factor = 2.0, steps_ahead = 2.0;
     // Rounding of a difference of travels, relative to the travel so far.
-    double way_rounding = 1e-15;
+    double travel_rounding = 1e-15;
     // Minimum time [s] before a blocked gap is retried. Later it is retried after as long as it has been blocked.
-    double least_rest = 1e-4;
+    double min_retry_delay = 1e-4;
 };
 
 class GapWatch {
@@ -68,42 +69,43 @@ public:
     GapWatch(System& system, GapState& gaps);
 
     // Sample gaps at the state that the system has read and the workspace is evaluated at. `sample_all` samples all
-    // gaps, at the start of a run or after a change other than a step. `sample_near_gaps` samples the near gaps after a step
-    // that was followed to its end.
+    // gaps, at the start of a run or after a change other than a step. `sample_monitored` samples the monitored gaps
+    // after a step that was followed to its end.
     void sample_all(double t);
-    void sample_near_gaps(double t);
+    void sample_monitored(double t);
 
-    // Follow a step just taken, of length h with the largest |v| of each dof. Far gaps that the travel of their bodies
-    // may close by the step's end become near. Return the new near gaps that must be sampled at the step's start.
+    // Follow a step just taken, of length h with the largest |v| of each dof. Skipped gaps that the travel of their
+    // bodies may close by the step's end are monitored from then on. Return those to sample at the step's start.
     const std::vector<int>& follow(const VecX& speed, double h);
 
-    // Return the near gaps for the sample of time stepping, taken once per step at its middle. `way`: travel of each
-    // dof since the last sample, or since the state at which these steps began. `leave_far` then makes wide gaps far.
-    const std::vector<int>& come(const VecX& way);
-    void leave_far();
-    // Check if a near gap was wider at its sample than its bodies can close by the end of this step of time stepping.
+    // Return the monitored gaps for the sample of time stepping, taken once per step at its middle. `path_length`: travel
+    // of each dof since the last sample, or since the state at which these steps began. Wide gaps leave the monitored
+    // set by `skip_wide`.
+    const std::vector<int>& advance(const VecX& path_length);
+    void skip_wide();
+    // Check if a monitored gap was wider at its sample than its bodies can close by the end of this step of time stepping.
     bool stays_open_in_step(int gap) const;
-    // Begin time stepping: all gaps become near, except far gaps wider than `least`.
+    // Begin time stepping: all gaps are monitored, except skipped gaps wider than `least`.
     void begin_time_steps(double least);
 
     GapState& gaps;
     const TravelBound travel;
-    // samples of the near gaps at the end of the current step, if it was followed
+    // samples of the monitored gaps at the end of the current step, if it was followed
     std::vector<GapSample> end;
     bool followed = false;
 
 private:
-    void look(double t, int gap);  // at the current state
-    // Classify a gap as far or near by its last width.
-    void place(int gap);
+    void sample(double t, int gap);  // at the current state
+    // Classify a gap as skipped or monitored by its last width.
+    void classify(int gap);
     void step(const VecX& speed, double h);
-    void ask_far();
-    void take_back();
+    void recheck_skipped();
+    void undo_step();
 
     System& system_;
     const Program& p;
     Workspace& w;
-    std::vector<int> unseen_;
+    std::vector<int> unsampled_;
 };
 
 }  // namespace pn

@@ -43,21 +43,21 @@ void HandOver::move(double time) {
     retract(p.mechanism, system_.q.data(), move_.data(), y_.data());
 }
 
-double HandOver::drift(int gap) {
+double HandOver::bias(int gap) {
     follow_gap(p, w, progress_.t, system_.v, gap);
-    return w.now.values[p.gaps[gap].block].drift[0];
+    return w.now.values[p.gaps[gap].block].bias[0];
 }
 
-double HandOver::drift_after(double time, int gap) {
+double HandOver::bias_after(double time, int gap) {
     move(time);
     system_.read(y_);
     update_kinematics(p, w, progress_.t + time, system_.q, system_.v);
-    return drift(gap);
+    return bias(gap);
 }
 
 // Check if the bias of a gap jumps within `size`, and reduce `size` to the first time after the jump.
 bool HandOver::find(int gap, double& size) {
-    double low = 0.0, high = size, at_low = drift_after(low, gap), at_high = drift_after(high, gap);
+    double low = 0.0, high = size, at_low = bias_after(low, gap), at_high = bias_after(high, gap);
     const double acceleration = p.mechanism.gravity.norm() + system_.velocity(progress_.rate).cwiseAbs().maxCoeff();
     const double scale = acceleration + std::abs(at_low);
     const double least = std::max(parameters.kept_bias_change * std::abs(at_high - at_low), min_bias_jump * scale);
@@ -65,7 +65,7 @@ bool HandOver::find(int gap, double& size) {
     while (high - low > width) {
         const double middle = 0.5 * (low + high);
         if (!(low < middle && middle < high)) break;
-        const double there = drift_after(middle, gap);
+        const double there = bias_after(middle, gap);
         const double before = std::abs(there - at_low), behind = std::abs(at_high - there);
         if (!(std::max(before, behind) >= least)) return false;
         const bool is_before = before >= least;
@@ -78,7 +78,7 @@ bool HandOver::find(int gap, double& size) {
 
 std::optional<HandOver::Found> HandOver::first(double size) {
     std::optional<Found> found;
-    for (int gap : w.now.touching) {
+    for (int gap : w.now.closed_gaps) {
         if (is_bare(p, gap) || p.is_users(gap) || has_one_feature(p, gap)) continue;
         if (find(gap, size)) found = Found{size, gap};
     }

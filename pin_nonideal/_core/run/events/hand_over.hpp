@@ -49,8 +49,8 @@ public:
 
 private:
     void move(double time);
-    double drift(int gap);
-    double drift_after(double time, int gap);
+    double bias(int gap);
+    double bias_after(double time, int gap);
     bool find(int gap, double& size);
 
     System& system_;

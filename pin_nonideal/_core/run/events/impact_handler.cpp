@@ -16,7 +16,7 @@ ImpactHandler::ImpactHandler(System& system, Progress& progress, GapWatch& watch
 
 bool ImpactHandler::resolve_impacts(bool starts) {
     int count = 0;
-    while (count < parameters.most_at_once && resolve_one_impact(starts)) ++count;
+    while (count < parameters.max_simultaneous_impacts && resolve_one_impact(starts)) ++count;
     return count > 0;
 }
 
@@ -42,7 +42,7 @@ void ImpactHandler::end_bouncing(double stop) {
     if (options_.output_dt > 0.0) stop = std::min(stop, output_.next());
     VecX y_end = progress_.y, rate_end = progress_.rate;
     const RunState state = w.state;
-    const auto go_back = [&] {
+    const auto restore_start = [&] {
         set_closed(p, w, state.closed);
         w.state = state;
         select_rows(p, w);
@@ -50,13 +50,10 @@ void ImpactHandler::end_bouncing(double stop) {
         begin_step(p, w, progress_.t, system_.q, system_.v);
     };
     std::optional<Rest> rest;
-    try {
-        rest = bounce_to_rest(system_, progress_.t, stop, y_end, rate_end);
-    } catch (const Failure&) {
-        go_back();
-        throw;
-    }
-    if (!rest) return go_back();
+    const auto failure = attempt([&] { rest = bounce_to_rest(system_, progress_.t, stop, y_end, rate_end); });
+    if (!rest) restore_start();
+    if (failure) throw *failure;
+    if (!rest) return;
     progress_.t = rest->time;
     progress_.y = y_end;
     progress_.rate = rate_end;
@@ -69,7 +66,7 @@ void ImpactHandler::end_bouncing(double stop) {
 void ImpactHandler::remember_gaps(bool whole_step) {
     if (system_.ng == 0) return;
     system_.read(progress_.y);
-    if (whole_step) watch_.sample_near_gaps(progress_.t);
+    if (whole_step) watch_.sample_monitored(progress_.t);
     else watch_.sample_all(progress_.t);
 }
 

@@ -11,7 +11,7 @@ struct ImpactHandlerParameters {
     double gain_rounding = 1e-12;
     // Maximum number of consecutive impacts at one instant. An impact can reverse the separation of other
     // contacts.
-    int most_at_once = 100;
+    int max_simultaneous_impacts = 100;
 };
 
 class ImpactHandler {
@@ -28,7 +28,7 @@ public:
     // state stays.
     void end_bouncing(double stop);
     // Sample widths and rates of the gaps at the current state, from which the next step starts. `whole_step`: sample
-    // only near gaps, after a step that was followed to its end.
+    // only monitored gaps, after a step that was followed to its end.
     void remember_gaps(bool whole_step = false);
 
 private:

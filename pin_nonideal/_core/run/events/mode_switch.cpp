@@ -9,7 +9,7 @@
 
 namespace pn {
 
-static bool of_modes(const Failure& failure) {
+static bool is_of_modes(const Failure& failure) {
     return failure.kind == Failure::Kind::not_converged || failure.kind == Failure::Kind::paradox;
 }
 
@@ -31,68 +31,64 @@ void ModeChanges::change(FoundEvent event) {
     bool has_impact = false;
     std::vector<int> let_go;
     event.in_vain = event.kind == FoundEvent::Kind::touch && event.index >= 0 && has_let_go(event.index);
-    try {
+    const auto failure = attempt([&] {
         if (contacts_land(system_, progress_.t, progress_.y)) event = {FoundEvent::Kind::touch, -1, progress_.t};
         has_impact = event.kind == FoundEvent::Kind::touch && impacts_.resolve_impacts(false);
         for (const Event& found : switch_modes(system_, progress_.t, progress_.y, progress_.rate, event, &let_go)) {
             out_.events.push_back(found);
             if (!has_impact) chatter_.count();
         }
-    } catch (const Failure& failure) {
-        keep_last(before, has_impact);
-        const bool of_hand_over = event.of_hand_over && !has_impact && of_closed_contacts(failure);
-        if (!(of_hand_over || is_recoverable(failure)) || !step_over(failure, of_hand_over)) throw;
+    });
+    if (failure) {
+        restore_last(before, has_impact);
+        const bool of_hand_over = event.of_hand_over && !has_impact && is_of_closed_contacts(*failure);
+        if (!bridge_with_time_stepping(*failure, of_hand_over)) throw *failure;
         return;
     }
     chatter_.remember();
     const bool in_vain = event.kind == FoundEvent::Kind::touch && event.index >= 0 && !has_impact;
     const bool same_modes = std::equal(before.mode.begin(), before.mode.end(), w.state.mode.begin());
-    if (!same_modes || before.closed != w.state.closed) progress_.gaps.ask_anew();
+    if (!same_modes || before.closed != w.state.closed) progress_.gaps.retry_all();
     else if (in_vain && !w.state.closed[event.index]) progress_.gaps.defer_retry(event.index, progress_.t);
     for (int gap : let_go) progress_.gaps.defer_retry(gap, progress_.t);
     impacts_.remember_gaps();
     if (has_impact) return end_bouncing();
     if (same_modes) chatter_.count();
     output_.configured_now();
-    bridge(event.of_gap() ? 0 : event.index);
+    bridge_chatter(event.of_gap() ? 0 : event.index);
 }
 
 // Check if a contact of the same two bodies was let go, because no contact of theirs had a load.
 bool ModeChanges::has_let_go(int gap) const {
     for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i)
-        if (progress_.gaps.is_in_vain(i) && same_bodies(p, gap, i)) return true;
+        if (progress_.gaps.is_blocked(i) && same_bodies(p, gap, i)) return true;
     return false;
 }
 
 // End the bouncing. If the motion of a low flight is not found, bridge it by time stepping if possible.
 void ModeChanges::end_bouncing() {
-    try {
-        impacts_.end_bouncing(torques_.next_stop(progress_.t, options_.end()));
-    } catch (const Failure& failure) {
-        if (!is_recoverable(failure) || !step_over(failure)) throw;
-    }
+    const auto failure = attempt([&] { impacts_.end_bouncing(torques_.next_stop(progress_.t, options_.end())); });
+    if (failure && !bridge_with_time_stepping(*failure)) throw *failure;
 }
 
 // A proof of no motion, or of several motions, is reported to the user.
 bool ModeChanges::is_recoverable(const Failure& failure) {
-    const bool shown = failure.solutions != Failure::Solutions::not_told;
-    return failure.kind == Failure::Kind::step_size || (of_modes(failure) && !shown);
+    const bool shown = failure.solutions != Failure::Solutions::unproven;
+    return failure.kind == Failure::Kind::step_size || (is_of_modes(failure) && !shown);
 }
 
 bool ModeChanges::can_switch_modes(const Failure& failure) const {
     const double spacing = mode_switch_parameters.forced_switch_spacing * tiny_step_at(progress_.t);
-    return of_modes(failure) && options_.method.adaptive() && system_.ng > 0 &&
+    return is_of_modes(failure) && options_.method.adaptive() && system_.ng > 0 &&
            progress_.t >= progress_.forced_switch_time + spacing;
 }
 
 bool ModeChanges::force_switch() {
     const double t = progress_.t, ahead = tiny_step_at(t);
     const VecX y = progress_.y;
-    try {
-        progress_.y.noalias() += ahead * progress_.rate;
-        progress_.t += ahead;
-        change(FoundEvent{FoundEvent::Kind::lift, -1, progress_.t});
-    } catch (const Failure&) {
+    progress_.y.noalias() += ahead * progress_.rate;
+    progress_.t += ahead;
+    if (attempt([&] { change(FoundEvent{FoundEvent::Kind::lift, -1, progress_.t}); })) {
         progress_.t = t;
         progress_.y = y;
         return false;
@@ -102,63 +98,62 @@ bool ModeChanges::force_switch() {
     return true;
 }
 
-void ModeChanges::bridge(int element) {
-    if (chatter_.bridge(element, options_.end())) go_on_with_new_modes();
+void ModeChanges::bridge_chatter(int element) {
+    if (chatter_.bridge_chatter(element, options_.end())) select_new_modes();
 }
 
 // Check if the solver failed, which proves nothing.
-bool ModeChanges::undecided(const Failure& failure) { return failure.kind == Failure::Kind::not_converged; }
+bool ModeChanges::is_undecided(const Failure& failure) { return failure.kind == Failure::Kind::not_converged; }
 
-bool ModeChanges::of_closed_contacts(const Failure& failure) {
+bool ModeChanges::is_of_closed_contacts(const Failure& failure) {
     using Kind = Failure::Kind;
     return failure.kind == Kind::closure || failure.kind == Kind::inconsistent || failure.kind == Kind::not_finite ||
            failure.kind == Kind::step_size;
 }
 
-bool ModeChanges::step_over(const Failure& failure, bool of_hand_over) {
+bool ModeChanges::bridge_with_time_stepping(const Failure& failure, bool of_hand_over) {
+    if (!of_hand_over && !is_recoverable(failure)) return false;
     if (options_.method.outside() || !(system_.ne > 0 || system_.ng > 0)) return false;
-    const bool of_elements = system_.ne > 0 && of_modes(failure) && !failure.elements.empty();
+    const bool of_elements = system_.ne > 0 && is_of_modes(failure) && !failure.elements.empty();
     const int element = of_elements ? failure.elements.front() : 0;
-    if (!(of_hand_over || undecided(failure) || chatter_.is_zeno() || creeps())) return false;
+    if (!(of_hand_over || is_undecided(failure) || chatter_.is_zeno() || is_creeping())) return false;
     for (;;) {
-        chatter_.step_over(element, options_.end());
-        try {
-            go_on_with_new_modes();
-            return true;
-        } catch (const Failure& again) {  // the solver fails again a little later
-            if (system_.ng == 0 || !of_modes(again) || !is_recoverable(again)) throw;
-        }
+        chatter_.bridge_stretch(element, options_.end());
+        const auto again = attempt([&] { select_new_modes(); });
+        if (!again) return true;
+        // The solver fails again a little later.
+        if (system_.ng == 0 || !is_of_modes(*again) || !is_recoverable(*again)) throw *again;
         if (progress_.t >= options_.end()) return true;
     }
 }
 
 // Check if all slipping elements are about to rest.
-bool ModeChanges::creeps() const {
-    const double least = mode_switch_parameters.creeping * (1.0 + system_.velocity(progress_.y).cwiseAbs().maxCoeff());
+bool ModeChanges::is_creeping() const {
+    const double speed = system_.velocity(progress_.y).cwiseAbs().maxCoeff();
+    const double max_slip = mode_switch_parameters.max_creep_speed * (1.0 + speed);
     const std::vector<int>& slipping = w.now.slipping;
     return !slipping.empty() && std::all_of(slipping.begin(), slipping.end(), [&](int e) {
-        return slip_velocity(w.now, p.frictions[e]).norm() <= least;
+        return slip_velocity(w.now, p.frictions[e]).norm() <= max_slip;
     });
 }
 
-void ModeChanges::go_on_with_new_modes() {
+void ModeChanges::select_new_modes() {
     switch_modes(system_, progress_.t, progress_.y, progress_.rate, std::nullopt);
     impacts_.remember_gaps();
     output_.configured_now();
 }
 
 // Restore the motion before the mode switch that failed, and record it.
-void ModeChanges::keep_last(const RunState& before, bool has_impact) {
+void ModeChanges::restore_last(const RunState& before, bool has_impact) {
     set_contacts(p, w, before.closed, before.mode);
     w.state = before;
     if (has_impact) return;
     system_.read(progress_.y);
-    try {
+    attempt([&] {  // if this fails too, the previous sample is the last, and the first failure is reported
         begin_step(p, w, progress_.t, system_.q, system_.v);
         evaluate(p, w, progress_.t, system_.q, system_.v);
         output_.now();
-    } catch (const Failure&) {  // the previous sample is the last, and the first failure is reported
-    }
+    });
 }
 
 }  // namespace pn

@@ -12,7 +12,7 @@ struct ModeSwitchParameters {
     // Minimum time between two forced mode switches, in tiny steps.
     double forced_switch_spacing = 1e3;
     // Maximum speed [m/s or rad/s] of slip that is about to rest or to begin, relative to 1 + the largest velocity.
-    double creeping = 1e-8;
+    double max_creep_speed = 1e-8;
     // Length of a tiny step, relative to the time, in seconds below 1 s. In shorter steps the motion itself fails.
     double tiny_step = 1e-10;
 };
@@ -37,19 +37,19 @@ public:
     static bool is_recoverable(const Failure& failure);
     // Bridge by time stepping if no motion or no short enough step was found. Applies to an accumulation of events, to
     // creeping slip, to unilateral contacts without a solution, and beside a hand-over. Return false if it does not apply.
-    bool step_over(const Failure& failure, bool of_hand_over = false);
+    bool bridge_with_time_stepping(const Failure& failure, bool of_hand_over = false);
     // Check if a step failed because closed contacts contradict each other or the accuracy.
-    static bool of_closed_contacts(const Failure& failure);
+    static bool is_of_closed_contacts(const Failure& failure);
     // Bridge an accumulation of events, and select modes at the new state.
-    void bridge(int element);
+    void bridge_chatter(int element);
 
 private:
     void end_bouncing();
     bool has_let_go(int gap) const;
-    void keep_last(const RunState& before, bool has_impact);
-    static bool undecided(const Failure& failure);
-    bool creeps() const;
-    void go_on_with_new_modes();
+    void restore_last(const RunState& before, bool has_impact);
+    static bool is_undecided(const Failure& failure);
+    bool is_creeping() const;
+    void select_new_modes();
 
     const Program& p;
     Workspace& w;

@@ -90,7 +90,7 @@ std::optional<Rest> bounce_to_rest(System& system, double t, double stop, VecX& 
     int bounce = 0;
     double halves[2] = {0.0, 0.0};
     bool dies_out = true;
-    for (; bounce < (dies_out ? 1 : 2) * rebound_parameters.most_bounces; ++bounce) {
+    for (; bounce < (dies_out ? 1 : 2) * rebound_parameters.max_bounces; ++bounce) {
         const Bouncing::Next next = bouncing.next(out.time);
         const double time = next.time();
         if (!next.stays_low() || out.time + time >= stop) break;
@@ -98,8 +98,8 @@ std::optional<Rest> bounce_to_rest(System& system, double t, double stop, VecX& 
         y += time * dy;
         retract(p.mechanism, system.q.data(), move.data(), y.data());
         out.time += time;
-        halves[2 * bounce >= rebound_parameters.most_bounces] += time;
-        if (bounce + 1 == rebound_parameters.most_bounces)
+        halves[2 * bounce >= rebound_parameters.max_bounces] += time;
+        if (bounce + 1 == rebound_parameters.max_bounces)
             dies_out = halves[1] < rebound_parameters.max_time_ratio * halves[0];
         FoundEvent event{FoundEvent::Kind::touch, 0, out.time};
         if (next.rest < next.low && !contacts_land(system, out.time, y))

@@ -11,7 +11,7 @@ namespace pn {
 struct ReboundParameters {
     // Maximum height of flights that are too low to be integrated, relative to the scene's size.
     double low_flight = 4e-12;
-    int most_bounces = 10000;  // number of flights after which the bouncing is judged
+    int max_bounces = 10000;  // number of flights after which the bouncing is judged
     // The bouncing dies out if the second half of the flights takes less than this part of the time of the first half.
     // With a restitution of 1 it does not die out, and contacts that land later come to rest.
     double max_time_ratio = 0.9;

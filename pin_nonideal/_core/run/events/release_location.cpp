@@ -16,47 +16,43 @@ namespace pn {
 // Return the acceleration with which sticking elements begin to slip at a state of the step. Return nothing if forces
 // within all limits can hold them.
 std::optional<double> ReleaseLocator::release_rate(double t, const VecX& y, const std::vector<Mode>& modes,
-                                                 ModeQuestion& asked) {
+                                                 ModeQuery& mode_query) {
     system_.read(y);
     // Selecting modes can reverse the slip of an element that has just come to rest. The step keeps its own directions.
     const std::vector<Vec3> directions = w.state.slip_direction, last_directions = w.state.last_direction;
-    asked = {modes, {}, {}};
+    mode_query = {modes, {}, {}};
     for (int e = 0; e < system_.ne; ++e)
-        if (!is_open(p, w, e) && at_rest(p, w, e, system_.v)) asked.at_rest.push_back(e);
+        if (!is_open(p, w, e) && at_rest(p, w, e, system_.v)) mode_query.at_rest.push_back(e);
     double rate = 0.0;
-    std::optional<Failure> paradox;
-    try {
-        resolve_modes(p, w, t, system_.q, system_.v, asked);
-        for (int e : asked.at_rest)
+    const auto failure = attempt({Failure::Kind::paradox, Failure::Kind::not_converged}, [&] {
+        resolve_modes(p, w, t, system_.q, system_.v, mode_query);
+        for (int e : mode_query.at_rest)
             if (modes[e] == sticking && w.state.mode[e] != sticking)
                 rate = std::max(rate, std::abs(slip_rate_along_mode(p, w, e)));
-    } catch (const Failure& failure) {  // sticking fails: unilateral contacts change together with the elements
-        const bool is_paradox = failure.kind == Failure::Kind::paradox;
-        if (p.gaps.empty() || (!is_paradox && failure.kind != Failure::Kind::not_converged)) throw;
-        if (is_paradox) paradox = failure;
-        rate = HUGE_VAL;
-    }
+    });
+    if (failure && p.gaps.empty()) throw *failure;
+    if (failure) rate = HUGE_VAL;  // sticking fails: unilateral contacts change together with the elements
     const double noise = relative_acceleration_rounding * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
     set_modes(p, w, modes);
     w.state.slip_direction = directions;
     w.state.last_direction = last_directions;
     // Contacts hold as long as any forces within their cones do, not only those of minimum norm.
     const bool hold = rate > noise && !p.gaps.empty() && closed_contacts_hold(p, w, t, system_.q, system_.v);
-    if (paradox && !hold) throw *paradox;
+    if (failure && failure->kind == Failure::Kind::paradox && !hold) throw *failure;
     begin_step(p, w, t, system_.q, system_.v);
     if (rate <= noise || hold) return std::nullopt;  // an element held by others does not move, whatever its force
     return rate;
 }
 
-std::optional<double> ReleaseLocator::release_rate_at_end(const std::vector<Mode>& modes, ModeQuestion& asked) {
-    return release_rate(stepper_.t0 + stepper_.h, stepper_.y1, modes, asked);
+std::optional<double> ReleaseLocator::release_rate_at_end(const std::vector<Mode>& modes, ModeQuery& mode_query) {
+    return release_rate(stepper_.t0 + stepper_.h, stepper_.y1, modes, mode_query);
 }
 
 // Check if nonnegative loads exist for the closed contacts, at the start, at the stages and at the end of the step.
 bool ReleaseLocator::all_press() {
-    for (const Stepper::Look& look : stepper_.looks())
-        for (int i : w.now.touching)
-            if (system_.load(*look.rate, i) < 0.0) return false;
+    for (const Stepper::RateSample& sample : stepper_.rate_samples())
+        for (int i : w.now.closed_gaps)
+            if (system_.load(*sample.rate, i) < 0.0) return false;
     return true;
 }
 
@@ -65,7 +61,7 @@ bool ReleaseLocator::all_press() {
 std::optional<FoundEvent> ReleaseLocator::lift_together() {
     if (p.gaps.empty() || !w.now.rows.redundant || all_press()) return std::nullopt;
     double low = 0.0, high = stepper_.h;
-    while (high - low > parameters.width * std::max(std::abs(stepper_.t0), stepper_.h)) {
+    while (high - low > parameters.time_tolerance * std::max(std::abs(stepper_.t0), stepper_.h)) {
         const double mid = 0.5 * (low + high);
         stepper_.end_at(mid);
         (all_press() ? low : high) = mid;
@@ -81,8 +77,8 @@ std::optional<FoundEvent> ReleaseLocator::lift_together() {
 // Return the part of the step at which its interpolant releases the sticking elements. `rate`: their slip acceleration
 // at the step's end. The search approaches the instant from later times. It uses secants of the acceleration, which
 // falls to zero toward the instant if limits do not jump, and bisection otherwise.
-double ReleaseLocator::release_part(double rate, const std::vector<Mode>& modes, ModeQuestion& asked) {
-    const double full = stepper_.h, width = parameters.width * std::max(std::abs(stepper_.t0) / full, 1.0);
+double ReleaseLocator::release_part(double rate, const std::vector<Mode>& modes, ModeQuery& mode_query) {
+    const double full = stepper_.h, width = parameters.time_tolerance * std::max(std::abs(stepper_.t0) / full, 1.0);
     double low = 0.0, high = 1.0, beyond = 0.0, rate_beyond = 0.0;
     bool falls = false;  // the rate falls toward the instant
     VecX y(system_.ny);
@@ -98,8 +94,8 @@ double ReleaseLocator::release_part(double rate, const std::vector<Mode>& modes,
         stepper_.interpolate(next, y);
         system_.read(y);
         update_kinematics(p, w, t, system_.q, system_.v);
-        const std::optional<double> there = release_rate(t, y, modes, asked);
-        falls = there && rate < HUGE_VAL && *there < parameters.least_fall * rate;
+        const std::optional<double> there = release_rate(t, y, modes, mode_query);
+        falls = there && rate < HUGE_VAL && *there < parameters.max_rate_ratio * rate;
         if (there) {
             beyond = std::exchange(high, next);
             rate_beyond = std::exchange(rate, *there);
@@ -112,16 +108,16 @@ double ReleaseLocator::release_part(double rate, const std::vector<Mode>& modes,
 
 // Check sticking elements inside a step at rest, and end the step at the first place of release. Return their slip
 // acceleration there. Steps at rest can be long relative to changes of user functions.
-std::optional<double> ReleaseLocator::release_rate_inside(const std::vector<Mode>& modes, ModeQuestion& asked) {
-    if (!p.asks_functions || (system_.velocity(stepper_.y1).array() != 0.0).any()) return std::nullopt;
+std::optional<double> ReleaseLocator::release_rate_inside(const std::vector<Mode>& modes, ModeQuery& mode_query) {
+    if (!p.calls_functions || (system_.velocity(stepper_.y1).array() != 0.0).any()) return std::nullopt;
     const double whole = stepper_.h;
     for (int k = 1; k < parameters.places_inside; ++k) {
         const double t = stepper_.t0 + whole * k / parameters.places_inside;
         system_.read(stepper_.y1);
         update_kinematics(p, w, t, system_.q, system_.v);
-        if (!release_rate(t, stepper_.y1, modes, asked)) continue;
+        if (!release_rate(t, stepper_.y1, modes, mode_query)) continue;
         stepper_.end_at(t - stepper_.t0);
-        return release_rate_at_end(modes, asked);
+        return release_rate_at_end(modes, mode_query);
     }
     system_.read(stepper_.y1);
     begin_step(p, w, stepper_.t0 + whole, system_.q, system_.v);
@@ -134,17 +130,17 @@ std::optional<double> ReleaseLocator::release_rate_inside(const std::vector<Mode
 std::optional<FoundEvent> ReleaseLocator::release_together() {
     if (!w.state.is_hyperstatic) return std::nullopt;
     const std::vector<Mode> modes = w.state.mode;
-    ModeQuestion asked;
-    std::optional<double> rate = release_rate_at_end(modes, asked);
-    if (!rate) rate = release_rate_inside(modes, asked);
+    ModeQuery mode_query;
+    std::optional<double> rate = release_rate_at_end(modes, mode_query);
+    if (!rate) rate = release_rate_inside(modes, mode_query);
     if (!rate) return std::nullopt;
     const double full = stepper_.h;
-    const double part = release_part(*rate, modes, asked);
-    for (double later = 0.0;; later = std::max(parameters.further_part * later, parameters.least_later)) {
+    const double part = release_part(*rate, modes, mode_query);
+    for (double later = 0.0;; later = std::max(parameters.further_part * later, parameters.min_extension)) {
         stepper_.end_at(std::min(part + later, 1.0) * full);
-        if (release_rate_at_end(modes, asked) || part + later >= 1.0) break;
+        if (release_rate_at_end(modes, mode_query) || part + later >= 1.0) break;
     }
-    return FoundEvent{FoundEvent::Kind::released_together, asked.at_rest.front(), stepper_.t0 + stepper_.h};
+    return FoundEvent{FoundEvent::Kind::released_together, mode_query.at_rest.front(), stepper_.t0 + stepper_.h};
 }
 
 }  // namespace pn

@@ -5,19 +5,19 @@
 #include <optional>
 #include <vector>
 
-#include "friction/mode_question.hpp"
+#include "friction/mode_query.hpp"
 #include "run/events/found_event.hpp"
 #include "run/integrators/stepper.hpp"
 
 namespace pn {
 
 struct ReleaseLocationParameters {
-    double width = 1e-12;         // tolerance of the instant, relative to the step or the time
-    double least_fall = 0.7;      // maximum ratio of two rates for which their secant is used
-    double short_of_root = 1e-2;  // distance kept from the root of the secant, relative to the distance to it
+    double time_tolerance = 1e-12;  // tolerance of the instant, relative to the step or the time
+    double max_rate_ratio = 0.7;    // maximum ratio of two rates for which their secant is used
+    double short_of_root = 1e-2;    // distance kept from the root of the secant, relative to the distance to it
     // Extension of a repeated step that does not show the release of its interpolant. The first extension is relative
     // to the step, and each further one is longer by a factor.
-    double least_later = 1e-11, further_part = 10.0;
+    double min_extension = 1e-11, further_part = 10.0;
     int places_inside = 8;  // parts of a step at rest, at whose ends sticking elements are checked
 };
 
@@ -34,10 +34,10 @@ public:
     std::optional<FoundEvent> lift_together();
 
 private:
-    std::optional<double> release_rate(double t, const VecX& y, const std::vector<Mode>& modes, ModeQuestion& asked);
-    std::optional<double> release_rate_at_end(const std::vector<Mode>& modes, ModeQuestion& asked);
-    double release_part(double rate, const std::vector<Mode>& modes, ModeQuestion& asked);
-    std::optional<double> release_rate_inside(const std::vector<Mode>& modes, ModeQuestion& asked);
+    std::optional<double> release_rate(double t, const VecX& y, const std::vector<Mode>& modes, ModeQuery& mode_query);
+    std::optional<double> release_rate_at_end(const std::vector<Mode>& modes, ModeQuery& mode_query);
+    double release_part(double rate, const std::vector<Mode>& modes, ModeQuery& mode_query);
+    std::optional<double> release_rate_inside(const std::vector<Mode>& modes, ModeQuery& mode_query);
     bool all_press();
 
     System& system_;

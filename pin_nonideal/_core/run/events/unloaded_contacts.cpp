@@ -13,7 +13,7 @@ namespace {
 
 std::vector<int> contacts_of_bodies(const Program& p, const Workspace& w, int gap) {
     std::vector<int> list;
-    for (int i : w.now.touching)
+    for (int i : w.now.closed_gaps)
         if (same_bodies(p, i, gap) && !is_bare(p, i)) list.push_back(i);
     return list;
 }
@@ -42,13 +42,11 @@ bool moves_without(System& system, double t, const std::vector<int>& contacts) {
     std::vector<char> closed = before.closed;
     for (int i : contacts) closed[i] = 0;
     bool same = false;
-    try {
+    attempt([&] {  // a failure means that there is no motion without these contacts
         set_closed(p, w, closed);
         begin_step(p, w, t, system.q, system.v);
         same = needs_no_force(system, t, contacts, held);
-    } catch (const Failure& failure) {  // no motion without these contacts
-        if (failure.kind == Failure::Kind::interrupted) throw;
-    }
+    });
     set_contacts(p, w, before.closed, before.mode);
     w.state = before;
     begin_step(p, w, t, system.q, system.v);
@@ -71,11 +69,11 @@ std::vector<int> open_unloaded_contacts(System& system, double t) {
     const Program& p = system.p;
     Workspace& w = system.w;
     std::vector<int> opened_gaps;
-    const std::vector<int> touching = w.now.touching;
-    for (int gap : touching) {
+    const std::vector<int> closed_gaps = w.now.closed_gaps;
+    for (int gap : closed_gaps) {
         if (!w.state.closed[gap] || !is_unloaded(system, t, gap)) continue;
         std::vector<char> closed = w.state.closed;
-        for (int i : touching) {
+        for (int i : closed_gaps) {
             if (!closed[i] || !same_bodies(p, i, gap)) continue;
             closed[i] = 0;
             opened_gaps.push_back(i);

@@ -17,16 +17,16 @@ double sign(double x) { return (x > 0.0) - (x < 0.0); }
 std::vector<int> bounded_drives(const Program& p) {
     std::vector<int> dofs;
     for (int dof = 0; p.limits_effort() && dof < p.mechanism.nv; ++dof)
-        if (p.least_effort[dof] > -HUGE_VAL || p.most_effort[dof] < HUGE_VAL) dofs.push_back(dof);
+        if (p.min_effort[dof] > -HUGE_VAL || p.max_effort[dof] < HUGE_VAL) dofs.push_back(dof);
     return dofs;
 }
 
 }  // namespace
 
-ValueEvents::ValueEvents(const std::vector<UserEvent>& asked, System& system, Stepper& stepper, Progress& progress)
-    : events_(asked), system_(system), stepper_(stepper), drives_(bounded_drives(system.p)), side_(progress.event_signs),
-      count_(asked.size() + drives_.size(), 0), asked_y_(VecX::Zero(system.ns)), asked_torque_(VecX::Zero(system.nv)),
-      probe_(VecX::Zero(system.ny)) {
+ValueEvents::ValueEvents(const std::vector<UserEvent>& events_in, System& system, Stepper& stepper, Progress& progress)
+    : events_(events_in), system_(system), stepper_(stepper), drives_(bounded_drives(system.p)), side_(progress.event_signs),
+      count_(events_in.size() + drives_.size(), 0), demand_y_(VecX::Zero(system.ns)),
+      demanded_torque_(VecX::Zero(system.nv)), probe_(VecX::Zero(system.ny)) {
     side_.assign(count_.size(), 0.0);
 }
 
@@ -38,14 +38,14 @@ double ValueEvents::value(int k, double t, const VecX& y) {
 
 // Return the effort left in a drive, negative if the demand exceeds it. The demands of all drives are computed at once.
 double ValueEvents::effort_left(int dof, double t, const VecX& y) {
-    if (!asked_before_ || t != asked_time_ || asked_y_ != y.head(system_.ns)) {
-        asked_before_ = true;
-        asked_time_ = t;
-        asked_y_ = y.head(system_.ns);
+    if (!has_demand_ || t != demand_time_ || demand_y_ != y.head(system_.ns)) {
+        has_demand_ = true;
+        demand_time_ = t;
+        demand_y_ = y.head(system_.ns);
         system_.read(y);
-        asked_torque(system_.p, system_.w, t, system_.q, system_.v, asked_torque_);
+        demanded_torque(system_.p, system_.w, t, system_.q, system_.v, demanded_torque_);
     }
-    return std::min(system_.p.most_effort[dof] - asked_torque_[dof], asked_torque_[dof] - system_.p.least_effort[dof]);
+    return std::min(system_.p.max_effort[dof] - demanded_torque_[dof], demanded_torque_[dof] - system_.p.min_effort[dof]);
 }
 
 double ValueEvents::value_inside(int k, double part) {
@@ -55,15 +55,15 @@ double ValueEvents::value_inside(int k, double part) {
 }
 
 void ValueEvents::start(double t, const VecX& y) {
-    asked_before_ = false;
+    has_demand_ = false;
     for (int k = 0; k < size(); ++k) side_[k] = sign(value(k, t, y));
 }
 
 // A value that is zero at the start of a run has no sign. Its first sign is no event.
 double ValueEvents::first_crossing(int k) {
     double before = 0.0;
-    for (int i = 1; i <= parameters.looks; ++i) {
-        const double part = static_cast<double>(i) / parameters.looks, here = value_inside(k, part);
+    for (int i = 1; i <= parameters.samples; ++i) {
+        const double part = static_cast<double>(i) / parameters.samples, here = value_inside(k, part);
         if (side_[k] != 0 && sign(here) == -side_[k]) {
             if (counts(k)) {
                 const auto margin = [&](double x) { return side_[k] * value_inside(k, x) / std::abs(here); };
@@ -81,7 +81,7 @@ double ValueEvents::first_crossing(int k) {
 }
 
 void ValueEvents::end_step_at(double size) {
-    stepper_.take_again(size);
+    stepper_.repeat(size);
     system_.project_and_evaluate(stepper_.t0 + size, stepper_.y1, stepper_.end_rate());
 }
 
@@ -96,7 +96,7 @@ void ValueEvents::step_onto(int k, double part) {
     double size = std::max(part * full, least);
     end_step_at(size);
     double here = value(k, t0 + size, stepper_.y1);
-    for (int i = 0; i < parameters.corrections && here != 0.0 && slope != 0.0; ++i) {
+    for (int i = 0; i < parameters.max_corrections && here != 0.0 && slope != 0.0; ++i) {
         const double next = std::clamp(size - here / slope, least, full), change = next - size, before = here;
         if (std::abs(change) <= parameters.end_tolerance * full || t0 + next == t0 + size) break;
         end_step_at(size = next);
@@ -105,7 +105,7 @@ void ValueEvents::step_onto(int k, double part) {
     }
 }
 
-void ValueEvents::tell(double t, std::vector<Event>& events) const {
+void ValueEvents::append_events(double t, std::vector<Event>& events) const {
     for (int k : found_) {
         const Event::Kind drives = side_[k] < 0.0 ? Event::Kind::saturate : Event::Kind::desaturate;
         if (k < users()) events.push_back({t, Event::Kind::user, k});
@@ -122,7 +122,7 @@ void ValueEvents::count(int k) {
 }
 
 // Count events that coincide with the event at the step's end, and store the signs of all other values.
-void ValueEvents::take_signs() {
+void ValueEvents::store_signs() {
     for (int k = 0; k < size(); ++k) {
         const double here = sign(value(k, stepper_.t0 + stepper_.h, stepper_.y1));
         if (here == 0 || here == side_[k] || std::count(found_.begin(), found_.end(), k) > 0) continue;
@@ -135,7 +135,7 @@ bool ValueEvents::locate(bool ends_at_event) {
     found_.clear();
     stepper_.make_interpolant();
     const std::vector<double> side = side_;
-    asked_before_ = false;
+    has_demand_ = false;
     int first = -1;
     double part = no_crossing;
     for (int k = 0; k < size(); ++k) {
@@ -155,13 +155,13 @@ bool ValueEvents::locate(bool ends_at_event) {
         system_.read_law_states(stepper_.y1);
         evaluate(system_.p, system_.w, stepper_.t0 + stepper_.h, system_.q, system_.v);
     }
-    take_signs();
+    store_signs();
     return first >= 0 && !at_end;
 }
 
-void ValueEvents::look_at_end(double t, const VecX& y) {
+void ValueEvents::sample_end(double t, const VecX& y) {
     found_.clear();
-    asked_before_ = false;
+    has_demand_ = false;
     for (int k = 0; k < size(); ++k) {
         const double here = sign(value(k, t, y));
         if (here == 0 || here == side_[k]) continue;

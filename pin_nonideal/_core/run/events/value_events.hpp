@@ -14,8 +14,8 @@
 namespace pn {
 
 struct ValueEventsParameters {
-    int looks = 5;         // samples of each step
-    int corrections = 12;  // maximum secants for the end of the step
+    int samples = 5;           // samples of each step
+    int max_corrections = 12;  // maximum secants for the end of the step
     // Tolerance of the corrected end, relative to the step.
     double end_tolerance = 1e-14;
     // Maximum time difference of a friction event and a user event that coincide, relative to the step.
@@ -29,7 +29,7 @@ public:
     using Parameters = ValueEventsParameters;
     static constexpr Parameters parameters{};
 
-    ValueEvents(const std::vector<UserEvent>& asked, System& system, Stepper& stepper, Progress& progress);
+    ValueEvents(const std::vector<UserEvent>& events_in, System& system, Stepper& stepper, Progress& progress);
 
     bool empty() const { return count_.empty(); }
     // Store the signs at the start of a run.
@@ -38,10 +38,10 @@ public:
     // if its end has changed. The workspace must be evaluated at the step's end, also on return.
     bool locate(bool ends_at_event);
     // Count the events at the end of a step of time stepping, whose end stays.
-    void look_at_end(double t, const VecX& y);
-    // Values with an event at the end of the step. `tell` appends their events.
+    void sample_end(double t, const VecX& y);
+    // Values with an event at the end of the step. `append_events` appends their events.
     const std::vector<int>& found() const { return found_; }
-    void tell(double t, std::vector<Event>& events) const;
+    void append_events(double t, std::vector<Event>& events) const;
     // Check if an event has ended the run.
     bool ends_run() const { return ends_run_; }
 
@@ -57,7 +57,7 @@ private:
     double first_crossing(int k);
     void end_step_at(double size);
     void step_onto(int k, double part);
-    void take_signs();
+    void store_signs();
     void count(int k);
 
     const std::vector<UserEvent>& events_;
@@ -67,9 +67,9 @@ private:
     std::vector<double>& side_;   // current sign of each value, 0 if zero since the start
     std::vector<long> count_;
     // Demanded effort of all drives, cached for the last state.
-    bool asked_before_ = false;
-    double asked_time_ = 0.0;
-    VecX asked_y_, asked_torque_;
+    bool has_demand_ = false;
+    double demand_time_ = 0.0;
+    VecX demand_y_, demanded_torque_;
     std::vector<int> found_;
     bool ends_run_ = false;
     VecX probe_;

@@ -14,17 +14,17 @@ Warnings::Warnings(System& system, Stepper& stepper, Progress& progress, Recordi
 
 void Warnings::record_pulls(const std::optional<FoundEvent>& event) {
     const int n = static_cast<int>(p.contacts.size());
-    std::vector<char> asked(n, 0), now(n, 0);
-    const auto ask = [&](int i, bool located) {
+    std::vector<char> is_reported(n, 0), now(n, 0);
+    const auto add_tension = [&](int i, bool located) {
         const PullMargin found = contact_pull_margin(p, w, i);
-        for (int j : found.sharing) asked[j] = 1;
+        for (int j : found.sharing) is_reported[j] = 1;
         if (!found.must_pull && !located) return;
         for (int j : found.sharing) now[j] = progress_.in_tension[j];
         for (int j : found.pulling) now[j] = 1;
     };
-    if (event && event->kind == FoundEvent::Kind::pull) ask(event->index, true);
+    if (event && event->kind == FoundEvent::Kind::pull) add_tension(event->index, true);
     for (int i = 0; i < n; ++i)
-        if (!asked[i] && normal_force(p, w, i) < 0.0) ask(i, false);
+        if (!is_reported[i] && normal_force(p, w, i) < 0.0) add_tension(i, false);
     for (int i = 0; i < n; ++i)
         if (now[i] && !progress_.in_tension[i]) out_.events.push_back({progress_.t, Event::Kind::pull, p.contacts[i]});
     progress_.in_tension = now;

@@ -77,7 +77,7 @@ double ErrorNorm::operator()(const VecX& dy, const VecX& y) {
         const double x = tangent_[k] / tolerance_[k];
         sum += x * x;
     }
-    for (int e : system_.w.now.loaded) {
+    for (int e : system_.w.now.loaded_elements) {
         if (system_.w.state.mode[e] != sticking) continue;
         // The load of a contact can jump at an edge. Steps too short to resolve the jump skip it.
         if (system_.p.frictions[e].gap >= 0 && !resolves_shares_) continue;
@@ -126,7 +126,7 @@ double ErrorNorm::initial_step(int order, double t, const VecX& y, const VecX& d
     const double curvature = (*this)(rate, y) / trial, top = std::max(speed, curvature);
     const double step = top <= parameters.no_curvature ? std::max(parameters.smallest_trial, trial * parameters.flat_part)
                                             : std::pow(parameters.first_part / top, 1.0 / order);
-    return std::min({parameters.most_growth * trial, step, limit});
+    return std::min({parameters.max_trial_growth * trial, step, limit});
 }
 
 }  // namespace pn

@@ -29,7 +29,7 @@ struct ErrorNormParameters {
     double first_part = 0.01;
     // Negligible norm of a state or rate, and the trial step [s] for it. Negligible second derivative, and the step for
     // it relative to the trial. Maximum growth over the trial.
-    double nothing = 1e-5, smallest_trial = 1e-6, no_curvature = 1e-15, flat_part = 1e-3, most_growth = 100.0;
+    double nothing = 1e-5, smallest_trial = 1e-6, no_curvature = 1e-15, flat_part = 1e-3, max_trial_growth = 100.0;
 };
 
 class ErrorNorm {

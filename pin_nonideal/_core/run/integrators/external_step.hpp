@@ -26,7 +26,7 @@ public:
     }
     // Evaluate the rates inside the step.
     template <class System>
-    void look_inside(System& system) {
+    void evaluate_inside(System& system) {
         for (int i = 1; i < method_.stages; ++i) {
             interpolate(method_.C[i], inside_);
             system.derivative(step_.t0 + method_.C[i] * step_.h, inside_, step_.rates[i]);

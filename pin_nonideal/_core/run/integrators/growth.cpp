@@ -8,7 +8,7 @@ namespace pn {
 GrowthGuard::GrowthGuard(System& system, Progress& progress, const Options& options, const Recording& out)
     : system_(system), progress_(progress), options_(options), out_(out) {}
 
-void GrowthGuard::look() {
+void GrowthGuard::check_step() {
     const double speed = progress_.y.segment(system_.nq, system_.nv).cwiseAbs().maxCoeff();
     std::vector<double>& speeds = progress_.growth_speeds;
     const double next = speeds.empty() ? parameters.min_recorded_speed : parameters.decade * speeds.back();

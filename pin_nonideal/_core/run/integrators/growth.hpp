@@ -40,7 +40,7 @@ public:
     // Check the growth after an accepted step. Throw a Failure if the largest speed has grown over many decades. The
     // growth is exponential, or a power of time in thousands of steps. The Failure has the dof, its source (0
     // actuation, 1 applied forces, 2 laws) and the rate of growth [1/s]. A run with max_steps is not limited.
-    void look();
+    void check_step();
 
 private:
     void judge();

@@ -134,7 +134,7 @@ constexpr void require(bool fits) {
 template <size_t a, size_t s>
 constexpr Method runge_kutta(const char* name, int order, const double (&A)[a], const double (&B)[s],
                              const double (&C)[s]) {
-    require(s < most_rates && 2 * a == s * (s - 1));
+    require(s < max_rates && 2 * a == s * (s - 1));
     Method m;
     m.name = name;
     m.order = order;
@@ -158,7 +158,7 @@ template <size_t a, size_t s, size_t d>
 constexpr Method with_terms(Method m, const double (&A)[a], const double (&C)[s], const double (&D)[d]) {
     m.further_stages = static_cast<int>(s);
     const int rates = m.stages + 1 + m.further_stages;
-    require(rates <= most_rates && d % rates == 0);
+    require(rates <= max_rates && d % rates == 0);
     require(static_cast<int>(2 * a) == m.further_stages * (2 * m.stages + 1 + m.further_stages));
     m.terms = static_cast<int>(d) / rates;
     m.A_further = A;

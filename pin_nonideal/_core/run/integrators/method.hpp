@@ -8,7 +8,7 @@
 namespace pn {
 
 // Maximum number of rates: stages, rate at the step's end, and further stages of the interpolant.
-constexpr int most_rates = 16;
+constexpr int max_rates = 16;
 
 struct Method {
     enum class Scheme { runge_kutta, semi_implicit_euler, moreau, outside };

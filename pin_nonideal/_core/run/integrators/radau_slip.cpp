@@ -33,7 +33,7 @@ Collocation::Collocation(Step& step, System& system, ErrorNorm& norm) : step_(st
     for (auto* list : {&A_, &T_, &P_, &Q_}) list->resize(stages);
 }
 
-double Collocation::part(int stage) { return points[stage]; }
+double Collocation::abscissa(int stage) { return points[stage]; }
 
 // Collect the elements with unknown directions: slipping elements with several directions.
 void Collocation::gather() {
@@ -54,7 +54,7 @@ void Collocation::gather() {
 
 // Initialize the stages from the last trial of the step, which had another length.
 void Collocation::stretch() {
-    const double ratio = step_.h / known_size_;
+    const double ratio = step_.h / warm_start_size_;
     const std::vector<VecX> n_before = n_;
     for (int i = 0; i < stages; ++i) {
         n_[i].setZero();
@@ -69,7 +69,7 @@ void Collocation::stretch() {
 }
 
 // Initialize the stages by the rate at the start, and size the buffers for the elements.
-void Collocation::go_straight_on() {
+void Collocation::extrapolate_straight() {
     sigma_.resize(elements_.size(), stages);
     G_.resize(system_.nv, rows_);
     for (int i = 0; i < stages; ++i) {
@@ -81,7 +81,7 @@ void Collocation::go_straight_on() {
     }
 }
 
-void Collocation::take_directions(int stage) const {
+void Collocation::set_directions(int stage) const {
     for (const Element& e : elements_)
         for (int k = 0; k < e.dim; ++k) system_.w.state.last_direction[e.index][k] = n_[stage][e.row + k];
 }
@@ -90,7 +90,7 @@ void Collocation::evaluate_stages(bool first) {
     const Program& p = system_.p;
     Workspace& w = system_.w;
     for (int i = 0; i < stages; ++i) {
-        take_directions(i);
+        set_directions(i);
         system_.derivative(step_.t0 + points[i] * step_.h, Y_[i], F_[i]);
         A_[i].setZero();
         for (size_t at = 0; at < elements_.size(); ++at) {
@@ -229,17 +229,17 @@ void Collocation::measure_stiffness() {
 }
 
 void Collocation::advance() {
-    const bool again = known_;
+    const bool again = has_warm_start_;
     gather();
-    converged_ = known_ = false;
+    converged_ = has_warm_start_ = false;
     step_.y1 = step_.y0;
     RunState& state = system_.w.state;
     for (const Element& e : elements_) state.last_direction[e.index] = state.slip_direction[e.index];
     if (step_.h == 0.0) return;
     if (again) stretch();
-    else go_straight_on();
+    else extrapolate_straight();
     double last = HUGE_VAL;
-    for (int it = 0; it < parameters.most_iterations; ++it) {
+    for (int it = 0; it < parameters.max_iterations; ++it) {
         evaluate_stages(it == 0);
         if (it == 0 && !again) find_response();
         correct();
@@ -255,12 +255,12 @@ void Collocation::advance() {
         if (converged_) break;
     }
     if (!converged_) return;
-    known_ = true;
-    known_size_ = step_.h;
+    has_warm_start_ = true;
+    warm_start_size_ = step_.h;
     measure_stiffness();
     step_.y1 = Y_[stages - 1];
     system_.normalize(step_.y1);
-    take_directions(stages - 1);
+    set_directions(stages - 1);
 }
 
 double Collocation::error() {
@@ -292,7 +292,7 @@ void Collocation::interpolate(double part, VecX& y) const {
     with_weights(part, [&](int k, double weight) {
         state += weight * (k == 0 ? step_.y0 : k == stages ? step_.y1 : Y_[k - 1]).head(step_.states);
     });
-    take_directions_at(part);
+    set_directions_at(part);
 }
 
 double Collocation::interpolated(double part, int index) const {
@@ -315,7 +315,7 @@ double Collocation::interpolated_rate(double part, int index) const {
     return rate / sum;
 }
 
-void Collocation::take_directions_at(double part) const {
+void Collocation::set_directions_at(double part) const {
     for (const Element& e : elements_) {
         Vec3 n = Vec3::Zero();
         with_weights(part, [&](int k, double weight) {

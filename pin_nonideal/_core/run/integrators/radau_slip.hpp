@@ -17,7 +17,7 @@
 namespace pn {
 
 struct CollocationParameters {
-    int most_iterations = 14;    // maximum iterations of a step, each an evaluation at all stages
+    int max_iterations = 14;     // maximum iterations of a step, each an evaluation at all stages
     double farthest_turn = 1.5;  // largest turn of a direction in the first iteration, else the step is too long
     // Convergence, relative to the tolerance: sum of the remaining changes, or the first change alone.
     double solved_part = 0.05, solved_at_once = 0.005;
@@ -46,16 +46,16 @@ public:
     // Fastest relaxation rate of a direction at the step's end, times the step.
     double stiffness() const { return stiffness_; }
     // Discard the warm start.
-    void forget() { known_ = false; }
+    void reset_warm_start() { has_warm_start_ = false; }
 
     // Abscissa of a stage in the step, and its rate.
-    static double part(int stage);
+    static double abscissa(int stage);
     const VecX& rate(int stage) const { return F_[stage]; }
     // Compute the state inside the step. The workspace then holds the directions there.
     void interpolate(double part, VecX& y) const;
     double interpolated(double part, int index) const;
     double interpolated_rate(double part, int index) const;
-    void take_directions_at(double part) const;
+    void set_directions_at(double part) const;
 
 private:
     struct Element {
@@ -64,8 +64,8 @@ private:
 
     void gather();
     void stretch();
-    void go_straight_on();
-    void take_directions(int stage) const;
+    void extrapolate_straight();
+    void set_directions(int stage) const;
     void evaluate_stages(bool first);
     void find_response();
     void correct();
@@ -81,8 +81,8 @@ private:
     ErrorNorm& norm_;
     std::vector<Element> elements_;
     int rows_ = 0, tangents_ = 0;
-    bool known_ = false, converged_ = false;
-    double stiffness_ = 0.0, known_size_ = 0.0;
+    bool has_warm_start_ = false, converged_ = false;
+    double stiffness_ = 0.0, warm_start_size_ = 0.0;
     std::vector<VecX> F_, Y_, next_;  // rates, states and next states of the stages
     std::vector<VecX> u_, n_;         // slip velocities and directions of all elements, by stage
     std::vector<VecX> turned_;        // change of the accelerations by the last turns

@@ -11,7 +11,7 @@ namespace pn {
 
 namespace {
 
-// Generator of changes of the last digits. The sequence is fixed, so that runs repeat. `most_spacings`: maximum change
+// Generator of changes of the last digits. The sequence is fixed, so that runs repeat. `max_spacings`: maximum change
 // in floating-point spacings.
 constexpr unsigned long long multiplier = 6364136223846793005ULL, increment = 1442695040888963407ULL;
 const double second_difference = std::sqrt(6.0);  // standard deviation of its rounding, relative to that of a rate
@@ -43,7 +43,7 @@ void RoundingFloor::measure() {
         for (int k = 0; k < n; ++k) {
             draw = multiplier * draw + increment;
             const double part = static_cast<double>(static_cast<long long>(draw)) * 0x1p-63;
-            change_[k] = parameters.most_spacings * epsilon * part * stepper_.y1[k];  // zero entries stay zero
+            change_[k] = parameters.max_spacings * epsilon * part * stepper_.y1[k];  // zero entries stay zero
         }
         noise_ = -2.0 * stepper_.end_rate();
         for (const double side : {1.0, -1.0}) {
@@ -65,10 +65,10 @@ void RoundingFloor::measure() {
     system_.w.state = kept;
 }
 
-void RoundingFloor::look() {
+void RoundingFloor::check_step() {
     if (tolerance_factor_ == 0.0 || stepper_.collocates()) return;
-    if (out_.steps < std::max(parameters.min_measured_steps, progress_.next_look)) return;
-    progress_.next_look = out_.steps + parameters.steps_between_measurements;
+    if (out_.steps < std::max(parameters.min_measured_steps, progress_.next_rounding_check)) return;
+    progress_.next_rounding_check = out_.steps + parameters.steps_between_measurements;
     measure();
 }
 

@@ -14,8 +14,8 @@ struct RoundingFloorParameters {
     // Safety factor on a measurement, which is only a sample. Part of the previous value that bounds the next one from
     // below.
     double sample_factor = 3.0, lasting_part = 0.5;
-    double most_spacings = 16.0;  // maximum change of a state in a sample, in floating-point spacings
-    int samples = 3;              // changed states of a measurement
+    double max_spacings = 16.0;  // maximum change of a state in a sample, in floating-point spacings
+    int samples = 3;             // changed states of a measurement
 };
 
 class RoundingFloor {
@@ -28,7 +28,7 @@ public:
     // Measure the rounding of the rates at intervals, in runs with many steps. Call it after a step that the error
     // control accepts. The workspace is evaluated at the step's end before and after. The norm raises the tolerance by
     // the rounding, so that noise alone does not shorten the next step.
-    void look();
+    void check_step();
 
 private:
     void measure();

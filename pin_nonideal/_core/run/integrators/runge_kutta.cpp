@@ -17,7 +17,7 @@ static PN_INLINE void add_weighted_at(int i, const VecX& y, const double* part, 
 }
 
 PN_WIDE void add_weighted(int size, const VecX& y, double h, const WeightedSum& sum, VecX& out) {
-    double part[most_rates];
+    double part[max_rates];
     for (int j = 0; j < sum.terms; ++j) part[j] = h * sum.weight[j];
     int i = 0;
     for (; i + 3 < size; i += 4) add_weighted_at<Lanes>(i, y, part, sum, out);
@@ -48,7 +48,7 @@ RungeKutta::RungeKutta(const Method& method, Step& step)
     for (int i = 0; i < method.terms; ++i)
         to_terms_.emplace_back(method.D + method.rates() * i, method.rates(), step.rates);
     for (int i = 0; i < method.powers; ++i) {
-        double weights[most_rates];
+        double weights[max_rates];
         for (int j = 0; j < stages; ++j) weights[j] = method.P[method.powers * j + i];
         to_terms_.emplace_back(weights, stages, step.rates);
     }

@@ -14,8 +14,8 @@ namespace pn {
 // Weighted sum of rates: nonzero weights, and pointers to their rates.
 struct WeightedSum {
     int terms = 0;
-    double weight[most_rates];
-    const double* rate[most_rates];
+    double weight[max_rates];
+    const double* rate[max_rates];
     WeightedSum(const double* weights, int n, const std::vector<VecX>& rates);
 };
 

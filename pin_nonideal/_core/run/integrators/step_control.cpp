@@ -16,10 +16,10 @@ double rounding_at(double pivot) { return std::numeric_limits<double>::epsilon()
 
 double StepControl::aim(const Method& method) { return std::pow(parameters.safety, method.order); }
 
-bool StepControl::needs_detour(double least_pivot, double start_pivot, double end_pivot) const {
+bool StepControl::needs_detour(double min_pivot, double start_pivot, double end_pivot) const {
     const double way = std::sqrt(start_pivot) + std::sqrt(end_pivot);
-    return method_.adaptive() && detours_ < parameters.detour_limit &&
-           std::sqrt(least_pivot) < parameters.clearance * way && rounding_at(least_pivot) > rtol_;
+    return method_.adaptive() && detours_ < parameters.max_detours &&
+           std::sqrt(min_pivot) < parameters.clearance * way && rounding_at(min_pivot) > rtol_;
 }
 
 bool StepControl::accepts(std::optional<double> error, double size, bool last, double& h) {
@@ -31,15 +31,15 @@ bool StepControl::accepts(std::optional<double> error, double size, bool last, d
     }
     if (!(*error <= 1.0)) {
         last_rejected_ = true;
-        h = size * std::max(parameters.shrink_limit,
+        h = size * std::max(parameters.min_step_ratio,
                             std::isfinite(*error) ? parameters.retry_safety * std::pow(*error, power) : 0.0);
         return false;
     }
     if (method_.adaptive()) {
-        double factor = parameters.growth_limit;
+        double factor = parameters.max_step_ratio;
         if (*error > 0.0) factor = std::min(factor, parameters.safety * std::pow(*error, power));
         if (last_rejected_) factor = std::min(1.0, factor);
-        if (!(last && factor * size < h)) h = size * std::max(factor, parameters.shrink_limit);
+        if (!(last && factor * size < h)) h = size * std::max(factor, parameters.min_step_ratio);
     }
     last_rejected_ = false;
     detours_ = 0;

@@ -16,11 +16,11 @@ struct StepControlParameters {
     // With 0.9 a third of the steps fails, and smooth motions need a sixth more evaluations for the same error. The
     // error of a retried step is given, so it aims closer.
     double safety = 0.65, retry_safety = 0.9;
-    double shrink_limit = 0.2, growth_limit = 10.0;  // least and largest ratio of two successive steps
+    double min_step_ratio = 0.2, max_step_ratio = 10.0;  // least and largest ratio of two successive steps
     // A step is shortened by `detour` if an evaluation is nearer to a singular position than `clearance` times the
     // length of the step's path. Its evaluations are then at other positions.
     double clearance = 0.04, detour = 0.85;
-    int detour_limit = 3;  // maximum number of such steps in a row
+    int max_detours = 3;  // maximum number of such steps in a row
 };
 
 class StepControl {
@@ -35,7 +35,7 @@ public:
 
     // Check if rounding near a singular position would spoil the stages of a step. A step of another length avoids the
     // position. Arguments: least pivot of the rows' factor at the stages, and its pivots at both ends.
-    bool needs_detour(double least_pivot, double start_pivot, double end_pivot) const;
+    bool needs_detour(double min_pivot, double start_pivot, double end_pivot) const;
     // Check if a step of this size is accepted with this error norm (1 at the tolerance, none for a detour). Set h to
     // the size of the next step, or of its next trial. `last`: the step was cut at a stop.
     bool accepts(std::optional<double> error, double size, bool last, double& h);

@@ -10,17 +10,18 @@ Stepper::Stepper(const Method& chosen, System& system, ErrorNorm& norm)
     if (method.scheme == Method::Scheme::runge_kutta) scheme_.emplace<RungeKutta>(method, *this);
     if (method.scheme == Method::Scheme::semi_implicit_euler) scheme_.emplace<SemiImplicitEuler>(*this);
     if (method.outside()) scheme_.emplace<OutsideStep>(method, *this);
-    system.seeks_directions = !method.outside();
+    system.can_solve_directions = !method.outside();
     for (int i = 0; i < stages; ++i)
-        if (i == 0 || (method.C && method.C[i] < 1.0)) looks_.push_back({i == 0 ? 0.0 : method.C[i], &rates[i]});
-    std::stable_sort(looks_.begin(), looks_.end(), [](const Look& a, const Look& b) { return a.part < b.part; });
+        if (i == 0 || (method.C && method.C[i] < 1.0)) rate_samples_.push_back({i == 0 ? 0.0 : method.C[i], &rates[i]});
+    const auto precedes = [](const RateSample& a, const RateSample& b) { return a.part < b.part; };
+    std::stable_sort(rate_samples_.begin(), rate_samples_.end(), precedes);
     // Keep the last stage at each instant, which is the most accurate.
-    const auto same = [](const Look& a, const Look& b) { return a.part == b.part; };
-    looks_.erase(looks_.begin(), std::unique(looks_.rbegin(), looks_.rend(), same).base());
-    collocation_looks_.push_back({0.0, &rates[0]});
+    const auto same = [](const RateSample& a, const RateSample& b) { return a.part == b.part; };
+    rate_samples_.erase(rate_samples_.begin(), std::unique(rate_samples_.rbegin(), rate_samples_.rend(), same).base());
+    collocation_samples_.push_back({0.0, &rates[0]});
     for (int i = 0; i + 1 < Collocation::stages; ++i)
-        collocation_looks_.push_back({Collocation::part(i), &collocation_.rate(i)});
-    for (auto* list : {&looks_, &collocation_looks_}) list->push_back({1.0, &end_rate()});
+        collocation_samples_.push_back({Collocation::abscissa(i), &collocation_.rate(i)});
+    for (auto* list : {&rate_samples_, &collocation_samples_}) list->push_back({1.0, &end_rate()});
 }
 
 // Call `use` with the scheme of the method. Time stepping has none here.
@@ -35,13 +36,13 @@ void Stepper::take(double t, double size) {
     t0 = t;
     h = size;
     has_interpolant_ = false;
-    collocates_ = system_.w.state.seeks_directions;
+    collocates_ = system_.w.state.solves_directions;
     active = system_.active();
     if (collocates_) {
         collocation_.advance();
         if (collocation_.is_solved() || method.adaptive()) return;
         RunState& state = system_.w.state;  // a fixed step cannot be shortened
-        collocates_ = state.seeks_directions = false;
+        collocates_ = state.solves_directions = false;
         state.last_direction = state.slip_direction;
     }
     if (std::holds_alternative<RungeKutta>(scheme_) && system_.stands(y0, start_rate())) return stand();
@@ -57,13 +58,13 @@ void Stepper::stand() {
     if (!rows.blocks.empty()) system_.smallest_pivot = std::min(system_.smallest_pivot, rows.distance);
 }
 
-void Stepper::take_again(double size) {
+void Stepper::repeat(double size) {
     take(t0, size);
     if (collocates_ && !collocation_.is_solved()) throw Failure(Failure::Kind::not_converged, t0);
 }
 
 void Stepper::end_at(double size) {
-    take_again(size);
+    repeat(size);
     system_.project_and_evaluate(t0 + size, y1, end_rate());
 }
 
@@ -78,7 +79,7 @@ void Stepper::follow(double t, double size, OutsideStep::Interpolant interpolant
     auto& outside = std::get<OutsideStep>(scheme_);
     outside.set_interpolant(std::move(interpolant));
     take(t, size);
-    if (system_.ne > 0) outside.look_inside(system_);
+    if (system_.ne > 0) outside.evaluate_inside(system_);
 }
 
 double Stepper::error() {

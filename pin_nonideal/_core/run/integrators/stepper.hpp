@@ -22,7 +22,7 @@ public:
     // interpolant is discarded.
     void move_end(double dt);
     // Repeat the step with another length. Throw a Failure if it is not solved.
-    void take_again(double size);
+    void repeat(double size);
     // Do the same, then project and evaluate its end.
     void end_at(double size);
     // Follow a step from t that an outside integrator has taken, and evaluate the rates inside.
@@ -48,17 +48,17 @@ public:
     // Return a relaxation rate times the step: of slip directions after collocation, else of velocities, estimated from
     // the last two evaluations.
     double stiffness() const;
-    // Restore the directions of the step's end after samples inside the step. `forget` discards the warm start for the
-    // next step.
-    void end_directions() const { if (collocates_) collocation_.take_directions_at(1.0); }
-    void forget() { collocation_.forget(); }
+    // Restore the directions of the step's end after samples inside the step. `reset_warm_start` discards the warm start
+    // for the next step.
+    void end_directions() const { if (collocates_) collocation_.set_directions_at(1.0); }
+    void reset_warm_start() { collocation_.reset_warm_start(); }
 
     // Rates of the step just taken, in order of time: at its start, at stages before its end, and at its end.
-    struct Look {
+    struct RateSample {
         double part;
         const VecX* rate;
     };
-    const std::vector<Look>& looks() const { return collocates_ ? collocation_looks_ : looks_; }
+    const std::vector<RateSample>& rate_samples() const { return collocates_ ? collocation_samples_ : rate_samples_; }
 
 private:
     void stand();
@@ -67,7 +67,7 @@ private:
     ErrorNorm& norm_;
     std::variant<std::monostate, RungeKutta, SemiImplicitEuler, OutsideStep> scheme_;
     Collocation collocation_;
-    std::vector<Look> looks_, collocation_looks_;
+    std::vector<RateSample> rate_samples_, collocation_samples_;
     bool has_interpolant_ = false, collocates_ = false;
 };
 

@@ -7,13 +7,13 @@ namespace pn {
 StepperChoice::StepperChoice(System& system, Stepper& stepper, Progress& progress, const Options& options)
     : w(system.w), system_(system), stepper_(stepper), progress_(progress), options_(options) {}
 
-void StepperChoice::look() {
+void StepperChoice::check_step() {
     is_stiff_ = options_.method.adaptive() && turning(system_) && stepper_.stiffness() > parameters.stiff_rate;
 }
 
 void StepperChoice::choose() {
-    stepper_.forget();
-    bool& seeks = w.state.seeks_directions;
+    stepper_.reset_warm_start();
+    bool& seeks = w.state.solves_directions;
     int& turning_steps = progress_.turning_steps;
     const double next = options_.method.adaptive() ? progress_.h : options_.dt;
     if (stepper_.collocates()) {

@@ -23,10 +23,10 @@ public:
     StepperChoice(System& system, Stepper& stepper, Progress& progress, const Options& options);
 
     // Check if stability limited the step just taken, whose end is evaluated.
-    void look();
+    void check_step();
     // Select the stepper of the next step.
     void choose();
-    void forget() { is_stiff_ = false; }
+    void reset() { is_stiff_ = false; }
 
 private:
     Workspace& w;

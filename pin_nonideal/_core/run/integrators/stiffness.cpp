@@ -10,19 +10,20 @@ namespace pn {
 
 StiffnessGuard::StiffnessGuard(System& system, Stepper& stepper, Progress& progress, const Options& options)
     : system_(system), stepper_(stepper), progress_(progress), options_(options),
-      most_steps_(options.max_steps > 0 ? static_cast<double>(options.max_steps) : parameters.usual_steps) {
-    forget();
+      max_steps_(options.max_steps > 0 ? static_cast<double>(options.max_steps) : parameters.usual_steps) {
+    reset();
 }
 
-void StiffnessGuard::forget() {
+void StiffnessGuard::reset() {
     start_time_ = Clock::now();
     steps_ = 0;
-    next_look_ahead_ = options_.hint && options_.max_steps == 0 ? parameters.first_look_ahead : parameters.no_look_ahead;
+    const bool estimates = options_.hint && options_.max_steps == 0;
+    next_estimate_steps_ = estimates ? parameters.first_estimate_steps : parameters.no_estimate_steps;
 }
 
 double StiffnessGuard::FastestMode::rate() const { return std::hypot(decay, frequency); }
 
-bool StiffnessGuard::FastestMode::decays() const { return decay > parameters.least_damping * rate(); }
+bool StiffnessGuard::FastestMode::decays() const { return decay > parameters.min_damping * rate(); }
 
 // Estimate the change of the rate with the state from two evaluations at the step's end: last stage, and result.
 double StiffnessGuard::stage_rate() const {
@@ -89,15 +90,15 @@ StiffnessGuard::FastestMode StiffnessGuard::mode_here() {
     return mode;
 }
 
-void StiffnessGuard::look() {
+void StiffnessGuard::check_step() {
     if (stepper_.method.stability == 0.0 || stepper_.collocates()) return;
-    look_for_border();
-    if (++steps_ == next_look_ahead_) look_ahead();
+    check_stability_limit();
+    if (++steps_ == next_estimate_steps_) estimate_remaining_time();
 }
 
-void StiffnessGuard::look_for_border() {
+void StiffnessGuard::check_stability_limit() {
     const double border = stepper_.method.stability, size = stepper_.h, at = stepper_.t0 + size;
-    if (!(options_.end() - at > most_steps_ * size)) return;
+    if (!(options_.end() - at > max_steps_ * size)) return;
     if (size * stage_rate() < parameters.near_border * border) {
         if (++progress_.quiet_steps == parameters.quiet_steps) progress_.stiff_steps = 0;
         return;
@@ -110,8 +111,8 @@ void StiffnessGuard::look_for_border() {
         throw Failure(Failure::Kind::stiff, at, {mode.dof}, mode.rate());
 }
 
-void StiffnessGuard::look_ahead() {
-    next_look_ahead_ = 2 * steps_;
+void StiffnessGuard::estimate_remaining_time() {
+    next_estimate_steps_ = 2 * steps_;
     const double size = stepper_.h, at = stepper_.t0 + size, left = options_.end() - at;
     const double so_far = std::chrono::duration<double>(Clock::now() - start_time_).count();
     if (so_far / static_cast<double>(steps_) * (left / size) < parameters.long_time) return;
@@ -120,16 +121,16 @@ void StiffnessGuard::look_ahead() {
     system_.w.counters = kept;
     const double radians = size * mode.rate();
     const bool follows =
-        mode.decays() ? radians > parameters.near_border * stepper_.method.stability && left < most_steps_ * size
+        mode.decays() ? radians > parameters.near_border * stepper_.method.stability && left < max_steps_ * size
                       : radians > parameters.part_of_period && mode.rate() * left > parameters.many_radians;
     if (!follows) return;
-    next_look_ahead_ = parameters.no_look_ahead;
+    next_estimate_steps_ = parameters.no_estimate_steps;
     options_.hint(at, mode.dof, mode.rate(), mode.decays());
 }
 
 void StiffnessGuard::require_time_steps(double size) {
     // Time stepping solves for slip directions together with the forces, so slow slip may turn arbitrarily fast.
-    system_.w.state.seeks_directions = true;
+    system_.w.state.solves_directions = true;
     const FastestMode mode = fastest_mode(parameters.difference_step);
     if (!(size * mode.rate() > parameters.euler_border && mode.decays())) return;
     const double shorter = fastest_mode(parameters.shorter_step).rate();

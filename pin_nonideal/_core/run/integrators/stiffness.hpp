@@ -21,14 +21,14 @@ struct StiffnessGuardParameters {
     double euler_border = 2.0;
     // Minimum decay of a mode that counts as decaying, relative to its rate. Other modes oscillate, and every method
     // must follow them.
-    double least_damping = 0.1;
+    double min_damping = 0.1;
     double difference_step = 1e-8;  // relative step of differences: root of the unit roundoff
     int power_passes = 20;          // passes of the power iteration
     // Shorter relative step, and minimum ratio of the rates by both steps. The rate of a jump, as of a load whose
     // contact point changes, grows as the step shrinks. It vanishes if the step does not reach the jump.
     double shorter_step = 1e-9, same_rate = 0.5;
     // Step count at which the remaining time is first estimated, doubled each time, and a step count past all runs.
-    long first_look_ahead = 500, no_look_ahead = 1L << 62;
+    long first_estimate_steps = 500, no_estimate_steps = 1L << 62;
     double long_time = 3.0;  // remaining wall time [s] from which a run is slow
     // A slow run vibrates if this phase [rad] is left, and if a step covers more than `part_of_period` [rad].
     double many_radians = 2e4, part_of_period = 0.1;
@@ -45,9 +45,9 @@ public:
     // Check stiffness after a step that the error control accepts. The workspace is evaluated at the step's end before
     // and after. Throw a Failure with the stiff dof and its rate [1/s]. Call the hint of the options if a fast motion
     // makes the run slow, but not endless.
-    void look();
+    void check_step();
     // Restart the step count for a new run.
-    void forget();
+    void reset();
     // Throw the same Failure at once if the fastest decaying mode is too fast for time steps of this size.
     void require_time_steps(double size);
 
@@ -59,8 +59,8 @@ private:
         bool decays() const;
     };
 
-    void look_for_border();
-    void look_ahead();
+    void check_stability_limit();
+    void estimate_remaining_time();
     // Return the fastest mode at the step's end. The workspace is evaluated at the step's end before and after.
     FastestMode mode_here();
     double stage_rate() const;
@@ -71,9 +71,9 @@ private:
     Stepper& stepper_;
     Progress& progress_;
     const Options& options_;
-    const double most_steps_;
+    const double max_steps_;
     Clock::time_point start_time_;
-    long steps_, next_look_ahead_;
+    long steps_, next_estimate_steps_;
     VecX probe_, probe_rate_;
 };
 

@@ -16,7 +16,7 @@
 namespace pn {
 
 // Maximum force / limit ratio of a contact. A contact whose load jumps to zero has opened.
-constexpr double most_share = 10.0;
+constexpr double max_load_ratio = 10.0;
 
 System::System(const Program& program, Workspace& workspace, bool with_energy)
     : p(program), w(workspace), energy(with_energy), nq(p.mechanism.nq), nv(p.mechanism.nv), nz(p.states),
@@ -25,7 +25,7 @@ System::System(const Program& program, Workspace& workspace, bool with_energy)
       q(VecX::Zero(nq)), v(VecX::Zero(nv)), q_before_(q) {}
 
 bool System::stands(const VecX& y, const VecX& dy) const {
-    const bool in_time = p.asks_functions || p.moves_in_time || p.torque_table() != nullptr;
+    const bool in_time = p.calls_functions || p.moves_in_time || p.torque_table() != nullptr;
     return !in_time && (velocity(y).array() == 0.0).all() && (dy.head(ns).array() == 0.0).all();
 }
 
@@ -63,13 +63,13 @@ void System::write_rate(double t, VecX& dy, bool locates_events) {
     if (nz > 0) dy.segment(nq + nv, nz) = w.now.dz;
     if (energy) powers(p, w, v, dy.data() + nq + nv + nz);
     if (!locates_events) return;
-    if (!w.now.loaded.empty()) watch(t, dy);
-    if (!w.now.touching.empty()) watch_loads(dy);
+    if (!w.now.loaded_elements.empty()) watch(t, dy);
+    if (!w.now.closed_gaps.empty()) watch_loads(dy);
 }
 
 void System::watch(double t, VecX& dy) {
     std::fill_n(dy.data() + ns, std::min(active() - ns, 2 * ne), 0.0);
-    for (int e : w.now.loaded) {
+    for (int e : w.now.loaded_elements) {
         double *of_element = dy.data() + ns + 2 * e, &share = of_element[0], &rate = of_element[1];
         if (slips(w.state.mode[e])) {
             const auto [speed, change] = slip_toward_rest(p, w, e);
@@ -79,7 +79,7 @@ void System::watch(double t, VecX& dy) {
             const auto [force, limit] = holding_force(p, w, e, t, q, v);
             // The force along one direction keeps its sign: it is smooth through zero.
             share = (p.frictions[e].dim == 1 ? force[0] : force.norm()) / std::max(limit, min_scale);
-            if (p.frictions[e].gap >= 0) share = std::clamp(share, -most_share, most_share);
+            if (p.frictions[e].gap >= 0) share = std::clamp(share, -max_load_ratio, max_load_ratio);
         }
     }
 }
@@ -87,7 +87,7 @@ void System::watch(double t, VecX& dy) {
 void System::watch_loads(VecX& dy) {
     double* loads = dy.data() + ns + 2 * ne;
     std::fill_n(loads, ng, 0.0);
-    for (int i : w.now.touching) {
+    for (int i : w.now.closed_gaps) {
         if (p.blocks[p.gaps[i].block].kept.empty()) continue;
         if (!w.now.rows.redundant) loads[i] = w.now.lam[p.blocks[p.gaps[i].block].row];
         else loads[i] = reactions(p, w).loads_are_feasible ? 1.0 : -1.0;
@@ -118,41 +118,37 @@ void System::project_and_evaluate(double t, VecX& y, VecX& dy) {
         kinetic_energy(p.mechanism, w.now.terms, v) + potential_energy(p.mechanism, w.now.terms) - before;
 }
 
-// Call `act` at the end of a time step whose modes may allow no motion. If they allow none and the run `goes_through`,
-// the friction of the step determines the motion. In other runs it does so only if the solver found no motion of
-// contacts, which proves nothing. Return false if the friction of the step determines the motion.
+// Call `act` at the end of a time step whose modes may allow no motion. If they allow none, the friction of the step
+// determines the motion: always with `may_lack_motion`, else only if the solver found no motion of contacts, which proves
+// nothing. Return false if the friction of the step determines the motion.
 template <class Act>
-bool System::go_through(double t, bool goes_through, const Act& act) {
-    try {
-        act();
-        return true;
-    } catch (const Failure& failure) {
-        const bool of_modes = failure.kind == Failure::Kind::paradox || failure.kind == Failure::Kind::not_converged;
-        const bool undecided = failure.solutions == Failure::Solutions::not_told && ng > 0;
-        if (!of_modes || !(goes_through || undecided)) throw;
-        if (goes_through) {
-            w.now.no_motion = true;
-            w.now.several_element = failure.elements.empty() ? 0 : failure.elements.front();
-        }
-        solve_with_step_friction(p, w, t, q, v);
-        return false;
+bool System::attempt_motion(double t, bool may_lack_motion, const Act& act) {
+    const auto failure = attempt({Failure::Kind::paradox, Failure::Kind::not_converged}, act);
+    if (!failure) return true;
+    const bool undecided = failure->solutions == Failure::Solutions::unproven && ng > 0;
+    if (!(may_lack_motion || undecided)) throw *failure;
+    if (may_lack_motion) {
+        w.now.no_motion = true;
+        w.now.several_element = failure->elements.empty() ? 0 : failure->elements.front();
     }
+    solve_with_step_friction(p, w, t, q, v);
+    return false;
 }
 
-void System::evaluate_step_end(double t, const VecX& y, VecX& dy, bool goes_through) {
+void System::evaluate_step_end(double t, const VecX& y, VecX& dy, bool may_lack_motion) {
     read(y);
     read_law_states(y);
     w.now.no_motion = false;
     begin_rows(p, w, t, q, v);
     // Closed contacts that others hold apart may contradict each other.
-    const bool found = go_through(t, goes_through, [&] {
+    const bool found = attempt_motion(t, may_lack_motion, [&] {
         assemble_forces(p, w, t, v);
         solve_dynamics(p, w, t, v);
     });
-    write_rate(t, dy, found && !goes_through);
+    write_rate(t, dy, found && !may_lack_motion);
 }
 
-void System::settle(double t, VecX& y, VecX& dy, bool evaluates, bool goes_through) {
+void System::settle(double t, VecX& y, VecX& dy, bool evaluates, bool may_lack_motion) {
     read(y);
     read_law_states(y);
     numerical_energy = 0.0;
@@ -172,7 +168,7 @@ void System::settle(double t, VecX& y, VecX& dy, bool evaluates, bool goes_throu
     bool moved = project_position(p, w, t, q, v, true, !evaluates);
     if (longest_single > 0.0 && left_planes(p, w, longest_single)) {
         q = q_before_;
-        chosen = move_out(p, w, t, q, v);
+        chosen = depenetrate(p, w, t, q, v);
         project_position(p, w, t, q, v, true, !evaluates);
         moved = true;
     }
@@ -182,10 +178,10 @@ void System::settle(double t, VecX& y, VecX& dy, bool evaluates, bool goes_throu
     if (past_sticking || (moved && evaluates)) chosen = configure_step(p, w);
     moved |= past_sticking;
     const bool found =
-        go_through(t, goes_through, [&] { moved |= begin_step_on_rates(p, w, t, v, chosen, evaluates); });
+        attempt_motion(t, may_lack_motion, [&] { moved |= begin_step_on_rates(p, w, t, v, chosen, evaluates); });
     moved |= !found;
     write(y);
-    if (evaluates) write_rate(t, dy, found && !goes_through);
+    if (evaluates) write_rate(t, dy, found && !may_lack_motion);
     if (moved && energy) numerical_energy = total() - before;
 }
 

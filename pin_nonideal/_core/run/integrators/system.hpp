@@ -24,7 +24,7 @@ struct System {
     // Project the stages first. Near a singular position the motion off the constraints differs wildly from the motion
     // on them. The projected equation y' = f(P(y)) has the same solutions without this difference.
     bool on_constraints = false;
-    bool seeks_directions = true;  // steps can solve for slip directions that slow slip does not define
+    bool can_solve_directions = true;  // steps can solve for slip directions that slow slip does not define
     double smallest_pivot = 1.0;  // smallest pivot of the rows' factor since the last reset
     double numerical_energy = 0.0;  // energy change by the last projection of a step's end [J], if the ledger is kept
     const int nq, nv, nz, nw, ne, ng, ns, ny;  // sizes of q, v, z, work, elements, gaps, y without watch, y
@@ -36,11 +36,11 @@ struct System {
     // Check if the scene has elements, gaps or contacts that can cause events.
     bool has_events() const { return ne > 0 || ng > 0 || !p.contacts.empty(); }
     // Check if an element or gap is active in the current modes, and therefore watched.
-    bool watches() const { return !w.now.loaded.empty() || !w.now.touching.empty(); }
+    bool watches() const { return !w.now.loaded_elements.empty() || !w.now.closed_gaps.empty(); }
     // Number of leading entries of a state or rate in use. The entries behind belong to open contacts.
     int active() const {
-        if (!w.now.touching.empty()) return ny;
-        return w.now.loaded.empty() ? ns : ns + 2 * (w.now.loaded.back() + 1);
+        if (!w.now.closed_gaps.empty()) return ny;
+        return w.now.loaded_elements.empty() ? ns : ns + 2 * (w.now.loaded_elements.back() + 1);
     }
     // Check if y stays the same in a step that starts with this rate: nothing moves, and nothing depends on time.
     bool stands(const VecX& y, const VecX& dy) const;
@@ -63,11 +63,11 @@ struct System {
     // Project a step's end onto the constraints, and evaluate the projected state for the next step.
     void project_and_evaluate(double t, VecX& y, VecX& dy);
     // Project the end of a step of time stepping, whose modes have just been set. Evaluate only if `evaluates`.
-    // `goes_through`: the run locates no events, and if these modes have no motion, slipping elements keep the friction of
-    // the step.
-    void settle(double t, VecX& y, VecX& dy, bool evaluates, bool goes_through);
+    // `may_lack_motion`: the run locates no events, and if these modes have no motion, slipping elements keep the
+    // friction of the step.
+    void settle(double t, VecX& y, VecX& dy, bool evaluates, bool may_lack_motion);
     // Evaluate the projected end of such a step.
-    void evaluate_step_end(double t, const VecX& y, VecX& dy, bool goes_through);
+    void evaluate_step_end(double t, const VecX& y, VecX& dy, bool may_lack_motion);
     // Check if y needs no projection. The quantities of a sample at y are then evaluated.
     bool is_on_constraints(double t, const VecX& y);
     void normalize(VecX& y) const;
@@ -80,7 +80,7 @@ private:
     void watch_loads(VecX& dy);
     double energy_at(const VecX& y);
     template <class Act>
-    bool go_through(double t, bool goes_through, const Act& act);
+    bool attempt_motion(double t, bool may_lack_motion, const Act& act);
 
     VecX q_before_;
 };

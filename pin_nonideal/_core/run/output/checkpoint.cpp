@@ -21,12 +21,12 @@ void fields(Archive& a, Modes& x) {
 }
 
 static void fields(Archive& a, RunState& x) {
-    auto& [mode, closed, slip_direction, last_direction, is_sticking_deferred, seeks_directions, is_hyperstatic,
+    auto& [mode, closed, slip_direction, last_direction, is_sticking_deferred, solves_directions, is_hyperstatic,
            rank_tolerance, z, held_torque, has_held, unknown, warm, percussion, third_order_lam, has_ideal_row_choice,
-           unique, growth, steps_since] = x;
-    a(mode, closed, slip_direction, last_direction, is_sticking_deferred, seeks_directions, is_hyperstatic,
+           unique, spectral_bound, steps_since] = x;
+    a(mode, closed, slip_direction, last_direction, is_sticking_deferred, solves_directions, is_hyperstatic,
       rank_tolerance, z, held_torque, has_held, unknown, warm, percussion, third_order_lam, has_ideal_row_choice, unique,
-      growth, steps_since);
+      spectral_bound, steps_since);
 }
 
 static void fields(Archive& a, TravelState& x) {
@@ -37,21 +37,23 @@ static void fields(Archive& a, TravelState& x) {
 }
 
 static void fields(Archive& a, GapState& x) {
-    auto& [width, rate, separation, near, far, way, turn, apart, travel, ask, current, near_gaps, blocked_since,
-           retry_time] = x;
-    a(width, rate, separation, near, far, way, turn, apart, ask, current, blocked_since, retry_time);
+    auto& [width, rate, separation, monitored, skipped, path_length, turn, distance, travel, recheck_travel, current,
+           monitored_gaps, blocked_since, retry_time] = x;
+    a(width, rate, separation, monitored, skipped, path_length, turn, distance, recheck_travel, current, blocked_since,
+      retry_time);
     fields(a, travel);
-    x.find_near();
+    x.list_monitored();
 }
 
 static void fields(Archive& a, Progress& x) {
     auto& [t, h, y, rate, configured_t, configured_y, numerical_energy, samples, next_period, detected_break,
            recent_event_times, mode_change_times, event_signs, bridged_time, bridged_end, slip_at_start, in_tension, gaps,
-           forced_switch_time, impact_energy, several_motions, stiff_steps, quiet_steps, rounding, next_look, growth_times,
-           growth_speeds, growth_steps, is_stationary, has_forces, turning_steps, may_hand_over, hand_over_time] = x;
+           forced_switch_time, impact_energy, several_motions, stiff_steps, quiet_steps, rounding, next_rounding_check,
+           growth_times, growth_speeds, growth_steps, is_stationary, has_forces, turning_steps, may_hand_over,
+           hand_over_time] = x;
     a(t, h, y, rate, configured_t, configured_y, numerical_energy, samples, next_period, detected_break, event_signs,
       bridged_time, bridged_end, slip_at_start, in_tension, forced_switch_time, impact_energy, several_motions, stiff_steps,
-      quiet_steps, rounding, next_look, is_stationary, has_forces, turning_steps, may_hand_over, hand_over_time);
+      quiet_steps, rounding, next_rounding_check, is_stationary, has_forces, turning_steps, may_hand_over, hand_over_time);
     fields(a, gaps);
     a.list(recent_event_times);
     a.list(growth_times);
@@ -141,11 +143,8 @@ void from_bytes(const std::string& bytes, System& system, Progress& progress, Re
         a.require(static_cast<size_t>(e.kind) < std::size(event_kinds) && e.element >= 0 && e.element < known);
     }
     a.require(progress.samples >= 0 && progress.next_period >= 0);
-    try {
-        evaluate_anew(system, progress);
-    } catch (const Failure&) {
-        a.require(false);  // no run has been in such a state
-    }
+    const auto failure = attempt([&] { evaluate_anew(system, progress); });
+    a.require(!failure);  // no run has been in a state that cannot be evaluated
 }
 
 std::string state_layout() {

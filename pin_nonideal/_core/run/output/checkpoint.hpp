@@ -32,7 +32,7 @@ struct Progress {
     bool several_motions = false;  // several motions are possible, which was recorded
     long stiff_steps = 0, quiet_steps = 0;  // steps near the stability limit, steps away from it since
     VecX rounding;          // last measured rounding of the rates, scaled to the tolerances that it requires
-    long next_look = 0;     // step number of the next measurement of rounding
+    long next_rounding_check = 0;     // step number of the next measurement of rounding
     // Decades of the largest speed: time, value and number of steps when it was reached.
     std::vector<double> growth_times, growth_speeds;
     std::vector<long> growth_steps;

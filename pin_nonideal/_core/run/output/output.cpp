@@ -30,7 +30,7 @@ void Output::emit(double at, const VecX& state, bool evaluated) {
     jumps_ = false;
     const GapState& gaps = progress_.gaps;
     recorder_.sample(at, state, {progress_.impact_energy, progress_.numerical_energy}, evaluated,
-                     gaps.current ? &gaps.far : nullptr);
+                     gaps.current ? &gaps.skipped : nullptr);
 }
 
 void Output::before_jump() {
@@ -46,10 +46,10 @@ void Output::configured_now() {
     progress_.configured_y.head(system_.ns) = progress_.y.head(system_.ns);
 }
 
-void Output::end_step(bool asked) {
+void Output::end_step(bool is_needed) {
     const double t = progress_.t;
     const bool on_grid = options_.output_dt > 0.0 && std::abs(next() - t) <= same_time(t);
-    if (!asked && options_.output_dt != 0.0 && !on_grid && t < options_.end()) return;
+    if (!is_needed && options_.output_dt != 0.0 && !on_grid && t < options_.end()) return;
     progress_.samples += on_grid;
     if (stepper_.has_interpolant() && !system_.has_events()) {  // the workspace may be inside the step
         system_.read(progress_.y);
@@ -66,10 +66,10 @@ void Output::end_time_step(double rounding) {
     if (options_.output_dt == 0.0 || on_grid || t >= options_.end()) now();
 }
 
-template <class Look>
-void Output::look_inside(const Look& look) {
+template <class Visit>
+void Output::evaluate_inside(const Visit& visit) {
     kept_ = w.state;
-    look();
+    visit();
     w.state = kept_;
     system_.read(progress_.y);
     evaluate(p, w, progress_.t, system_.q, system_.v);
@@ -77,7 +77,7 @@ void Output::look_inside(const Look& look) {
 }
 
 void Output::keep_step() {
-    if (options_.record.dense) look_inside([&] { dense_.step(progress_.numerical_energy); });
+    if (options_.record.dense) evaluate_inside([&] { dense_.step(progress_.numerical_energy); });
 }
 
 void Output::keep_time_step(double from, const VecX& y_from) {
@@ -98,7 +98,7 @@ void Output::emit_between(double at) {
         progress_.configured_t = at;
         progress_.configured_y.head(system_.ns) = sample_.head(system_.ns);
     }
-    forget_slip_directions(w);
+    reset_slip_directions(w);
     emit(at, sample_, false);
     if (redundant) choose_as_before(at);
 }
@@ -129,7 +129,7 @@ void Output::inside_step(std::optional<double> between) {
         if (between) emit_between(*between);
     };
     if (!system_.has_events()) return emit_samples();
-    look_inside(emit_samples);  // modes and directions of slip follow from the evaluation at the step's end
+    evaluate_inside(emit_samples);  // modes and directions of slip follow from the evaluation at the step's end
     configured_now();
 }
 

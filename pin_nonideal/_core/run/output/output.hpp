@@ -19,8 +19,8 @@ public:
     void before_jump();
     // Record the current state, at which the workspace is evaluated.
     void now();
-    // Record a sample at the end of a step without mode changes, if one is due or `asked` is true.
-    void end_step(bool asked);
+    // Record a sample at the end of a step without mode changes, if one is due or `is_needed` is true.
+    void end_step(bool is_needed);
     // Record a sample at the end of a step of time stepping if one is due, up to the rounding of the end.
     void end_time_step(double rounding);
     // Record samples of the grid inside the step just taken, and one at the time `between`.
@@ -37,10 +37,10 @@ private:
     // Record a sample inside the step just taken, from its interpolant. Leaves the workspace at the sample.
     void emit_between(double at);
     void choose_as_before(double at);
-    // Call `look`, which may leave the workspace at any state of the step just taken, then restore the workspace at the
+    // Call `visit`, which may leave the workspace at any state of the step just taken, then restore the workspace at the
     // step's end.
-    template <class Look>
-    void look_inside(const Look& look);
+    template <class Visit>
+    void evaluate_inside(const Visit& visit);
 
     const Program& p;
     Workspace& w;

@@ -50,10 +50,10 @@ static void hold(const Program& p, Workspace& w, const InsideStates& inside, siz
 }
 
 // Set the slip directions of a state: from the step's polynomial if the step solved for them, else from the slip.
-static void take_directions(const Program& p, Workspace& w, const System& system, const InsideStates& inside, size_t k) {
+static void set_directions(const Program& p, Workspace& w, const System& system, const InsideStates& inside, size_t k) {
     RunState& state = w.state;
-    state.seeks_directions = false;
-    forget_slip_directions(w);
+    state.solves_directions = false;
+    reset_slip_directions(w);
     const VecX& directions = inside.directions[k];
     for (int e = 0; e < directions.size() / 3; ++e)
         state.last_direction[e] = directions.segment<3>(3 * e).stableNormalized();
@@ -65,7 +65,7 @@ static void take_directions(const Program& p, Workspace& w, const System& system
         if (!sought[e] && u.norm() > min_directed_speed * (1.0 + system.v.cwiseAbs().maxCoeff()))
             state.last_direction[e] = u.normalized();
     }
-    state.seeks_directions = true;
+    state.solves_directions = true;
 }
 
 void sample_inside(const Program& p, Workspace& w, const InsideStates& inside, const RecordOptions& options,
@@ -79,7 +79,7 @@ void sample_inside(const Program& p, Workspace& w, const InsideStates& inside, c
         enter_stretch(p, w, inside.t[k], inside.end);
         hold(p, w, inside, k);
         system.read(y);
-        take_directions(p, w, system, inside, k);
+        set_directions(p, w, system, inside, k);
         system.read_law_states(y);
         configure(p, w, inside.t[k], system.q, system.v);
         choose_rows_near(p, w, inside.t[k], system.q, system.v);

@@ -15,14 +15,14 @@ namespace {
 // Check if another step from the same state may have another result. Reasons are time, user functions, or steps of
 // another method in between.
 bool may_differ(const Program& p, const Options& options) {
-    return options.method.scheme != Method::Scheme::moreau || p.asks_functions || p.moves_in_time || options.callback ||
+    return options.method.scheme != Method::Scheme::moreau || p.calls_functions || p.moves_in_time || options.callback ||
            std::holds_alternative<SampledTorque>(p.actuation) || p.torque_table() != nullptr;
 }
 
 // Check if accelerations and forces are needed at the end of every step.
-bool asks_always(const Program& p, const Options& options) {
+bool needs_forces_always(const Program& p, const Options& options) {
     return options.method.scheme != Method::Scheme::moreau || options.output_dt == 0.0 || options.record.dense ||
-           options.callback || options.save || !options.events.empty() || !p.contacts.empty() || p.asks_functions;
+           options.callback || options.save || !options.events.empty() || !p.contacts.empty() || p.calls_functions;
 }
 
 }  // namespace
@@ -33,7 +33,7 @@ TimeStepping::TimeStepping(System& system, Progress& progress, GapWatch& watch, 
     : p(system.p), w(system.w), system_(system), progress_(progress), options_(options), torques_(torques),
       output_(output), warnings_(warnings), value_events_(value_events), out_(out), moreau_(system),
       moreau_contacts_(system, watch), is_autonomous_(!may_differ(system.p, options)),
-      always_evaluated_(asks_always(system.p, options)) {}
+      always_evaluated_(needs_forces_always(system.p, options)) {}
 
 // End of a step of this size: at a stop, a jump of the actuation or a due sample before it. Times that differ only by
 // rounding are one end, the latest of them.
@@ -61,7 +61,7 @@ bool TimeStepping::rests() const {
 
 // Check if accelerations and forces are needed at the step's end: by a sample, by the end of the run, or by slip. Slip
 // needs them if its direction or limit depends on them.
-bool TimeStepping::asks_for_motion(double end, double t_end) const {
+bool TimeStepping::needs_forces(double end, double t_end) const {
     if (always_evaluated_ || end >= t_end || end >= options_.end() || output_.next() <= end + rounding_)
         return true;
     return system_.ng == 0 && std::any_of(w.now.slipping.begin(), w.now.slipping.end(), [&](int e) {
@@ -70,7 +70,7 @@ bool TimeStepping::asks_for_motion(double end, double t_end) const {
 }
 
 // Take as much of a step to `end` as approaching edges allow, in a scene with unilateral contacts.
-void TimeStepping::take_part(double end, double t_end, double least) {
+void TimeStepping::step_part(double end, double t_end, double least) {
     double& t = progress_.t;
     const double left = end - t, h = std::max(moreau_contacts_.allowed(t, left, progress_.y), least);
     const bool whole = h >= (1.0 - parameters.min_remainder) * left;
@@ -82,32 +82,32 @@ void TimeStepping::take_part(double end, double t_end, double least) {
         out_.events.back().miss = relaxed.miss;
     }
     misses_laws_ = relaxed.block >= 0;
-    const bool asks = progress_.has_forces = whole && asks_for_motion(end, t_end);
+    const bool needs_forces_here = progress_.has_forces = whole && needs_forces(end, t_end);
     if (moreau_contacts_.project(t, progress_.y, progress_.numerical_energy)) {
-        if (asks) system_.evaluate_step_end(t, progress_.y, progress_.rate, true);
+        if (needs_forces_here) system_.evaluate_step_end(t, progress_.y, progress_.rate, true);
         return;
     }
-    system_.settle(t, progress_.y, progress_.rate, asks, true);
+    system_.settle(t, progress_.y, progress_.rate, needs_forces_here, true);
     progress_.numerical_energy += system_.numerical_energy;
 }
 
 // A step that starts and ends at rest with the same contacts and modes leaves the state unchanged.
-void TimeStepping::take_with_contacts(double end, double t_end) {
-    const double least = parameters.least_cut * (end - progress_.t);
+void TimeStepping::step_with_contacts(double end, double t_end) {
+    const double least = parameters.min_cut * (end - progress_.t);
     const bool may_stand = is_autonomous_ && (system_.velocity(progress_.y).array() == 0.0).all();
     if (may_stand) {
         y_from_ = progress_.y;
         before_step_ = w.state.mode;
         closed_before_step_ = w.state.closed;
     }
-    while (progress_.t < end) take_part(end, t_end, least);
+    while (progress_.t < end) step_part(end, t_end, least);
     progress_.is_stationary = may_stand && !misses_laws_ && progress_.y == y_from_ &&
                               same_bytes<Mode>(before_step_, w.state.mode) &&
                               same_bytes(closed_before_step_, w.state.closed);
 }
 
 void TimeStepping::take(double end, double t_end) {
-    if (system_.ng > 0) return take_with_contacts(end, t_end);
+    if (system_.ng > 0) return step_with_contacts(end, t_end);
     double& t = progress_.t;
     VecX &y = progress_.y, &y_from = y_from_;
     const bool was_at_rest = rests();
@@ -122,7 +122,7 @@ void TimeStepping::take(double end, double t_end) {
     const bool held = was_at_rest && std::equal(before.begin(), before.end(), w.state.mode.begin());
     if (!held) {
         const bool bridges = options_.method.scheme != Method::Scheme::moreau;
-        system_.settle(t, y, progress_.rate, asks_for_motion(end, t_end), bridges);
+        system_.settle(t, y, progress_.rate, needs_forces(end, t_end), bridges);
         progress_.numerical_energy += system_.numerical_energy;
         return;
     }
@@ -144,7 +144,7 @@ void TimeStepping::begin(double size) {
     system_.read(progress_.y);
     std::vector<char> closed = system_.touching.at(p, w, progress_.t, system_.q, system_.v, true).rest;
     set_closed(p, w, closed);
-    moreau_contacts_.forget();
+    moreau_contacts_.reset();
     VecX y = progress_.y;
     double numerical_energy = 0.0, impact_energy = 0.0;
     moreau_contacts_.step(progress_.t, size, y, numerical_energy, impact_energy);
@@ -152,7 +152,7 @@ void TimeStepping::begin(double size) {
     const std::vector<Mode> modes = w.state.mode;
     set_closed(p, w, closed);
     system_.read(progress_.y);
-    ModeQuestion first = first_question(p, w, progress_.t, system_.q, system_.v);
+    ModeQuery first = make_first_mode_query(p, w, progress_.t, system_.q, system_.v);
     for (int e : first.at_rest) first.modes[e] = modes[e];
     set_contacts(p, w, closed, first.modes);
     system_.evaluate_step_end(progress_.t, progress_.y, progress_.rate, true);
@@ -172,7 +172,7 @@ void TimeStepping::step(double size, double stop, double t_end) {
         open_before_ = !watched;
     }
     const VecX y_from = options_.record.dense ? y : VecX();
-    if (!progress_.is_stationary || (!progress_.has_forces && asks_for_motion(end, t_end))) take(end, t_end);
+    if (!progress_.is_stationary || (!progress_.has_forces && needs_forces(end, t_end))) take(end, t_end);
     t = end;
     ++out_.steps;
     output_.configured_now();
@@ -182,8 +182,8 @@ void TimeStepping::step(double size, double stop, double t_end) {
     warnings_.pulls(std::nullopt);
     warnings_.several(false);
     output_.keep_time_step(from, y_from);
-    value_events_.look_at_end(t, y);
-    value_events_.tell(t, out_.events);
+    value_events_.sample_end(t, y);
+    value_events_.append_events(t, out_.events);
     if (!value_events_.found().empty()) output_.now();
     output_.end_time_step(rounding_);
 }

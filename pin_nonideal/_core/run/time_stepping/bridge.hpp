@@ -14,7 +14,7 @@ struct BridgeParameters {
     // Shortest remainder of a step that becomes a step of its own, relative to the step.
     double min_remainder = 1e-9;
     // Shortest part of a step while edges approach each other, relative to the step.
-    double least_cut = 1e-3;
+    double min_cut = 1e-3;
 };
 
 class TimeStepping {
@@ -33,9 +33,9 @@ public:
 private:
     bool rests() const;
     void take(double end, double t_end);
-    void take_with_contacts(double end, double t_end);
-    void take_part(double end, double t_end, double least);
-    bool asks_for_motion(double end, double t_end) const;
+    void step_with_contacts(double end, double t_end);
+    void step_part(double end, double t_end, double least);
+    bool needs_forces(double end, double t_end) const;
     double end_of_step(double size, double stop, double t_end) const;
 
     const Program& p;

@@ -33,7 +33,7 @@ bool ContactProjection::pose(const Program& p, Workspace& w, bool sticks) {
     elements_.clear();
     gap_.clear();
     const auto kept = [&](int e) { return static_cast<int>(p.blocks[p.frictions[e].block].kept.size()); };
-    for (int i : w.now.touching) {
+    for (int i : w.now.closed_gaps) {
         const Gap& gap = p.gaps[i];
         if (is_bare(p, i)) continue;
         add(gap.block, 1, false);
@@ -41,7 +41,7 @@ bool ContactProjection::pose(const Program& p, Workspace& w, bool sticks) {
         if (sticks && gap.sliding >= 0 && w.state.mode[gap.sliding] == sticking)
             add(p.frictions[gap.sliding].block, kept(gap.sliding), true);
     }
-    for (int e : w.now.loaded) {
+    for (int e : w.now.loaded_elements) {
         const int gap = p.frictions[e].gap;
         const bool slides = gap >= 0 && p.gaps[gap].sliding == e && !is_bare(p, gap);
         if (sticks && !slides && w.state.mode[e] == sticking && kept(e) > 0) add(p.frictions[e].block, kept(e), false);
@@ -65,7 +65,7 @@ bool ContactProjection::close_gaps(const Program& p, Workspace& w, double t, Vec
         retract(p.mechanism, q_from_.data(), move_.data(), q.data());
         for (const auto& flyer : flyers_) flyer.turn_axes(v, move_.segment<3>(flyer.dof + 3));
         place_bodies(p.mechanism, w.now.terms, q);
-        for (int i : w.now.touching) measure_gap(p, w, t, v, i);
+        for (int i : w.now.closed_gaps) measure_gap(p, w, t, v, i);
         moves = true;
     }
     return moves;
@@ -74,7 +74,7 @@ bool ContactProjection::close_gaps(const Program& p, Workspace& w, double t, Vec
 // Check if a closed contact is left open or penetrates.
 bool ContactProjection::is_open(const Program& p, const Workspace& w) const {
     const double allowed = max_projected_gap * scene_size(p, w);
-    return std::any_of(w.now.touching.begin(), w.now.touching.end(),
+    return std::any_of(w.now.closed_gaps.begin(), w.now.closed_gaps.end(),
                        [&](int i) { return !is_bare(p, i) && std::abs(gap_width(p, w, i)) > allowed; });
 }
 
@@ -82,9 +82,9 @@ bool ContactProjection::is_open(const Program& p, const Workspace& w) const {
 bool ContactProjection::open_blocked_contacts(const Program& p, Workspace& w) {
     const double allowed = max_projected_gap * scene_size(p, w);
     const auto is_apart = [&](int i) { return !is_bare(p, i) && gap_width(p, w, i) > allowed; };
-    if (std::none_of(w.now.touching.begin(), w.now.touching.end(), is_apart)) return false;
+    if (std::none_of(w.now.closed_gaps.begin(), w.now.closed_gaps.end(), is_apart)) return false;
     closed_ = w.state.closed;
-    for (int i : w.now.touching)
+    for (int i : w.now.closed_gaps)
         if (is_apart(i)) closed_[i] = 0;
     set_closed(p, w, closed_);
     return true;

@@ -8,7 +8,7 @@
 namespace pn {
 
 struct EndModeParameters {
-    double most_stopped = 1e-6;  // slip of an element that stops, relative to 1 + the largest velocity
+    double max_stopped_slip = 1e-6;  // slip of an element that stops, relative to 1 + the largest velocity
 };
 
 class EndModes {
@@ -22,7 +22,7 @@ public:
     // Check if a slip is zero up to rounding.
     bool is_rest(double slip) const { return slip <= still_; }
     // Check if a slip is so slow that an element stops if its force can hold it.
-    bool is_stopped(double slip) const { return slip <= parameters.most_stopped * fastest_; }
+    bool is_stopped(double slip) const { return slip <= parameters.max_stopped_slip * fastest_; }
     // Check if a slip misses rest by less than the force misses its limit, each relative to its scale. A solution that
     // meets neither condition then sticks.
     bool is_nearer_to_rest(double slip, double force, double limit) const {

@@ -45,9 +45,9 @@ JointDrives::Step::Step(const JointDrives& drives, const Program& p, Workspace& 
     step.inertia.resize(v0.size());
     step.force.setZero(v0.size());
     if (!now_.has_override && !p.limits_effort()) return;
-    if (!now_.has_override) asked_torque(p, w, t, q0, v0, now_.tau);
+    if (!now_.has_override) demanded_torque(p, w, t, q0, v0, now_.tau);
     for (int dof = 0; dof < v0.size(); ++dof) {
-        if (!now_.has_override && now_.tau[dof] > p.least_effort[dof] && now_.tau[dof] < p.most_effort[dof]) continue;
+        if (!now_.has_override && now_.tau[dof] > p.min_effort[dof] && now_.tau[dof] < p.max_effort[dof]) continue;
         step.stiffness[dof] -= drives.kp_[dof];
         step.damping[dof] -= drives.kd_[dof];
     }

@@ -100,7 +100,7 @@ void Moreau::pose_problem() {
         const Block& block = p.blocks[friction.block];
         mean_.start_rates(p, w, friction.block);
         for (int k = 0; k < friction.dim; ++k)
-            problem_.alpha0[at++] += w.scratch.r[block.row + k] / h_ + 0.5 * w.now.values[friction.block].drift[k];
+            problem_.alpha0[at++] += w.scratch.r[block.row + k] / h_ + 0.5 * w.now.values[friction.block].bias[k];
     }
 }
 
@@ -149,9 +149,9 @@ void Moreau::solve_friction(double t) {
         const double change = update_limits(t);
         const double largest = system_.ne > 0 ? std::max(0.0, limit_.size.maxCoeff()) : 0.0;
         const bool stalls = change > parameters.min_load_decrease * last_change &&
-                            change <= parameters.stalled_load_tolerance * largest;
+                            change <= parameters.stall_load_tolerance * largest;
         last_change = change;
-        if (pass > 0 && (change <= parameters.element_load_tolerance * largest || stalls || !p.needs_reactions)) return;
+        if (pass > 0 && (change <= parameters.load_tolerance * largest || stalls || !p.needs_reactions)) return;
         if (!symmetric_limits_) force_ = friction_program(problem_.W, problem_.alpha0, problem_.dims, limit_);
         else if (problem_.rows > 0 && boxes_)
             box_.solve(problem_.W, problem_.alpha0, limit_.size, &initial_force_, force_);
@@ -178,7 +178,7 @@ void Moreau::end_velocity() {
         if (dim == 1) shifted_[0] -= force_limit_.middle[at];
         const double slip = alpha_.segment(at, dim).norm();
         const bool rests = end.is_rest(h_ * slip) && slip <= rounding;
-        const bool holds = shifted_.norm() < force_limit_[e] * (1.0 - parameters.box_force_rounding);
+        const bool holds = shifted_.norm() < force_limit_[e] * (1.0 - parameters.limit_rounding);
         modes_[e] = EndModes::settle(holds || rests, dim > 1 || alpha_[at] > 0.0, p.blocks[p.frictions[e].block], v1_);
     }
 }

@@ -19,12 +19,12 @@
 namespace pn {
 
 struct MoreauParameters {
-    double element_load_tolerance = 1e-13;  // change of limits that counts as rounding, relative to the largest limit
+    double load_tolerance = 1e-13;  // change of limits that counts as rounding, relative to the largest limit
     // Change of limits that counts as rounding if a pass no longer halves it: loads of long chains have more
     // rounding.
-    double stalled_load_tolerance = 1e-9, min_load_decrease = 0.5;
-    double box_force_rounding = 1e-12;  // distance of a force at its limit, relative to the limit
-    double slip_rest_rounding = 1e-9;   // slip at the end that counts as none, relative to that without friction
+    double stall_load_tolerance = 1e-9, min_load_decrease = 0.5;
+    double limit_rounding = 1e-12;     // distance of a force at its limit, relative to the limit
+    double slip_rest_rounding = 1e-9;  // slip at the end that counts as none, relative to that without friction
     // Maximum number of passes for load-dependent limits.
     int max_load_passes = 60;
 };

@@ -34,7 +34,7 @@ double MoreauContacts::allowed(double t, double h, const VecX& y) {
     if (!rounded_) return h;
     bool placed = false;
     double shortest = h;
-    for (int i : watch_.gaps.near_gaps) {
+    for (int i : watch_.gaps.monitored_gaps) {
         if (!(rounded_by_[i] < HUGE_VAL) || w.state.closed[i] || watch_.stays_open_in_step(i)) continue;
         if (!placed) {
             system_.read(y);
@@ -95,7 +95,7 @@ void MoreauContacts::step(double t, double h, VecX& y, double& numerical_energy,
 bool MoreauContacts::project(double t, VecX& y, double& numerical_energy) {
     if (!forces_.is_separate()) return false;
     const bool rests = (v0_.array() == 0.0).all() && (v1_.array() == 0.0).all() && same_bytes(closed_, was_closed_);
-    if (rests || (w.now.touching.empty() && w.now.loaded.empty())) return true;
+    if (rests || (w.now.closed_gaps.empty() && w.now.loaded_elements.empty())) return true;
     system_.read(y);
     if (!projection_.project(p, w, t, system_.q, system_.v)) return false;
     system_.write(y);
@@ -123,12 +123,8 @@ void MoreauContacts::sweep(double t, JointDrives::Step& drives, bool first) {
 // with that of the first sweep.
 bool MoreauContacts::correct(double t, JointDrives::Step& drives) {
     const bool relaxed_before = forces_.law_miss().block >= 0;
-    try {
-        sweep(t, drives, false);
-        if (relaxed_before || forces_.law_miss().block < 0) return true;
-    } catch (const Failure& failure) {
-        if (failure.kind != Failure::Kind::not_converged) throw;
-    }
+    const bool found = !attempt({Failure::Kind::not_converged}, [&] { sweep(t, drives, false); });
+    if (found && (relaxed_before || forces_.law_miss().block < 0)) return true;
     if (!relaxed_before) forces_.clear_miss();
     mean_.begin(h_, v0_);
     sweep(t, drives, false);
@@ -171,20 +167,20 @@ const VecX& MoreauContacts::way_since_last() {
 // if they stay closed.
 void MoreauContacts::find_touching(double t) {
     touching_.clear();
-    for (int i : watch_.come(way_since_last())) {
+    for (int i : watch_.advance(way_since_last())) {
         measure_gap(p, w, t, mean_.value(), i);
         const double width = gap_width(p, w, i);
         const bool touches = was_closed_[i] || (width <= 0.0 && tells_way_out(i, width));
         if (touches) touching_.push_back(i);
         watch_.gaps.width[i] = touches ? 0.0 : width - parameters.width_rounding * scene_size(p, w);  // guaranteed width
     }
-    watch_.leave_far();
+    watch_.skip_wide();
     for (int i : touching_) {
         evaluate_block(p, w, t, mean_.value(), p.gaps[i].block);
         for (int e : p.gaps[i].elements) evaluate_block(p, w, t, mean_.value(), p.frictions[e].block);
     }
     if (touching_.size() > 1)
-        leave_one_of_each_place(p, w, touching_, [&](int i, int other) { return was_closed_[i] && !was_closed_[other]; });
+        remove_coincident(p, w, touching_, [&](int i, int other) { return was_closed_[i] && !was_closed_[other]; });
 }
 
 // Evaluate the contacts that take part at a new mean velocity.
@@ -239,7 +235,7 @@ void MoreauContacts::solve(double t) {
     elements_.begin_passes();
     for (int pass = 0; n > 0; ++pass) {
         if (loads || pass > 0) apply();
-        const double allowed = StepForces::parameters.most_miss * forces_.f.head(n).cwiseAbs().maxCoeff();
+        const double allowed = StepForces::parameters.max_residual * forces_.f.head(n).cwiseAbs().maxCoeff();
         if (elements_.limits_settle(p, w, t, mean_, allowed) && pass > 0) break;
         if (pass == Moreau::parameters.max_load_passes && rest_within_limits(t)) break;
         if (pass == Moreau::parameters.max_load_passes || !forces_.solve(h_, q0_, v0_))
@@ -277,7 +273,7 @@ void MoreauContacts::end_velocity() {
     }
     if (n == 0) return;
     const EndModes rule(v1_);
-    const double clear = StepForces::parameters.cone_force_rounding * f.head(n).cwiseAbs().maxCoeff();
+    const double clear = StepForces::parameters.limit_rounding * f.head(n).cwiseAbs().maxCoeff();
     end.head(n) *= h_;
     for (size_t e = 0, at = 0; e < parts.size(); at += cones[e].dim, ++e) {
         const StepElements::Part& part = parts[e];

@@ -29,9 +29,9 @@ public:
     MoreauContacts(System& system, GapWatch& watch);
 
     // Forget the gaps and the rest of earlier steps.
-    void forget() {
+    void reset() {
         q_sampled_.resize(0);
-        forces_.forget();
+        forces_.reset();
     }
     // Return the longest step from y at t, up to h. Approaching edges and rims may penetrate by half of their rounding.
     // If they already penetrate, the middle of the step may reach half of the remaining rounding. Deeper edges and rims

@@ -12,11 +12,13 @@
 namespace pn {
 
 struct StepForcesParameters {
-    // Distance of a force at its limit, relative to the limit.
-    double cone_force_rounding = 1e-9;
+    // Distance of a force at its limit, relative to the largest force.
+    double limit_rounding = 1e-9;
+    // Rows at the step's end that count as rest, relative to the rows without the forces.
+    double rest_rounding = 1e-9;
     // Accepted residual relative to the velocities. A step of a turning body can have no exact solution if corners
     // share its load. Also the accepted error of a limit, relative to the forces. The statistics report both.
-    double most_miss = 1e-7;
+    double max_residual = 1e-7;
 };
 
 class StepForces {
@@ -30,7 +32,7 @@ public:
     StepForces(const Program& p, Workspace& w, const StepElements& elements);
 
     // Discard the configuration that no forces held at rest in earlier steps.
-    void forget() { q_without_rest_.resize(0); }
+    void reset() { q_without_rest_.resize(0); }
     // Set up the problem of the elements for the acceleration `a_free` without the forces, over a step of length h. The
     // forces of the last step are the guess. `anew`: the rows have changed.
     void pose(const MeanVelocity& mean, double h, const VecX& a_free, bool anew);
@@ -63,7 +65,7 @@ public:
 private:
     void measure_free(const MeanVelocity& mean, double h, const VecX& a_free);
     void recall_forces();
-    void relax(double h);
+    void accept_best_forces(double h);
     bool moves();
     bool keep_rest(bool solved, const VecX& q0);
 

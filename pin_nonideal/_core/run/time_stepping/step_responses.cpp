@@ -13,8 +13,8 @@ StepResponses::StepResponses(const Program& p)
 
 void StepResponses::find(const Program& p, Workspace& w, const std::vector<StepRow>& rows) {
     const int n = static_cast<int>(rows.size());
-    if (n == 0 || known_) return;
-    known_ = true;
+    if (n == 0 || is_computed_) return;
+    is_computed_ = true;
     if (W_.rows() < n) {
         W_.resize(n, n);
         response_.resize(p.mechanism.nv, n);

@@ -12,7 +12,7 @@ class StepResponses {
 public:
     explicit StepResponses(const Program& p);
 
-    void forget() { known_ = false; }
+    void reset() { is_computed_ = false; }
     // Compute the responses of the rows in a configured workspace, unless they are known.
     void find(const Program& p, Workspace& w, const std::vector<StepRow>& rows);
     // Response of the first n rows to the forces of these rows. Rows that the constraints hold do not respond.
@@ -23,7 +23,7 @@ public:
     void add_multipliers(const VecX& f, int n, VecX& lam) const;
 
 private:
-    bool known_ = false;
+    bool is_computed_ = false;
     bool scaled_ = true;  // response_ holds a_s = R^T a
     MatX W_, response_, multipliers_;
     VecX unit_, zero_, lam_, free_response_, force_, a_;
