@@ -110,7 +110,7 @@ void MoreauContacts::sweep(double t, JointDrives::Step& drives, bool first) {
     solve_free(t);
     if (first) {
         find_touching(t);
-        elements_.gather(p, w, touching_, modes_, v0_);
+        elements_.gather(p, w, touching_, was_closed_, modes_, v0_);
     } else {
         move_touching(t);
     }

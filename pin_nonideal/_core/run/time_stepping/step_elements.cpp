@@ -39,7 +39,7 @@ void StepElements::add(const Program& p, const Part& part, int block, int kept, 
 }
 
 void StepElements::gather(const Program& p, Workspace& w, const std::vector<int>& touching,
-                          const std::vector<Mode>& modes, const VecX& v0) {
+                          const std::vector<char>& closed, const std::vector<Mode>& modes, const VecX& v0) {
     rows.clear();
     parts.clear();
     cones.clear();
@@ -50,6 +50,7 @@ void StepElements::gather(const Program& p, Workspace& w, const std::vector<int>
         Part part{i, gap.sliding, gap.restitution * std::min(0.0, gap_rate(p, w, i))};
         part.rests = gap.sliding >= 0 && (modes[gap.sliding] == sticking ||
                                           slip_velocity(w.now, p.frictions[gap.sliding]).norm() <= rest_rate(v0));
+        part.strikes = !closed[i];
         const double mu = gap.sliding < 0 ? 0.0 : coefficient(p, w, part);
         add(p, part, gap.block, 1, ConeElement::contact(1 + slides, mu));
         for (int e : gap.elements)

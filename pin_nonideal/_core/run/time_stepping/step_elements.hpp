@@ -32,6 +32,7 @@ public:
         double approach = 0.0; // restitution times the closing rate of the gap, at most 0
         double middle = 0.0;   // middle of the limits of a box with one direction
         bool rests = false;    // the contact sticks at the step's start
+        bool strikes = false;  // the contact was open at the step's start
     };
 
     std::vector<StepRow> rows;
@@ -40,10 +41,10 @@ public:
 
     explicit StepElements(const Program& p);
 
-    // Collect the elements of the contacts `touching` with their sliding, then other dry friction. The step starts in
-    // the given modes with the velocity v0.
-    void gather(const Program& p, Workspace& w, const std::vector<int>& touching, const std::vector<Mode>& modes,
-                const VecX& v0);
+    // Collect the elements of the contacts `touching` with their sliding, then other dry friction. The step starts with
+    // the given closed contacts and modes at the velocity v0.
+    void gather(const Program& p, Workspace& w, const std::vector<int>& touching, const std::vector<char>& closed,
+                const std::vector<Mode>& modes, const VecX& v0);
     // Update the coefficients of contacts to the velocity of the workspace.
     void move(const Program& p, const Workspace& w);
     // Check if a limit of dry friction follows a load. The loads must then have minimum norm, because limits of other

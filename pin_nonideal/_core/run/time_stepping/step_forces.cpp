@@ -35,6 +35,35 @@ void StepForces::add_multipliers(VecX& lam) const {
     responses_.add_multipliers(f, static_cast<int>(elements_.rows.size()), lam);
 }
 
+namespace {
+
+// Return a bound of the rates of a row between two bodies: the speeds of both bodies at its point, whatever its direction.
+double rate_bound(const Terms& terms, const Block& block, const Vec3& point) {
+    double bound = 0.0;
+    for (const int joint : {block.joint1, block.joint2}) {
+        if (joint == 0) continue;
+        const Body& body = terms.body[joint];
+        const Vec3 origin = body.ref + body.p;
+        bound += velocity_at(body, origin).norm() + body.v.ang.norm() * (point - origin).norm();
+    }
+    return bound;
+}
+
+}  // namespace
+
+// Half of the change of a row's rate in a step by the turn of its directions, over the step. At edges of small rounding
+// the directions turn far within a step. The rate is not linear in the step then, and the direction at the middle of the
+// step serves for the whole step.
+double StepForces::turning_rate(const StepRow& row, double h) const {
+    const Block& block = p.blocks[row.block];
+    const RowValues& values = w.now.values[row.block];
+    const int k = block.kept[row.k];
+    const double half = 0.5 * values.bias[k];
+    if (!values.geometric) return half;
+    const double bound = parameters.max_turn * rate_bound(w.now.terms, block, values.wrench[k].point);
+    return h * std::abs(half) <= bound ? half : 0.0;
+}
+
 // Compute the velocities at the step's end without the forces, over h.
 void StepForces::measure_free(const MeanVelocity& mean, double h, const VecX& a_free) {
     const auto& rows = elements_.rows;
@@ -44,11 +73,13 @@ void StepForces::measure_free(const MeanVelocity& mean, double h, const VecX& a_
     for (int i = 0; i < n; ++i) {
         const Block& block = p.blocks[rows[i].block];
         if (i == 0 || rows[i].block != rows[i - 1].block) mean.start_rates(p, w, rows[i].block);
-        const double bias = w.now.values[rows[i].block].bias[block.kept[rows[i].k]];
-        offset_[i] = w.scratch.r[block.row + rows[i].k] / h + 0.5 * bias;
+        offset_[i] = w.scratch.r[block.row + rows[i].k] / h + turning_rate(rows[i], h);
     }
-    for (size_t e = 0, at = 0; e < parts.size(); at += cones[e].dim, ++e)
+    for (size_t e = 0, at = 0; e < parts.size(); at += cones[e].dim, ++e) {
         offset_[at] += parts[e].approach / h;
+        // A contact that strikes need not open against the turn of its normal, which would add energy.
+        if (parts[e].strikes) offset_[at] -= std::min(0.0, turning_rate(rows[at], h));
+    }
     for (int i = 0; i < n; ++i) {
         const Block& block = p.blocks[rows[i].block];
         if (i == 0 || rows[i].block != rows[i - 1].block) multiply(block, w.now.A, a_free, w.scratch.r);

@@ -12,6 +12,8 @@
 namespace pn {
 
 struct StepForcesParameters {
+    // Largest turn of a direction in a step whose change of a rate is taken into account [half rad].
+    double max_turn = 0.25;
     // Distance of a force at its limit, relative to the largest force.
     double limit_rounding = 1e-9;
     // Rows at the step's end that count as rest, relative to the rows without the forces.
@@ -64,6 +66,7 @@ public:
 
 private:
     void measure_free(const MeanVelocity& mean, double h, const VecX& a_free);
+    double turning_rate(const StepRow& row, double h) const;
     void recall_forces();
     void accept_best_forces(double h);
     bool moves();

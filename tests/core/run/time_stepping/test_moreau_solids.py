@@ -124,3 +124,38 @@ def test_a_heavy_box_falls_on_a_light_one(seed, ratio):
             fastest, *(np.linalg.norm(u[:3]) + 0.35 * np.linalg.norm(u[3:]) for u in (v[:6], v[6:]))
         )
         assert runner.rows(x, np.zeros(12), 0.0)[2][corners].min() > -DT * (fastest + DT * GRAVITY)
+
+
+def dominoes(seed: int) -> pn.Scene:
+    """Return equal dominoes in a row, of which the first turns about its front edge."""
+    rng = np.random.default_rng(seed)
+    count, thick, high = int(rng.integers(2, 8)), rng.uniform(0.02, 0.05), rng.uniform(0.15, 0.25)
+    wide, apart, spin = rng.uniform(0.05, 0.12), rng.uniform(1.5, 3.0) * thick, rng.uniform(1.5, 4.0)
+    mu = rng.uniform(0.1, 0.8)
+    model, shapes = empty((0.0, 0.0, -GRAVITY)), pin.GeometryModel()
+    shapes.addGeometryObject(pn.ground())
+    for k in range(count):
+        place = (apart * k, 0.0, 0.5 * high)
+        pn.free_body(
+            model,
+            f"domino {k}",
+            coal.Box(thick, wide, high),
+            density=500.0,
+            collision_model=shapes,
+            place=place,
+        )
+    contacts = pn.ground_contacts(model, shapes, mu=mu)
+    contacts += [pn.GeometryContact(f"domino {k + 1}", f"domino {k}", mu=mu) for k in range(count - 1)]
+    v = np.zeros(6 * count)
+    v[:6] = (0.5 * high * spin, 0.0, 0.5 * thick * spin, 0.0, spin, 0.0)
+    return pn.Scene(model, contacts=contacts, collision_model=shapes, v0=v)
+
+
+# Speeds of 1e22 and NaN in seeds 2 and 31, if the rates of edges are linear in a step.
+@pytest.mark.parametrize("seed", seeds(range(60), always=(2, 31), count=3))
+def test_equal_dominoes_fall_and_lose_energy(seed):
+    """The edges of equal boxes turn far within a step, and corners of both share places."""
+    run = pn.simulate(dominoes(seed), 0.8, method="moreau", dt=DT, record="energy")
+    assert np.abs(run.v).max() < 100.0
+    total = run.energy["total"]
+    assert np.diff(total).max() < 1e-6 * (total[0] - total.min())
