@@ -68,6 +68,7 @@ def parse_overrides(compiled: CompiledScene, parameters: Mapping[str, object], n
         UnknownNameError: no part of the scene has that name.
     """
     columns: dict[tuple[str, int, str], Array] = {}
+    owners: dict[str, str] = {}  # by call of the builder and argument, as errors of the core name them
     parts = _parts(compiled) if parameters else {}
     for name, entries in parameters.items():
         if name == "gravity":
@@ -77,7 +78,9 @@ def parse_overrides(compiled: CompiledScene, parameters: Mapping[str, object], n
         ):
             columns |= _body(compiled, name, entries, n)
         elif name in parts:
-            columns |= _columns(name, entries, n, parts[name])
+            own = _columns(name, entries, n, parts[name])
+            owners = {f"{call}: {key}": f'"{name}": {key}' for call, _, key in own} | owners
+            columns |= own
         else:
             known = [*parts, *list(compiled.model.names)[1:], "gravity"]
             raise UnknownNameError(
@@ -86,11 +89,11 @@ def parse_overrides(compiled: CompiledScene, parameters: Mapping[str, object], n
     flat = [values.reshape(n, -1) for values in columns.values()]
     names, values = list(columns), np.ascontiguousarray(np.hstack(flat)) if flat else np.zeros((n, 0))
     if n:
-        _check_known(compiled.program, ParameterOverrides(names, values[:1]))
+        _check_known(compiled.program, ParameterOverrides(names, values[:1]), owners)
     return ParameterOverrides(names, values)
 
 
-def _check_known(program: core.Program, first: ParameterOverrides) -> None:
+def _check_known(program: core.Program, first: ParameterOverrides, owners: Mapping[str, str]) -> None:
     """Check that the core accepts all overrides as numbers.
 
     Raises:
@@ -100,8 +103,8 @@ def _check_known(program: core.Program, first: ParameterOverrides) -> None:
         core.with_numbers(program, *first)
     except ValueError as error:
         raise InputError(
-            f"rollout: parameters: {error} shapes the scene and cannot differ between runs; sweep makes a "
-            "scene for each"
+            f"rollout: parameters: {owners.get(str(error), error)} shapes the scene and cannot differ "
+            "between runs; sweep makes a scene for each"
         ) from None
 
 

@@ -239,7 +239,7 @@ def test_what_is_no_parameter(case):
 def test_what_shapes_the_scene_is_no_parameter():
     touch = {"floor": {"radius": [0.1, 0.2]}}
     with refuses(
-        "add_contact: radius shapes the scene and cannot differ between runs; sweep makes", pn.InputError
+        '"floor": radius shapes the scene and cannot differ between runs; sweep makes', pn.InputError
     ):
         pn.rollout(ball(), None, None, 0.1, parameters=touch)
     with refuses('record "dense" goes without parameters', pn.InputError):

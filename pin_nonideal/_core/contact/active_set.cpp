@@ -50,8 +50,8 @@ struct Search {
     double t;
     const VecX& v;
     const Choice& rest;
-    const std::function<void(const RestingMotion*)>& find_modes;
-    const RestingMotion* joint_motion = nullptr;
+    const std::function<void(const OnsetMotion*)>& find_modes;
+    const OnsetMotion* joint_motion = nullptr;
     bool needs_opposed_friction = false;  // slip onset must oppose friction
     std::vector<Choice> tried;
     std::optional<Failure> failure;  // failure of the first active set without a motion
@@ -195,17 +195,17 @@ const TouchingContacts& TouchingCache::at(const Program& p, Workspace& w, double
 
 // Contacts that share a load are decided together. Other contacts are decided one by one, which tests uniqueness, and
 // together if this does not converge.
-void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
-                    const OnsetQuery& query, const std::function<void(const RestingMotion*)>& find_modes) {
+void select_active_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
+                            const OnsetQuery& query, const std::function<void(const OnsetMotion*)>& find_modes) {
     const RunState before = w.state;
     const auto solve_jointly = [&] {
         set_closed(p, w, before.closed);
         set_modes(p, w, before.mode);
         w.state = before;
-        return resting_motion(p, w, t, q, v, query);
+        return onset_motion(p, w, t, q, v, query);
     };
     std::optional<Failure> failure;  // of the first active set without a motion
-    const auto seek = [&](const Choice& start, const RestingMotion* joint_motion, bool needs_opposed_friction) {
+    const auto seek = [&](const Choice& start, const OnsetMotion* joint_motion, bool needs_opposed_friction) {
         Choice first = start;
         if (query.opening_gap >= 0) first[query.opening_gap] = 0;
         Search search{p, w, t, v, query.rest, find_modes, joint_motion, needs_opposed_friction, {}, {}};
@@ -213,7 +213,7 @@ void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, con
         if (!failure) failure = search.failure;
         return false;
     };
-    const auto close = [&](const Choice& start, const RestingMotion* joint_motion) {
+    const auto close = [&](const Choice& start, const OnsetMotion* joint_motion) {
         if (seek(start, joint_motion, true) || seek(start, joint_motion, false)) return;
         if (failure) throw *failure;
         throw Failure(Failure::Kind::not_converged, t);
@@ -226,7 +226,7 @@ void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, con
     };
     // Load shares of slipping contacts follow friction, unlike those of the cone problem. If friction of unloaded
     // contacts spoils the shares, the loaded contacts alone determine the motion.
-    const auto seek_from_joint_motion = [&](RestingMotion guess) {
+    const auto seek_from_joint_motion = [&](OnsetMotion guess) {
         guess.is_initial_guess = true;
         if (seek(guess.closed, &guess, true)) return true;
         restart();
@@ -238,7 +238,7 @@ void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, con
         return false;
     };
     const bool many = std::count(query.rest.begin(), query.rest.end(), char(1)) >= active_set_parameters.may_share;
-    std::optional<RestingMotion> joint_motion;
+    std::optional<OnsetMotion> joint_motion;
     if (many && query.at_limit.empty()) {
         joint_motion = solve_jointly();
         if (joint_motion && joint_motion->closed == query.rest && !joint_motion->slides())

@@ -59,7 +59,7 @@ bool slip_opposes_friction(const Program& p, Workspace& w, const VecX& v);
 // Select the closed contacts among those at rest at (t, q, v). `find_modes` computes the stick-slip modes for closed
 // contacts, or takes them from the joint motion of all contacts if given. On return the workspace holds the motion at
 // v. If no consistent solution exists, some slip directions are not consistent yet, and integration corrects them.
-void close_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
-                    const OnsetQuery& query, const std::function<void(const RestingMotion*)>& find_modes);
+void select_active_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
+                            const OnsetQuery& query, const std::function<void(const OnsetMotion*)>& find_modes);
 
 }  // namespace pn

@@ -81,11 +81,11 @@ bool with_problem(const Program& p, Workspace& w, double t, const VecX& q, const
 
 }  // namespace
 
-std::optional<RestingMotion> resting_motion(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
-                                            const OnsetQuery& query) {
+std::optional<OnsetMotion> onset_motion(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
+                                        const OnsetQuery& query) {
     const std::vector<char> open(p.gaps.size(), 0);
-    RestingMotion out{open, open, std::vector<Mode>(p.frictions.size(), unloaded),
-                      std::vector<Vec3>(p.frictions.size(), Vec3::Zero()), {}};
+    OnsetMotion out{open, open, std::vector<Mode>(p.frictions.size(), unloaded),
+                    std::vector<Vec3>(p.frictions.size(), Vec3::Zero()), {}};
     out.friction = out.direction;
     const auto rest = [&](const std::vector<int>& others) {
         out.closed = out.loaded = query.rest;

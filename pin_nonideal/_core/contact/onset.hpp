@@ -10,8 +10,8 @@ namespace pn {
 
 // Solve for the motion of the contacts at rest at (t, q, v). Return nothing if other laws depend on loads too, or if no
 // motion was found. The modes in the workspace are restored.
-std::optional<RestingMotion> resting_motion(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
-                                            const OnsetQuery& query);
+std::optional<OnsetMotion> onset_motion(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
+                                        const OnsetQuery& query);
 
 // Returns true if forces within the cones of all closed contacts hold them at (t, q, v). Returns false if one of them
 // slides, or if other laws depend on loads too.

@@ -22,11 +22,11 @@ bool is_at_rest(const Program& p, const Workspace& w, const VecX& v, const Onset
            slip_velocity(w.now, p.frictions[e]).norm() <= rest_speed * (1.0 + v.cwiseAbs().maxCoeff());
 }
 
-bool RestingMotion::slides() const {
+bool OnsetMotion::slides() const {
     return std::any_of(modes.begin(), modes.end(), [](Mode mode) { return slips(mode); });
 }
 
-void RestingMotion::to_modes(const Program& p, Workspace& w, ModeQuery& query) const {
+void OnsetMotion::to_modes(const Program& p, Workspace& w, ModeQuery& query) const {
     if (is_initial_guess) {
         query.nearby_friction = friction;
         return;
@@ -207,7 +207,7 @@ bool RestingProblem::alternate(const VecX& free) {
     return false;
 }
 
-void RestingProblem::read(RestingMotion& out) const {
+void RestingProblem::read(OnsetMotion& out) const {
     const VecX a = w0 + W * f;
     for (size_t i = 0; i < cones.size(); ++i) {
         const int e = rows.element(i);

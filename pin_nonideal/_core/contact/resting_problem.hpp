@@ -11,7 +11,7 @@
 
 namespace pn {
 
-struct RestingMotion {
+struct OnsetMotion {
     std::vector<char> closed;     // by gap
     std::vector<char> loaded;     // closed contacts that press, by gap
     std::vector<Mode> modes;      // by element
@@ -66,7 +66,7 @@ public:
     // Solve for forces that hold all contacts at rest. Rest is preferred to motion if both are possible.
     bool hold(ConeComplementarity& solver);
     // Store the motion under the forces.
-    void read(RestingMotion& out) const;
+    void read(OnsetMotion& out) const;
 
 private:
     MatX chosen(const MatX& of_all) const;

@@ -126,7 +126,7 @@ HoldingForce holding_force(const Program& p, Workspace& w, int e, double t, cons
     return out;
 }
 
-double limit_at_hand(const Program& p, Workspace& w, int e, double t, const VecX& q, const VecX& v) {
+double current_limit(const Program& p, Workspace& w, int e, double t, const VecX& q, const VecX& v) {
     if (w.state.mode[e] == unloaded) return 0.0;
     if (w.state.mode[e] != sticking) return w.now.limit[e];
     const SlipLimits limits = static_limits(p, w, e, t, q, v);

@@ -44,7 +44,7 @@ struct HoldingForce {
 };
 HoldingForce holding_force(const Program& p, Workspace& w, int element, double t, const VecX& q, const VecX& v);
 // Nearest bound of the friction force of a sticking element, limit of a slipping element, zero without load.
-double limit_at_hand(const Program& p, Workspace& w, int element, double t, const VecX& q, const VecX& v);
+double current_limit(const Program& p, Workspace& w, int element, double t, const VecX& q, const VecX& v);
 // Add the force of a slipping element, for the limit in the workspace, to a generalized force. add_slip_forces adds the
 // forces of all slipping elements, with (`load_dependent`) or without a load from reactions.
 void add_slip_force(const Program& p, Workspace& w, int element, VecX& C);

@@ -127,7 +127,7 @@ struct Implicit : Unknowns {
             differentiate(*this, y, g, size, J);
             const bool stalls = it > 3 && error <= implicit_friction_parameters.stall_tolerance * size && error >= last;
             if (error <= implicit_friction_parameters.newton_tolerance * size || stalls) {
-                look_for_others(*this, y, J, size);
+                search_other_solutions(*this, y, J, size);
                 image(y, g);
                 return;
             }

@@ -76,7 +76,7 @@ private:
     bool is_known_ = true;
 };
 
-static void find_alike(Program& p) {
+static void find_duplicates(Program& p) {
     std::map<std::vector<double>, int> first;
     for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
         const GapNumbers of(p, p.gaps[i]);
@@ -126,7 +126,7 @@ void Program::finish() {
         // Spinning and rolling resistance have their own row kind.
         if (!std::holds_alternative<SpinSlipRows>(blocks[f.block].kind)) gaps[f.gap].sliding = static_cast<int>(e);
     }
-    find_alike(*this);
+    find_duplicates(*this);
     for (Friction& f : frictions) {
         if (f.load != Friction::Load::multiplier) continue;
         f.row = blocks[f.anchor].user_row + f.anchor_row;

@@ -268,7 +268,7 @@ double min_determinant(const Unknowns& u, const MatX& J) {
     return least;
 }
 
-void look_for_others(Unknowns& u, VecX& y, const MatX& J, double size) {
+void search_other_solutions(Unknowns& u, VecX& y, const MatX& J, double size) {
     RunState& state = u.w.state;
     const MatX I = MatX::Identity(u.n, u.n);
     const double here = determinant(I - J);

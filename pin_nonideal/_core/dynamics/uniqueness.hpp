@@ -31,7 +31,7 @@ void decide_over_zero_load_sets(Unknowns& unknowns, const VecX& start, VecX& y, 
 // Search for other solutions with user functions among the unknowns. J is dg/dy at y. Throws a failure if the
 // determinant indicates other solutions and Newton's method finds one. Finding none proves nothing. If the run
 // continues, y becomes the solution that is least sensitive to changes of the loads.
-void look_for_others(Unknowns& unknowns, VecX& y, const MatX& J, double size);
+void search_other_solutions(Unknowns& unknowns, VecX& y, const MatX& J, double size);
 // Smallest det(I - dg/dy) over the combinations of branches of the laws.
 double min_determinant(const Unknowns& unknowns, const MatX& J);
 // Compute dg/dy by finite differences, scaled by the size of the unknowns.

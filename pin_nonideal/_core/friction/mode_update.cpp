@@ -12,7 +12,7 @@ namespace {
 // Change the modes whose conditions fail in the current motion. An element past its limit slips, and an element driven
 // against its slip sticks. Return the number of changes. Return nothing if one motion does not decide, for elements of
 // several directions or redundant sticking elements.
-std::optional<int> change_modes(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
+std::optional<int> update_modes(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
                                 const std::vector<int>& at_rest, std::vector<Mode>& modes) {
     const double size = w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm();
     int changed = 0;
@@ -53,7 +53,7 @@ bool try_previous_modes(const Program& p, Workspace& w, double t, VecX& q, VecX&
             if (keeps_velocity) begin_step(p, w, t, q, v);
         });
         if (failure || !keeps_velocity) break;
-        const std::optional<int> changed = change_modes(p, w, t, q, v, query.at_rest, modes);
+        const std::optional<int> changed = update_modes(p, w, t, q, v, query.at_rest, modes);
         if (changed == 0) return true;
         if (!changed) break;
         q = q_before;

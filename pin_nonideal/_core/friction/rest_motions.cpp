@@ -21,7 +21,7 @@ bool sticks_more(const std::vector<bool>& one, const std::vector<bool>& other) {
 
 // Solve for the forces of all elements for the current factors of their limits and one zero-load set. A few elements:
 // select among all motions. More elements: the motion in which all stick, else any motion.
-bool RestMotions::find_in_piece(RestProblem& problem, VecX& x) {
+bool RestMotions::find_in_zero_load_set(RestProblem& problem, VecX& x) {
     const RestEquation& equation = problem.equation;
     const AllMotions all = all_motions(equation);
     if (all.complete && !problem.has_zero_load_sets()) {
@@ -38,7 +38,7 @@ bool RestMotions::find_in_piece(RestProblem& problem, VecX& x) {
 }
 
 bool RestMotions::find(RestProblem& problem, VecX& x) {
-    for (int turn = 0; turn < implicit_friction_parameters.max_zero_load_sets && find_in_piece(problem, x); ++turn) {
+    for (int turn = 0; turn < implicit_friction_parameters.max_zero_load_sets && find_in_zero_load_set(problem, x); ++turn) {
         if (!problem.has_zero_load_sets() || problem.is_motion(x)) return true;
         problem.freeze_zero_loads(x);
     }
@@ -46,7 +46,7 @@ bool RestMotions::find(RestProblem& problem, VecX& x) {
     for (const std::vector<char>& has_zero_load : zero_load_sets(p, w)) {
         problem.freeze_zero_loads(has_zero_load);
         x.setZero();
-        if (find_in_piece(problem, x) && problem.is_motion(x)) return true;
+        if (find_in_zero_load_set(problem, x) && problem.is_motion(x)) return true;
     }
     return false;
 }

@@ -28,7 +28,7 @@ public:
     bool are_complete() const { return complete_; }
 
 private:
-    bool find_in_piece(RestProblem& problem, VecX& x);
+    bool find_in_zero_load_set(RestProblem& problem, VecX& x);
     bool choose(const RestProblem& problem, const std::vector<VecX>& motions, VecX& x);
     bool all_stick(const RestEquation& equation, const VecX& x) const;
 

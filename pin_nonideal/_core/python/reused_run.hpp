@@ -18,7 +18,7 @@ public:
     void run_from(const Program& p, Workspace& w, const RunState& first, const Options& options, const VecX& q0,
                   const VecX& v0) {
         clear_samples();
-        clear(p, w, first);
+        reset_workspace(p, w, first);
         record_end(out, [&] {
             if (!run_) run_ = std::make_unique<SteppedRun>(p, w, options, out);
             run_->begin(q0, v0, options.duration, true);

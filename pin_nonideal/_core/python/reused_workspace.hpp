@@ -8,7 +8,7 @@
 namespace pn {
 
 // Reset every field that a run reads before it writes it. `first`: run state of a new workspace.
-inline void clear(const Program& p, Workspace& w, const RunState& first) {
+inline void reset_workspace(const Program& p, Workspace& w, const RunState& first) {
     const Vec3 none = Vec3::Zero();
     w.state = first;
     w.counters = {};

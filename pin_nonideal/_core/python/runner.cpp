@@ -70,14 +70,14 @@ void Runner::choose_contacts(double t, const std::optional<std::vector<Mode>>& m
     query.rest = touching_contacts(*p, *w, t, q, v, true).rest;
     query.after_impact = true;
     query.prescribed = modes.has_value();
-    close_contacts(*p, *w, t, q, v, query, [&](const RestingMotion* joint_motion) {
+    select_active_contacts(*p, *w, t, q, v, query, [&](const OnsetMotion* joint_motion) {
         update_kinematics(*p, *w, t, q, v);
         choose_friction(t, modes, joint_motion);
     });
     if (!modes && !slip_opposes_friction(*p, *w, v)) throw Failure(Failure::Kind::not_converged, t, w->now.slipping);
 }
 
-void Runner::choose_friction(double t, const std::optional<std::vector<Mode>>& modes, const RestingMotion* joint_motion) {
+void Runner::choose_friction(double t, const std::optional<std::vector<Mode>>& modes, const OnsetMotion* joint_motion) {
     ModeQuery mode_query = make_first_mode_query(*p, *w, t, q, v);  // sets the slip directions, too
     if (!modes) {
         if (joint_motion) joint_motion->to_modes(*p, *w, mode_query);
@@ -132,7 +132,7 @@ Instant Runner::solve(const Array& q_in, const Array& v_in, double t, const std:
         const Mode mode = w->state.mode[e];
         Vec3 f = friction_force(*p, *w, element);
         out.friction.push_back(to_numpy(&f[0], p->frictions[e].dim));
-        out.limits.push_back(limit_at_hand(*p, *w, element, t, q, v));
+        out.limits.push_back(current_limit(*p, *w, element, t, q, v));
         out.modes.push_back(mode);
     }
     Split split;
@@ -311,7 +311,7 @@ Outcome Runner::simulate(const Array& q_in, const Array& v_in) {
             outcome.recording = std::exchange(run_.out, {});
         } else {
             run_.reset();
-            clear(*p, *w, first);
+            reset_workspace(*p, *w, first);
             pn::simulate(*p, *w, q0, v0, options, outcome.recording);
         }
     }

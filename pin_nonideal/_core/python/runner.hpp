@@ -84,7 +84,7 @@ private:
     // Set the modes: the given ones, else by velocity, and at rest by the complementarity problem.
     void choose_modes(double t, const std::optional<std::vector<Mode>>& modes);
     void choose_contacts(double t, const std::optional<std::vector<Mode>>& modes);
-    void choose_friction(double t, const std::optional<std::vector<Mode>>& modes, const RestingMotion* together);
+    void choose_friction(double t, const std::optional<std::vector<Mode>>& modes, const OnsetMotion* joint_motion);
 };
 
 nb::class_<Runner> bind_runner(nb::module_& m);

@@ -62,7 +62,7 @@ struct SteppedRunOwner {
         if (!std::isfinite(t)) throw std::invalid_argument("expected a finite time");
         if (!torque.is_none()) read_buffer(torque, tau);
         options.t0 = t;
-        clear(*p, w, first);
+        reset_workspace(*p, w, first);
         w.now.has_override = !torque.is_none();
         if (w.now.has_override) w.now.override_torque = tau;
         clear_samples();

@@ -60,8 +60,8 @@ void Simulation::start(const VecX& q0, const VecX& v0) {
         impacts.remember_gaps();
     }
     output.now();
-    warnings.pulls(std::nullopt);
-    warnings.several(false);
+    warnings.check_tension(std::nullopt);
+    warnings.check_uniqueness(false);
     value_events.start(progress.t, progress.y);
     progress.h = options.dt;
     if (options.method.adaptive()) {
@@ -328,13 +328,13 @@ void Simulation::accept(const Proposal& proposal, const std::optional<FoundEvent
     impacts.remember_gaps(!event);
     output.keep_step();
     value_events.append_events(progress.t, out.events);
-    if (!event || !event->changes_modes()) warnings.pulls(event);
-    output.inside_step(warnings.several(true));
+    if (!event || !event->changes_modes()) warnings.check_tension(event);
+    output.inside_step(warnings.check_uniqueness(true));
     stepper.end_directions();
     choice.choose();
     if (!event) return;
     if (event->changes_modes()) modes.change(*event);
-    warnings.several(false);
+    warnings.check_uniqueness(false);
     if (event->kind != FoundEvent::Kind::reversal) return;
     chatter.count();
     modes.bridge_chatter(event->index);

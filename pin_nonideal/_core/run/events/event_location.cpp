@@ -87,7 +87,7 @@ void EventLocator::step_onto(const Crossing& crossing) {
     const double full = stepper_.h;
     time_to_rest_.reset();
     stepper_.end_at(std::clamp(crossing.part, 0.0, 1.0) * full);
-    if (!crossing.leaps) correct_instant(crossing, full);
+    if (!crossing.jumps) correct_instant(crossing, full);
     if (misses_rest(crossing.watch)) end_before_rest();
 }
 

@@ -172,10 +172,10 @@ std::optional<double> EventSearch::confirm(const Watch& watch, double part, doub
 
 // Return the crossing of a contact load that jumps below zero, as when a corner reaches an edge. The event lies after
 // the jump, by the smallest time difference that separates two instants. Return nothing if the load does not jump.
-std::optional<Crossing> EventSearch::behind_leap(const Watch& watch, Source from, double part) {
-    if (!(margin_inside(watch, from, part) < -parameters.leap_part * margin_inside(watch, from, 0.0)))
+std::optional<Crossing> EventSearch::cross_jump(const Watch& watch, Source from, double part) {
+    if (!(margin_inside(watch, from, part) < -parameters.jump_part * margin_inside(watch, from, 0.0)))
         return std::nullopt;
-    part = std::max(part, parameters.leap_digits * (std::abs(stepper_.t0) + stepper_.h) / stepper_.h);
+    part = std::max(part, parameters.jump_digits * (std::abs(stepper_.t0) + stepper_.h) / stepper_.h);
     for (; part < 1.0; part *= 2.0)
         if (margin_inside(watch, from, part) < 0.0) return Crossing{watch, part, 0.0, true};
     return std::nullopt;
@@ -190,7 +190,7 @@ Crossing EventSearch::cross(const Watch& watch, Source from) {
     const double part = first_crossing(watch, from);
     if (part == no_crossing) return {watch, part, 0.0};
     if (watch.kind == Watch::Kind::load)
-        if (const auto crossing = behind_leap(watch, from, part)) return *crossing;
+        if (const auto crossing = cross_jump(watch, from, part)) return *crossing;
     const double before = std::max(0.0, part - root_search_parameters.margin_slope_step),
                  after = before + root_search_parameters.margin_slope_step;
     return {watch, part,

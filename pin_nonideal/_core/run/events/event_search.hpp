@@ -15,7 +15,7 @@ namespace pn {
 struct Crossing {
     Watch watch;
     double part, slope;  // part of the step, and rate of the margin at this part per step
-    bool leaps = false;  // the margin jumps below zero without a root
+    bool jumps = false;  // the margin jumps below zero without a root
 };
 
 struct EventSearchParameters {
@@ -24,9 +24,9 @@ struct EventSearchParameters {
     // A parabola through three points falls below the middle one by at most 1/8 of its second difference. Dips up to
     // twice that depth are searched.
     double parabola_part = 0.25;
-    // `leap_part`: negative margin that counts as a jump, relative to the margin at the step's start. `leap_digits`:
+    // `jump_part`: negative margin that counts as a jump, relative to the margin at the step's start. `jump_digits`:
     // relative time difference that separates two instants.
-    double leap_part = 1e-3, leap_digits = 1e-15;
+    double jump_part = 1e-3, jump_digits = 1e-15;
     // Error of a force / limit ratio that comes from an interpolant of low order, relative to its change.
     double doubted_part = 1e-2;
     int max_confirmations = 3;  // maximum evaluations that confirm an interpolated crossing
@@ -69,7 +69,7 @@ private:
     double margin_inside(const Watch& watch, Source source, double part);
     double first_crossing(const Watch& watch, Source source);
     Crossing cross(const Watch& watch, Source source);
-    std::optional<Crossing> behind_leap(const Watch& watch, Source source, double part);
+    std::optional<Crossing> cross_jump(const Watch& watch, Source source, double part);
     Crossing confirmed(const Crossing& interpolated);
     std::optional<double> confirm(const Watch& watch, double part, double slope, double at_start);
 

@@ -65,7 +65,7 @@ void set_direction_search(System& system, const std::vector<int>& resting, bool 
     const auto begins = [&](int e) { return system.p.frictions[e].dim > 1 && slips(system.w.state.mode[e]); };
     bool& seeks = system.w.state.solves_directions;
     seeks = system.can_solve_directions &&
-            ((seeks && sought && turning(system)) || std::any_of(resting.begin(), resting.end(), begins));
+            ((seeks && sought && has_turning_slip(system)) || std::any_of(resting.begin(), resting.end(), begins));
 }
 
 // Defer the sticking of an element that came to rest but must slip on. The deferral ends when its mode changes or it
@@ -80,7 +80,7 @@ void linger(RunState& state, const std::vector<Mode>& before, const FoundEvent& 
 
 }  // namespace
 
-bool turning(const System& system) {
+bool has_turning_slip(const System& system) {
     const std::vector<int>& slipping = system.w.now.slipping;
     return std::any_of(slipping.begin(), slipping.end(), [&](int e) { return system.p.frictions[e].dim > 1; });
 }
@@ -101,7 +101,7 @@ struct FrictionSwitch {
     int held = -1;  // element that has just reached its limit
 
     // `joint_motion`: onset motion of all contacts, if known.
-    void find(const RestingMotion* joint_motion) {
+    void find(const OnsetMotion* joint_motion) {
         const Program& p = system.p;
         Workspace& w = system.w;
         if (p.frictions.empty()) {
@@ -158,7 +158,7 @@ void close_and_find(System& system, double t, bool starts, FrictionSwitch& frict
     query.at_limit = friction.at_limit();
     query.after_impact = landing;
     const VecX q = system.q, v = system.v;
-    close_contacts(p, system.w, t, q, v, query, [&](const RestingMotion* joint_motion) {
+    select_active_contacts(p, system.w, t, q, v, query, [&](const OnsetMotion* joint_motion) {
         system.q = q;
         system.v = v;
         update_kinematics(p, system.w, t, q, v);
@@ -187,7 +187,7 @@ std::vector<Event> changes_since(const System& system, double t, const std::vect
 }
 
 std::vector<Event> switch_modes(System& system, double t, VecX& y, VecX& dy, const std::optional<FoundEvent>& event,
-                                std::vector<int>* let_go) {
+                                std::vector<int>* released) {
     const Program& p = system.p;
     Workspace& w = system.w;
     system.read(y);
@@ -198,8 +198,8 @@ std::vector<Event> switch_modes(System& system, double t, VecX& y, VecX& dy, con
     FrictionSwitch friction{system, t, event, before, {}};
     if (p.gaps.empty()) friction.find(nullptr);
     else close_and_find(system, t, !event, friction);
-    if (let_go && event && (event->kind == FoundEvent::Kind::lift || event->in_vain))
-        *let_go = open_unloaded_contacts(system, t);
+    if (released && event && (event->kind == FoundEvent::Kind::lift || event->in_vain))
+        *released = open_unloaded_contacts(system, t);
     if (!p.frictions.empty() || !p.gaps.empty()) {
         set_direction_search(system, friction.mode_query.at_rest, event.has_value());
         system.write(y);

@@ -22,10 +22,10 @@ inline constexpr EventHandlingParameters event_handling_parameters{};
 // element gets its mode from its velocity. On return the workspace is evaluated at (t, y), and dy holds the rate.
 // Return the changes, empty without an event.
 //
-// The contacts of two bodies open if none of them has a load at a lift, or at a touch in vain. `let_go` receives their
+// The contacts of two bodies open if none of them has a load at a lift, or at a touch in vain. `released` receives their
 // gaps.
 std::vector<Event> switch_modes(System& system, double t, VecX& y, VecX& dy, const std::optional<FoundEvent>& event,
-                                std::vector<int>* let_go = nullptr);
+                                std::vector<int>* released = nullptr);
 
 // Return the changes of modes since `before`. Contacts that open or close come first, then elements that stick or slip.
 // The element `turned` has reversed.
@@ -45,7 +45,7 @@ struct Strike {
 Strike strike_contacts(System& system, double t, VecX& y, bool starts, bool bounces = true);
 
 // Check if an element with several directions slips.
-bool turning(const System& system);
+bool has_turning_slip(const System& system);
 
 // Return the kind of event for a change of an element's mode.
 Event::Kind kind_of_change(Mode before, Mode after);

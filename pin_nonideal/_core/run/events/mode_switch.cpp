@@ -29,12 +29,12 @@ ModeChanges::ModeChanges(System& system, Progress& progress, const Options& opti
 void ModeChanges::change(FoundEvent event) {
     const RunState before = w.state;
     bool has_impact = false;
-    std::vector<int> let_go;
-    event.in_vain = event.kind == FoundEvent::Kind::touch && event.index >= 0 && has_let_go(event.index);
+    std::vector<int> released;
+    event.in_vain = event.kind == FoundEvent::Kind::touch && event.index >= 0 && was_released(event.index);
     const auto failure = attempt([&] {
         if (contacts_land(system_, progress_.t, progress_.y)) event = {FoundEvent::Kind::touch, -1, progress_.t};
         has_impact = event.kind == FoundEvent::Kind::touch && impacts_.resolve_impacts(false);
-        for (const Event& found : switch_modes(system_, progress_.t, progress_.y, progress_.rate, event, &let_go)) {
+        for (const Event& found : switch_modes(system_, progress_.t, progress_.y, progress_.rate, event, &released)) {
             out_.events.push_back(found);
             if (!has_impact) chatter_.count();
         }
@@ -50,7 +50,7 @@ void ModeChanges::change(FoundEvent event) {
     const bool same_modes = std::equal(before.mode.begin(), before.mode.end(), w.state.mode.begin());
     if (!same_modes || before.closed != w.state.closed) progress_.gaps.retry_all();
     else if (in_vain && !w.state.closed[event.index]) progress_.gaps.defer_retry(event.index, progress_.t);
-    for (int gap : let_go) progress_.gaps.defer_retry(gap, progress_.t);
+    for (int gap : released) progress_.gaps.defer_retry(gap, progress_.t);
     impacts_.remember_gaps();
     if (has_impact) return end_bouncing();
     if (same_modes) chatter_.count();
@@ -59,7 +59,7 @@ void ModeChanges::change(FoundEvent event) {
 }
 
 // Check if a contact of the same two bodies was let go, because no contact of theirs had a load.
-bool ModeChanges::has_let_go(int gap) const {
+bool ModeChanges::was_released(int gap) const {
     for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i)
         if (progress_.gaps.is_blocked(i) && same_bodies(p, gap, i)) return true;
     return false;

@@ -45,7 +45,7 @@ public:
 
 private:
     void end_bouncing();
-    bool has_let_go(int gap) const;
+    bool was_released(int gap) const;
     void restore_last(const RunState& before, bool has_impact);
     static bool is_undecided(const Failure& failure);
     bool is_creeping() const;

@@ -14,12 +14,12 @@ public:
     Warnings(System& system, Stepper& stepper, Progress& progress, Recording& out);
 
     // Record contacts and wheels in tension, once each time the tension begins.
-    void pulls(const std::optional<FoundEvent>& event) {
+    void check_tension(const std::optional<FoundEvent>& event) {
         if (!p.contacts.empty()) record_pulls(event);
     }
     // Record the instant from which the laws allow several motions, once each time. At the end of a time step this
     // includes laws that allow no motion. Return the recorded instant, which can lie inside the step.
-    std::optional<double> several(bool after_step) {
+    std::optional<double> check_uniqueness(bool after_step) {
         const bool before = progress_.several_motions;
         progress_.several_motions = w.state.unique == Uniqueness::several || w.now.several || w.now.no_motion;
         if (before || !progress_.several_motions) return std::nullopt;

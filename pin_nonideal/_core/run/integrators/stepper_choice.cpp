@@ -8,7 +8,7 @@ StepperChoice::StepperChoice(System& system, Stepper& stepper, Progress& progres
     : w(system.w), system_(system), stepper_(stepper), progress_(progress), options_(options) {}
 
 void StepperChoice::check_step() {
-    is_stiff_ = options_.method.adaptive() && turning(system_) && stepper_.stiffness() > parameters.stiff_rate;
+    is_stiff_ = options_.method.adaptive() && has_turning_slip(system_) && stepper_.stiffness() > parameters.stiff_rate;
 }
 
 void StepperChoice::choose() {
@@ -17,7 +17,8 @@ void StepperChoice::choose() {
     int& turning_steps = progress_.turning_steps;
     const double next = options_.method.adaptive() ? progress_.h : options_.dt;
     if (stepper_.collocates()) {
-        seeks = turning(system_) && (stepper_.h == 0.0 || stepper_.stiffness() * next > parameters.stiff_rate * stepper_.h);
+        seeks = has_turning_slip(system_) &&
+                (stepper_.h == 0.0 || stepper_.stiffness() * next > parameters.stiff_rate * stepper_.h);
         turning_steps = seeks ? 0 : -parameters.patience;
     } else if (turning_steps < 0) {
         ++turning_steps;

@@ -47,7 +47,7 @@ void Recorder::record_laws(double t) {
     for (size_t l = 0; l < force.size(); ++l)
         for (int dof : supports_[l]) out.law_forces.push_back(force[l][dof]);
     for (size_t e = 0; e < p.frictions.size(); ++e)
-        out.limits.push_back(limit_at_hand(p, w, static_cast<int>(e), t, system.q, system.v));
+        out.limits.push_back(current_limit(p, w, static_cast<int>(e), t, system.q, system.v));
 }
 
 void Recorder::record_reactions() {

@@ -179,8 +179,8 @@ void TimeStepping::step(double size, double stop, double t_end) {
     remember_directions(system_, progress_.slip_at_start);
     if (watched || system_.watches())
         for (const Event& change : changes_since(system_, t, closed_before_, before_)) out_.events.push_back(change);
-    warnings_.pulls(std::nullopt);
-    warnings_.several(false);
+    warnings_.check_tension(std::nullopt);
+    warnings_.check_uniqueness(false);
     output_.keep_time_step(from, y_from);
     value_events_.sample_end(t, y);
     value_events_.append_events(t, out_.events);

@@ -43,7 +43,7 @@ double MoreauContacts::allowed(double t, double h, const VecX& y) {
         }
         follow_gap(p, w, t, system_.v, i);
         const double width = gap_width(p, w, i), rate = gap_rate(p, w, i);
-        if (!(rate < 0.0) || !tells_way_out(i, width)) continue;
+        if (!(rate < 0.0) || !has_known_direction(i, width)) continue;
         const double reach = std::max(width, 0.0) + (width > 0.0 ? 0.5 : 1.0) * depth_left(p, w, i, width);
         shortest = std::min(shortest, reach / -rate);
     }
@@ -155,7 +155,7 @@ void MoreauContacts::solve_free(double t) {
 
 // Return the travel of each dof since the last sample of the gaps, including projections. It is at least that of the
 // velocity, because angles wrap around.
-const VecX& MoreauContacts::way_since_last() {
+const VecX& MoreauContacts::path_since_last() {
     q_sampled_ -= q_mid_;
     ambient_to_tangent(p.mechanism, q_mid_.data(), q_sampled_.data(), v1_.data());
     force_ = v1_.cwiseAbs().cwiseMax(h_ * v0_.cwiseAbs());
@@ -167,10 +167,10 @@ const VecX& MoreauContacts::way_since_last() {
 // if they stay closed.
 void MoreauContacts::find_touching(double t) {
     touching_.clear();
-    for (int i : watch_.advance(way_since_last())) {
+    for (int i : watch_.advance(path_since_last())) {
         measure_gap(p, w, t, mean_.value(), i);
         const double width = gap_width(p, w, i);
-        const bool touches = was_closed_[i] || (width <= 0.0 && tells_way_out(i, width));
+        const bool touches = was_closed_[i] || (width <= 0.0 && has_known_direction(i, width));
         if (touches) touching_.push_back(i);
         watch_.gaps.width[i] = touches ? 0.0 : width - parameters.width_rounding * scene_size(p, w);  // guaranteed width
     }

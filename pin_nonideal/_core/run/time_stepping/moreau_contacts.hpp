@@ -49,14 +49,14 @@ public:
     const StepForces::LawMiss& law_miss() const { return forces_.law_miss(); }
 
 private:
-    bool tells_way_out(int gap, double width) const {
+    bool has_known_direction(int gap, double width) const {
         return width > -MoreauContacts::parameters.nearly_all * rounded_by_[gap];
     }
     void select(const std::vector<char>& closed, const std::vector<Mode>& modes, bool flies);
     void sweep(double t, JointDrives::Step& drives, bool first);
     bool correct(double t, JointDrives::Step& drives);
     void solve_free(double t);
-    const VecX& way_since_last();
+    const VecX& path_since_last();
     void find_touching(double t);
     void move_touching(double t);
     bool rest_within_limits(double t);
