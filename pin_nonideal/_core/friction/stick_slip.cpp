@@ -216,7 +216,7 @@ struct Search {
         // A complete search includes this motion. If all elements hold, no other motion has more sticking elements.
         const bool all_known = is_searched(equation) && !problem.has_pieces();
         if (slid && !all_known && equation.loaded()) {
-            if (motions.hold(problem, x)) {
+            if (motions.hold(problem, x) && !any_breaks(question, equation, x)) {
                 w.now.several = is_reliable;
                 w.now.several_element = list.front();
                 std::vector<Mode> modes = question.modes;
