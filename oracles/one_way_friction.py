@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 
 TIGHT = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-13}
 SLACK = 1e-9  # violation that counts as rounding, relative to 1 + the largest force
-# Slip speed and excess of a force at an event. Elements begin to slip, or stick at their limit, with zero up to rounding.
+# Slip speed and excess of a force at an event: slip begins, and limits are reached, at zero up to rounding.
 REST = 1e-12
 
 
@@ -50,15 +50,15 @@ class OneWayFriction:
         return x[:n], f
 
     def margin(self, f, ratio=None):
-        """Return the distance of each force to its nearer limit, by default the static limit; negative outside."""
+        """Return the distance of each force to its nearer limit, by default static; negative outside."""
         ratio = self.ratio if ratio is None else ratio
         return np.minimum(f + ratio * self.forward, ratio * self.backward - f)
 
     def modes_at(self, t, q, v, modes, resting, breaking=None):
         """Select modes of the elements at rest that meet all conditions just after t.
 
-        The static limits of all elements determine one motion. Elements that slip in this motion have their kinetic
-        limit from then on, and the modes are selected again, until no other element slips.
+        The static limits of all elements determine one motion.  Elements that slip in this motion have their
+        kinetic limit from then on, and the modes are selected again, until no other element slips.
         """
         released = set() if breaking is None else {breaking}
         while True:

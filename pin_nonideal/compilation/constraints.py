@@ -37,8 +37,8 @@ from .resolver import Frame, Resolver, placed_on, words
 MAX_GEAR = 64
 # A ratio within this distance of a fraction is treated as that fraction.
 GEAR_ROUNDING = 1e-12
-# Step of central differences in time, relative to max(1 s, |t|), and their weights, of sixth order: a compromise
-# between rounding and curvature. The error is 1e-12 of the residual up to 100 rad/s.
+# Step of central differences in time, relative to max(1 s, |t|), and their weights, of sixth order: a
+# compromise between rounding and curvature. The error is 1e-12 of the residual up to 100 rad/s.
 TIME_DIFFERENCE, DIFFERENCE_WEIGHTS = 1e-4, (3.0 / 4.0, -3.0 / 20.0, 1.0 / 60.0)
 
 
