@@ -1,8 +1,9 @@
 """Pendulum on a cart with prescribed motion, integrated by SciPy between the breaks of the motion.
 
 The angle is measured from the vertical, L is the length to the center of mass and J the inertia about the
-pivot: J angle'' = m L (x'' cos(angle) - g sin(angle)).  If x' jumps by d, angle' jumps by
-m L cos(angle) d / J.
+pivot: J angle'' = m L (x'' cos(angle) - g sin(angle)).  The unknowns are the angle and the momentum
+u = J angle' - m L cos(angle) x', with u' = m L sin(angle) (angle' x' - g).  u keeps its value where x' jumps,
+and contains no x'', which may be large.
 """
 
 from __future__ import annotations
@@ -42,23 +43,29 @@ class Pendulum:
         """Return (angle, rate) at the end, and the work done at the jumps of the cart's velocity."""
         lever = self.mass * self.length
         J = lever * self.length + self.inertia
-        state, begin, work = np.array(start, float), 0.0, 0.0
-        stops = [t for t in sorted(breaks) if 0.0 < t < duration] + [duration]
-        for stop in stops:
+
+        def turning(angle, momentum, speed):
+            return (momentum + lever * np.cos(angle) * speed) / J
+
+        speed = function(0.0)[1]
+        state = np.array([start[0], J * start[1] - lever * np.cos(start[0]) * speed])
+        begin, work = 0.0, 0.0
+        for stop in [t for t in sorted(breaks) if 0.0 < t < duration] + [duration]:
             low, high = np.nextafter(begin, np.inf), np.nextafter(stop, -np.inf)
 
             def rate(t, y, low=low, high=high):
-                x2 = function(min(max(t, low), high))[2]
-                return [y[1], lever * (x2 * np.cos(y[0]) - GRAVITY * np.sin(y[0])) / J]
+                speed = function(min(max(t, low), high))[1]
+                turns = turning(*y, speed)
+                return [turns, lever * np.sin(y[0]) * (turns * speed - GRAVITY)]
 
             run = solve_ivp(rate, (begin, stop), state, method="DOP853", rtol=REFERENCE, atol=REFERENCE)
-            state, begin = run.y[:, -1].copy(), stop
+            state, begin = run.y[:, -1], stop
             if stop < duration:
                 before, after = (function(np.nextafter(stop, side * np.inf))[1] for side in (-1, 1))
-                energy = self.kinetic(before, state)
-                state[1] += lever * np.cos(state[0]) * (after - before) / J
-                work += self.kinetic(after, state) - energy
-        return state, work
+                angle = state[0]
+                work += self.kinetic(after, (angle, turning(*state, after)))
+                work -= self.kinetic(before, (angle, turning(*state, before)))
+        return (state[0], turning(*state, function(duration)[1])), work
 
     def kinetic(self, speed, state):
         """Return the kinetic energy of cart and pendulum [J]."""

@@ -14,6 +14,8 @@ from scipy.integrate import solve_ivp
 
 TIGHT = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-13}
 SLACK = 1e-9  # violation that counts as rounding, relative to 1 + the largest force
+# Slip speed and excess of a force at an event: slip begins, and limits are reached, at zero up to rounding.
+REST = 1e-12
 
 
 class OneWayFriction:
@@ -32,10 +34,13 @@ class OneWayFriction:
         self.M, self.force, self.D = np.asarray(M), force, np.asarray(D)
         self.forward, self.backward, self.ratio = map(np.asarray, (forward, backward, ratio))
 
-    def solve(self, t, q, v, modes):
-        """Return acceleration and friction forces for modes +1, -1 (slipping) and 0 (sticking)."""
+    def solve(self, t, q, v, modes, ratio=1.0):
+        """Return acceleration and friction forces for modes +1, -1 (slipping) and 0 (sticking).
+
+        Slipping elements have `ratio` times their kinetic limit.
+        """
         n, stuck = len(self.M), [i for i, mode in enumerate(modes) if mode == 0]
-        f = np.where(np.array(modes) > 0, -self.forward, self.backward)
+        f = np.where(np.array(modes) > 0, -ratio * self.forward, ratio * self.backward)
         f[stuck] = 0.0
         right = np.concatenate([self.force(t, q, v) + self.D.T @ f, np.zeros(len(stuck))])
         S = self.D[stuck]
@@ -44,12 +49,28 @@ class OneWayFriction:
         f[stuck] = x[n:]
         return x[:n], f
 
-    def margin(self, f):
-        """Return the distance of each force to its nearer static limit; negative outside."""
-        return np.minimum(f + self.ratio * self.forward, self.ratio * self.backward - f)
+    def margin(self, f, ratio=None):
+        """Return the distance of each force to its nearer limit, by default static; negative outside."""
+        ratio = self.ratio if ratio is None else ratio
+        return np.minimum(f + ratio * self.forward, ratio * self.backward - f)
 
     def modes_at(self, t, q, v, modes, resting, breaking=None):
-        """Select modes of the elements at rest that meet all conditions just after t."""
+        """Select modes of the elements at rest that meet all conditions just after t.
+
+        The static limits of all elements determine one motion.  Elements that slip in this motion have their
+        kinetic limit from then on, and the modes are selected again, until no other element slips.
+        """
+        released = set() if breaking is None else {breaking}
+        while True:
+            static = [i in resting and i not in released for i in range(len(modes))]
+            found = self._modes_within(np.where(static, self.ratio, 1.0), t, q, v, modes, resting, breaking)
+            slipping = {i for i in resting if found[i] != 0}
+            if slipping <= released:
+                return found
+            released |= slipping
+
+    def _modes_within(self, ratio, t, q, v, modes, resting, breaking):
+        """Select the modes for limits of `ratio` times the kinetic limits."""
         scale = 1.0 + np.abs(self.force(t, q, v)).max()
         for choice in product((0, 1, -1), repeat=len(resting)):
             trial = list(modes)
@@ -57,8 +78,8 @@ class OneWayFriction:
                 trial[i] = mode
             if breaking is not None and trial[breaking] == 0:
                 continue
-            a, f = self.solve(t, q, v, trial)
-            slip, inside = self.D @ a, self.margin(f)
+            a, f = self.solve(t, q, v, trial, ratio)
+            slip, inside = self.D @ a, self.margin(f, ratio)
             fits = [
                 inside[i] >= -SLACK * scale if trial[i] == 0 else trial[i] * slip[i] >= -SLACK * scale
                 for i in resting
@@ -81,8 +102,8 @@ class OneWayFriction:
 
                     def event(t, y, i=i, mode=mode, modes=tuple(modes)):
                         if mode != 0:
-                            return mode * self.D[i] @ y[n:]
-                        return self.margin(self.solve(t, y[:n], y[n:], modes)[1])[i] + 1e-12
+                            return mode * self.D[i] @ y[n:] + REST
+                        return self.margin(self.solve(t, y[:n], y[n:], modes)[1])[i] + REST
 
                     event.terminal, event.direction = True, -1.0
                     watch.append(event)

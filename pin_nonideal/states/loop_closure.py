@@ -48,7 +48,7 @@ MIN_CURVATURE = 1e-2
 MANY_FREEDOMS = 200
 # Maximum number of starts until a closure is found, and number of further starts if its displacement is
 # longer than FAR_MOVE units (twice as many above VERY_FAR_MOVE). With at most FEW_FREEDOMS coordinates,
-# starts continue up to MAX_STARTS until the nearest closure was found OFTEN times.
+# starts continue up to MAX_STARTS until a closure is found, and until the nearest was found OFTEN times.
 STARTS, FURTHER_STARTS, FAR_MOVE, VERY_FAR_MOVE = 24, 12, 0.05, 0.5
 MAX_STARTS, OFTEN, FEW_FREEDOMS = 60, 4, 12
 SPREADS = (0.1, 0.3, 0.5, 1.0)  # spreads of starts, in turn, over max(1 unit, displacement of best closure)
@@ -153,7 +153,7 @@ class Search:
         generator = np.random.default_rng(0)  # a fixed seed makes the result deterministic
         most = MAX_STARTS if len(self.unit) <= FEW_FREEDOMS else 0
         k = 0
-        while k < starts or (further and often < OFTEN and k < most):
+        while k < starts or (k < most and (further and often < OFTEN if best else fallback is None)):
             longest = 1.0 if best is None else max(1.0, self._longest(best.q))
             spread = longest * SPREADS[k % len(SPREADS)] * generator.standard_normal(len(self.unit))
             k += 1

@@ -11,7 +11,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from pin_nonideal.core_loader import core
-from pin_nonideal.errors import InputError, PinNonidealError
+from pin_nonideal.errors import InputError, NonFiniteError, PinNonidealError
 from pin_nonideal.types import Array, Model
 
 from .closure_search import ClosureSearch, mass_function, metric
@@ -122,6 +122,7 @@ class Projection:
             InputError: a contact starts with deep penetration, or the constraints do not admit the held
                 entries together.
             InconsistentConstraintsError: no velocity satisfies the constraints.
+            NonFiniteError: the velocity on the constraints is above the largest number.
         """
         if not self.program.rows:
             return (
@@ -153,6 +154,8 @@ class Projection:
             if search is not None:
                 iterations, nearest = iterations + search[0], search[1]
             _, v_on, _, _, rate = runner.project(on, v, t, np.inf)
+        if not np.isfinite(v_on).all():
+            raise NonFiniteError("v: the velocity on the constraints overflows; give a slower one")
         if not rate <= RATE_TOLERANCE * min(1.0, self.length) * (1.0 + _largest(v_on)):
             raise velocity_error(rows_at(runner, on, v_on, t)[3], self.program, t)
         mass = mass_function(self.model, runner)
@@ -272,6 +275,7 @@ class Projection:
         )
         on, v_on = found_q.reshape(q.shape), found_v.reshape(v.shape)
         met = rate <= RATE_TOLERANCE * min(1.0, self.length) * (1.0 + np.abs(v_on).max(axis=1, initial=0.0))
+        met &= np.isfinite(v_on).all(axis=1)
         hardly = np.abs(on - q).max(axis=1, initial=0.0) <= AMBIENT_FACTOR * MAX_NEWTON_MOVE * self.unit.min(
             initial=np.inf
         )

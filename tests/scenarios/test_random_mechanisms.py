@@ -78,8 +78,8 @@ def assert_conditions(m, run, i, conditions):
 
 
 @pytest.mark.parametrize(
-    "seed", seeds([*range(QUICK), 204], always=[204])
-)  # 204: a load jumps as a ball joint begins to slip
+    "seed", seeds([*range(QUICK), 204], always=[37, 204])
+)  # 37: stages of the first trial diverge to 1e68 rad/s; 204: a load jumps as a ball joint begins to slip
 def test_conditions(seed):
     check(seed)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal.errors import InputError, UnknownNameError
+from pin_nonideal.errors import InputError, NonFiniteError, UnknownNameError
 
 from ..support.every_joint import INF, MODEL, NAN, Q, V, scaled, with_entry
 from ..support.refusals import refuses
@@ -116,3 +116,10 @@ def test_modes_that_are_none(modes):
     scene = pn.Scene(MODEL, laws=[pn.JointFriction("j0", coulomb=1.0)])
     with refuses(f"modes must hold 1 numbers out of -1, 0, 1; got {modes}", InputError):
         scene.solve(Q, V, modes=modes)
+
+
+def test_a_velocity_that_overflows_on_the_constraints():
+    """The connecting rod of the four-bar turns faster than its crank."""
+    scene = pn.load("four_bar")
+    with refuses("v: the velocity on the constraints overflows; give a slower one", NonFiniteError):
+        scene.project(v=np.full(3, 1.7e308))

@@ -40,7 +40,8 @@ def named_near(scene, seed):
     return {f"j{k}": float(scene.q0[k] + away * draw.uniform(-1.0, 1.0)) for k in dofs}
 
 
-@pytest.mark.parametrize("seed", seeds(range(300)))
+# In chain 255 only the 25th or a later start finds a closure.
+@pytest.mark.parametrize("seed", seeds(range(300), always=(255,)))
 def test_the_others_follow_by_the_least_move(seed):
     """The move d is stationary in d^T M d under the closed loop and the named values."""
     scene, _ = chain(seed)

@@ -40,8 +40,9 @@ class Legged:
         bend = np.zeros(model.nv)
         if not straight:
             bend[6 if floats else 1 :] = rng.uniform(-0.5, 0.5, model.nv - (6 if floats else 1))
-            bend[3:6] *= not floats
-            bend[3:6] += 0.1 * rng.standard_normal(3) * floats
+            turn = 0.1 * rng.standard_normal(3)
+            if floats:
+                bend[3:6] = turn
         q = pin.integrate(model, pin.neutral(model), bend)
         self.apart, rods = 0.0, []
         if legs > 1 and rng.uniform() < 0.4:

@@ -74,22 +74,33 @@ def _disk(axis):
     return lambda frame, plane: pn.Rolling(frame, 0.3, axis=axis, plane=plane)
 
 
+def _leaning(axis):
+    """Return the height of a disk's center for the normal of the plane in the axes of the disk."""
+    return lambda normal: 0.3 * np.linalg.norm(np.cross(normal, axis)) / np.linalg.norm(axis)
+
+
 def _contact(radius):
     return lambda frame, plane: PointContact(frame, plane=plane, radius=radius, unilateral=False)
 
 
 def _on_plane(make, body, plane, height):
-    """Return a frame of `body` at a height over a plane (z of frame "plane" of a body or of the world)."""
+    """Return a frame of `body` at a height over a plane (z of frame "plane" of a body or of the world).
+
+    The height is a number, or a function of the plane's normal in the axes of the frame.
+    """
 
     def build(rng):
         model, q = three_trees(rng)
         here = place_of(model, q, f"{body} tip")
         name = None if plane is None else "plane"
+        turn = here.rotation.T if plane is None else pin.rpy.rpyToMatrix(0.2, 0.3, -0.1)
+        above = height(turn[:, 2]) if callable(height) else height
         if plane is None:
-            q[model.joints[1].idx_q + 2] += height - here.translation[2]  # lift the floating base of the tree
+            base = model.joints[1].idx_q  # lift the floating base of the tree
+            q[base : base + 3] += (above - here.translation[2]) * model.jointPlacements[1].rotation[2]
         else:
-            turned = pin.SE3(here.rotation @ pin.rpy.rpyToMatrix(0.2, 0.3, -0.1), here.translation)
-            below = turned * pin.SE3(np.eye(3), np.array([0.4, -0.2, -height]))
+            turned = pin.SE3(here.rotation @ turn, here.translation)
+            below = turned * pin.SE3(np.eye(3), np.array([0.4, -0.2, -above]))
             attach(model, name, model.getJointId(plane), q, below)
         thing = make(f"{body} tip", name)
         key = "contacts" if isinstance(thing, PointContact) else "constraints"
@@ -155,9 +166,9 @@ TREES = {
     "motion of an endless joint": _joints(pn.PrescribedMotion("c1", pn.polynomial([0.2, 4.0]))),
     "motion of a helical joint": _joints(pn.PrescribedMotion("c2", _wobble)),
     "knife edge": _joints(pn.KnifeEdge("b2 tip", axis=AXIS)),
-    "disk on the ground": _on_plane(_disk(AXIS), "a0", None, 0.25),
+    "disk on the ground": _on_plane(_disk(AXIS), "a0", None, _leaning(AXIS)),
     "sphere on the ground": _on_plane(_disk(None), "a0", None, 0.3),
-    "disk on a moving plane": _on_plane(_disk("y"), "a3", "b2", 0.25),
+    "disk on a moving plane": _on_plane(_disk("y"), "a3", "b2", _leaning((0.0, 1.0, 0.0))),
     "sphere on a moving plane": _on_plane(_disk(None), "a3", "b2", 0.3),
     "point on a moving plane": _on_plane(_contact(0.0), "a3", "b2", 0.0),
     "ball on a moving plane": _on_plane(_contact(0.2), "c3", "a3", 0.2),

@@ -42,6 +42,18 @@ std::vector<Mode> modes_of(Workspace& w, const ModeQuery& query, const std::vect
 
 }  // namespace
 
+bool any_breaks(const ModeQuery& query, const RestEquation& equation, const VecX& x) {
+    VecX alpha;
+    FrictionLimits limits;
+    equation.respond(x, alpha, limits);
+    for (size_t i = 0; i < query.at_rest.size(); ++i) {
+        const RestElement& e = equation.elements[i];
+        const VecX force = x.segment(e.row, e.dim) - limits.middle.segment(e.row, e.dim);
+        if (breaks(query, query.at_rest[i], force, limits[i])) return true;
+    }
+    return false;
+}
+
 // Friction and acceleration of a slipping element are opposite. The larger one, relative to its rounding, gives the
 // slip direction.
 std::vector<Mode> modes_of(Workspace& w, const ModeQuery& query, const FrictionProblem& problem, const VecX& f,

@@ -17,6 +17,8 @@ struct SlipOnsetParameters {
 
 inline constexpr SlipOnsetParameters slip_onset_parameters{};
 
+// Check if an element that just reached its limit is at its limit under forces x, so that rest does not last.
+bool any_breaks(const ModeQuery& query, const RestEquation& equation, const VecX& x);
 // Compute the modes for the forces f of a program with these limits. Slip directions are stored in the workspace.
 std::vector<Mode> modes_of(Workspace& w, const ModeQuery& query, const FrictionProblem& problem, const VecX& f,
                            const FrictionLimits& limits);

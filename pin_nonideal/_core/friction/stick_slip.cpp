@@ -210,7 +210,7 @@ struct Search {
         // A complete search includes this motion. If all elements hold, no other motion has more sticking elements.
         const bool all_known = is_searched(equation) && !problem.has_zero_load_sets();
         if (slid && !all_known && equation.is_load_dependent()) {
-            if (motions.hold(problem, x)) {
+            if (motions.hold(problem, x) && !any_breaks(query, equation, x)) {
                 w.now.several = is_reliable;
                 w.now.several_element = list.front();
                 std::vector<Mode> modes = query.modes;

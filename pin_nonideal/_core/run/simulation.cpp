@@ -29,6 +29,7 @@ Simulation::Simulation(const Program& program, Workspace& workspace, const Optio
       chatter(system, progress, run_options, stiffness, time_stepping, recording),
       modes(system, progress, run_options, torques, output, impacts, chatter, recording) {
     progress.y = progress.rate = progress.configured_y = VecX::Zero(system.ny);
+    guess = w.state.unknown;
     // Time stepping solves for velocities. Accelerations are only recorded, so the solution nearest to the last one
     // suffices.
     const bool in_time = options.method.scheme == Method::Scheme::moreau;
@@ -183,6 +184,8 @@ std::optional<double> Simulation::integrate(const Proposal& proposal) {
     open_loop.reset();  // valid for this step only: a shorter one may fail for another reason
     watched = system.watches();
     if (watched) before_step = w.state;
+    guess = w.state.unknown;
+    has_guess = w.state.warm;
     const int active = system.active();
     stepper.y0.head(system.ns) = progress.y.head(system.ns);
     stepper.y0.segment(system.ns, active - system.ns).setZero();  // watch entries integrate over one step only
@@ -244,7 +247,10 @@ std::optional<double> Simulation::try_step(const Proposal& proposal) {
 bool Simulation::control_error(const Proposal& proposal, std::optional<double> error) {
     const bool accepted = control.accepts(error, proposal.size, proposal.last, progress.h);
     if (accepted) open_loop.reset();
-    else ++out.rejected;
+    else {
+        ++out.rejected;
+        restore_guess();
+    }
     progress.may_hand_over |= !accepted;
     const double spacing = std::abs(std::nextafter(progress.t, t_end) - progress.t);
     if (accepted || !error || progress.h >= parameters.min_step_spacings * spacing) return accepted;
@@ -300,12 +306,19 @@ bool Simulation::recover(const Failure& failure) {
     return has_switched || modes.bridge_with_time_stepping(failure, of_hand_over);
 }
 
+// The loads of a stage that diverged are no guess for a shorter step.
+void Simulation::restore_guess() {
+    w.state.unknown = guess;
+    w.state.warm = has_guess;
+}
+
 // Restore the modes and the dependent rows and forces of the step's start.
 void Simulation::back_to_start() {
     if (watched) {
         set_contacts(p, w, before_step.closed, before_step.mode);
         w.state = before_step;
     }
+    restore_guess();
     system.read(progress.y);
     begin_step(p, w, progress.t, system.q, system.v);
 }

@@ -71,6 +71,7 @@ protected:
     std::optional<double> to_hand_over();
     void find_event();
     bool recover(const Failure& failure);
+    void restore_guess();
     void back_to_start();
 
     std::optional<double> try_step(const Proposal& proposal);
@@ -118,6 +119,8 @@ protected:
     VecX projection_move;  // move by the projection of the step's end
     std::optional<FoundEvent> event;  // event in the step just taken
     RunState before_step;      // run state at the step's start, set if `watched`
+    VecX guess;                // loads at the step's start, the initial guess of its first stage
+    bool has_guess = false;    // true if the loads at the step's start are known
     bool watched = false;      // a contact was closed or an element active at the step's start
     bool hand_over_ahead = false;  // the step ends before a hand-over
     std::optional<Failure> open_loop;  // loop that a trial of this step could not close

@@ -145,3 +145,33 @@ def test_a_standing_quadruped_against_pinocchio():
     expected = pinocchio_acceleration(model, q, v, tau, rigid)
     a = scene.acceleration(q, v, tau)
     np.testing.assert_allclose(a, expected, rtol=0, atol=PINOCCHIO * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("rtol", [1e-10, 1e-11])
+def test_a_rate_that_is_not_given_is_exact_enough_for_tight_tolerances(rtol):
+    """A rod of a pendulum in space whose length swings, with and without its rate."""
+    model = pin.Model()
+    ball = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "ball")
+    model.appendBodyToJoint(ball, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
+
+    def length(t):
+        return 1.0 + 0.1 * np.sin(3.0 * t), 0.3 * np.cos(3.0 * t), -0.9 * np.sin(3.0 * t)
+
+    def rows(t, q, v, data):
+        r, dr, ddr = length(t)
+        return q[None], [dr * dr + r * ddr - v @ v]
+
+    def residual(t, q):
+        return [0.5 * (q @ q - length(t)[0] ** 2)]
+
+    def rate(t, q, v):
+        return [q @ v - length(t)[0] * length(t)[1]]
+
+    runs = []
+    for given in (None, rate):
+        rod = pn.UserConstraint(rows, 1, residual=residual, rate=given, name="rod")
+        scene = pn.Scene(model, constraints=[rod], q0=[0.6, 0.0, -0.8])
+        runs.append(pn.simulate(scene, 0.3, rtol=rtol, atol=0.01 * rtol, output_dt=0.1, max_steps=1000))
+    found, expected = runs
+    assert found.stats.steps + found.stats.rejected <= 2 * (expected.stats.steps + expected.stats.rejected)
+    np.testing.assert_allclose(found.q[-1], expected.q[-1], rtol=0.0, atol=1e2 * rtol)

@@ -118,8 +118,13 @@ def scene_of(system):
     return pn.Scene(model, laws=laws, forces=[pn.UserForce(system.force)])
 
 
+# In systems 73, 129 and 174 an element reaches its limit while all elements at rest still hold within rounding. In 213
+# one slips for 0.4 ms. In 117 several modes are possible at the start.
+REACHED = (73, 117, 129, 174, 213)
+
+
 @pytest.mark.parametrize("count", [1, 3])
-@pytest.mark.parametrize("seed", seeds(range(300)))
+@pytest.mark.parametrize("seed", seeds(range(300), always=REACHED, count=15))
 def test_random_systems_move_as_by_scipy(seed, count):
     system = random_system(seed, count)
     times = np.linspace(0.0, 4.0, 9)

@@ -21,7 +21,8 @@ LONGER = [
     pytest.param(kind, 1.0, marks=pytest.mark.slow) for kind in ("clamped", "pulse", "zigzag", "profile")
 ]
 ORDERED = [("natural", 1.0), ("zigzag", 4.0), *LONGER]
-# Sum of the errors of all steps in tolerances, and rounding of fast pulses.
+# Sum of the errors of all steps in tolerances at 1 rad/s, without one step of a fast pulse, whose tolerance
+# is rtol of the largest velocity; and rounding of fast pulses.
 ADDED, FLOOR = 300.0, 1e-10
 BALANCE = 1e-9
 
@@ -117,7 +118,8 @@ def test_no_break_is_leapt_over(kind, many):
         for method in ("dop853", "dopri5"):
             for rtol in (1e-6, 1e-9, 1e-12):
                 run = case.run(method=method, rtol=rtol, atol=1e-2 * rtol, record=("energy",))
-                assert case.miss(run) < max(ADDED * rtol, FLOOR), (seed, method, rtol)
+                missed, fastest = case.miss(run), np.abs(run.v).max()
+                assert missed < max((ADDED + fastest) * rtol, FLOOR), (seed, method, rtol)
                 allowed = max(ADDED * rtol, BALANCE) * max(1.0, np.ptp(run.energy["kinetic"]))
                 assert np.abs(run.energy["balance"]).max() < allowed, (seed, method, rtol)
 
