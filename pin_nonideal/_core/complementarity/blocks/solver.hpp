@@ -19,9 +19,8 @@ struct BlockSolverParameters {
     int max_compliances = 30;                // maximum number of compliances on the path
     // Maximum rounds of sweeps, and sweeps of a round.
     int max_sweep_rounds = 8, sweeps_per_round = 50;
-    // Error from which sweeps from no forces replace the best forces found, and the number of these sweeps.
-    double min_swept_error = 1e-2;
-    int last_sweeps = 400;
+    double min_swept_error = 1e-2;  // error from which sweeps from no forces replace the best forces found
+    int last_sweeps = 400;          // number of these sweeps
 };
 
 class BlockSolver {

@@ -112,7 +112,7 @@ bool StepForces::solve(double h, const VecX& q0, const VecX& v0) {
     f.head(n) -= middle_.head(n);
     end_rows.head(n) = free_rows_.head(n);
     end_rows.head(n).noalias() += W * middle_.head(n);
-    solver_.search_briefly(error < BlockSolver::parameters.min_swept_error);
+    solver_.search_briefly(error < parameters.max_brief_error);
     if (!solved)
         solved = solver_.solve(W, end_rows.head(n), elements_.cones, true, f.head(n), true) == ConeStatus::solved &&
                  !add_energy(W, end_rows.head(n), f.head(n));

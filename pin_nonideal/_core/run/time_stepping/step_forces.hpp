@@ -12,6 +12,8 @@
 namespace pn {
 
 struct StepForcesParameters {
+    // Error of the forces found tree by tree, relative to them, up to which the search with all responses is brief.
+    double max_brief_error = 1e-2;
     // Largest turn of a direction in a step whose change of a rate is taken into account [half rad].
     double max_turn = 0.25;
     // Distance of a force at its limit, relative to the largest force.
