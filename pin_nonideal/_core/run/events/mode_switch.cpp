@@ -40,7 +40,8 @@ void ModeChanges::change(FoundEvent event) {
         }
     } catch (const Failure& failure) {
         keep_last(before, has_impact);
-        const bool of_hand_over = event.of_hand_over && !has_impact && of_closed_contacts(failure);
+        const bool of_hand_over =
+            !has_impact && ((event.of_hand_over && of_closed_contacts(failure)) || of_contradicting_contacts(failure));
         if (!(of_hand_over || is_recoverable(failure)) || !step_over(failure, of_hand_over)) throw;
         return;
     }
@@ -113,6 +114,11 @@ bool ModeChanges::of_closed_contacts(const Failure& failure) {
     using Kind = Failure::Kind;
     return failure.kind == Kind::closure || failure.kind == Kind::inconsistent || failure.kind == Kind::not_finite ||
            failure.kind == Kind::step_size;
+}
+
+bool ModeChanges::of_contradicting_contacts(const Failure& failure) const {
+    return failure.kind == Failure::Kind::inconsistent && failure.value > 0.0 &&
+           std::all_of(failure.elements.begin(), failure.elements.end(), [&](int block) { return block >= p.first_gap; });
 }
 
 bool ModeChanges::step_over(const Failure& failure, bool of_hand_over) {
