@@ -118,8 +118,8 @@ def scene_of(system):
     return pn.Scene(model, laws=laws, forces=[pn.UserForce(system.force)])
 
 
-# In systems 73, 129 and 174 an element reaches its limit while all elements at rest still hold within rounding. In 213
-# one slips for 0.4 ms. In 117 several modes are possible at the start.
+# In systems 73, 129 and 174 an element reaches its limit while all elements at rest still hold within
+# rounding. In 213 one slips for 0.4 ms. In 117 several modes are possible at the start.
 REACHED = (73, 117, 129, 174, 213)
 
 
