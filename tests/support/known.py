@@ -60,6 +60,26 @@ KNOWN: list[Known] = [
         functions="simulate .*|stepper|poses of a replay",
     ),
     Known(
+        "time stepping splits the load of four feet otherwise if rows act or friction holds a joint",
+        ("robot solo12_dropped", "an idle row", "simulate moreau"),
+        scenes="robot solo12_dropped",
+        transformations="boosted|accelerated|split by a lock|an idle row|friction without limit",
+        functions="simulate moreau",
+    ),
+    Known(
+        "rows in Python change the ledger of time stepping by a tenth of its balance",
+        ("robot slider_crank", "an idle row", "simulate moreau"),
+        scenes="robot slider_crank",
+        transformations="an idle row",
+        functions="simulate moreau",
+    ),
+    Known(
+        "differences in time, for a rate that is not given and for checks, have steps in seconds",
+        ("rows of user", "tonnes, kilometers, hours", "solve"),
+        scenes="rows of user",
+        transformations="tonnes, kilometers, hours",
+    ),
+    Known(
         "time stepping of a contact that resists turning strikes otherwise where there are loops",
         ("touching PointContact", "an idle row", "simulate moreau"),
         scenes="touching .*",

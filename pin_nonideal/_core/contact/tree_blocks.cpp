@@ -1,6 +1,7 @@
 #include "contact/tree_blocks.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace pn {
 
@@ -23,10 +24,15 @@ TreeBlocks::TreeBlocks(const Program& p) : size_(p.mechanism.nv, 0), node_(p.mec
     }
 }
 
-// Check the ratio of the pivots of a tree. Pivots of different trees may differ by any factor.
-bool TreeBlocks::is_well_conditioned(const Workspace& w, int root) const {
-    const auto pivots = w.now.terms.D.segment(root, size_[root]);
-    return pivots.maxCoeff() <= max_pivot_ratio * pivots.minCoeff();
+// Check the ratio of the pivots of a tree, in units of its dofs. Pivots of different trees may differ by any factor.
+bool TreeBlocks::is_well_conditioned(const Program& p, const Workspace& w, int root) const {
+    double least = HUGE_VAL, most = 0.0;
+    for (int dof = root; dof < root + size_[root]; ++dof) {
+        const double unit = p.mechanism.unit[dof], pivot = unit * unit * w.now.terms.D[dof];
+        least = std::min(least, pivot);
+        most = std::max(most, pivot);
+    }
+    return most <= max_pivot_ratio * least;
 }
 
 int TreeBlocks::node_of(const Program& p, const Workspace& w, int root, BlockProblem& problem) {
@@ -58,7 +64,8 @@ bool TreeBlocks::fill(const Program& p, const Workspace& w, const std::vector<St
                 trees[trees[0] >= 0] = root;
             }
         if (trees[0] < 0) return false;
-        if (!is_well_conditioned(w, trees[0]) || (trees[1] >= 0 && !is_well_conditioned(w, trees[1]))) return false;
+        for (int root : trees)
+            if (root >= 0 && !is_well_conditioned(p, w, root)) return false;
         const int first = node_of(p, w, trees[0], problem);
         const int second = trees[1] < 0 ? -1 : node_of(p, w, trees[1], problem);
         BlockElement& e = problem.elements[problem.add_element(cone, first, second)];

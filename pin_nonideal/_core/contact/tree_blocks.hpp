@@ -23,7 +23,7 @@ public:
               const std::vector<ConeElement>& cones, BlockProblem& problem);
 
 private:
-    bool is_well_conditioned(const Workspace& w, int root) const;
+    bool is_well_conditioned(const Program& p, const Workspace& w, int root) const;
     int node_of(const Program& p, const Workspace& w, int root, BlockProblem& problem);
 
     std::vector<int> root_, local_, size_;  // by dof: first dof of its tree, index in it; by first dof: dofs of the tree

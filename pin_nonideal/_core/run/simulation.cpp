@@ -295,7 +295,8 @@ bool Simulation::leaves_rate(const Proposal& proposal) const {
 bool Simulation::recover(const Failure& failure) {
     const bool can_switch_modes = modes.can_switch_modes(failure);
     const bool at_hand_over = hand_over_ahead || progress.t - progress.hand_over_time <= ChatterDetector::parameters.window;
-    const bool of_hand_over = at_hand_over && ModeChanges::is_of_closed_contacts(failure);
+    const bool of_hand_over =
+        (at_hand_over && ModeChanges::is_of_closed_contacts(failure)) || modes.is_of_contradicting_contacts(failure);
     const bool is_recoverable = of_hand_over || ModeChanges::is_recoverable(failure);
     if (!can_switch_modes && !is_recoverable) return false;
     bool has_switched = false;

@@ -1,6 +1,7 @@
 #include "tree/pinocchio_reader.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <stdexcept>
 
@@ -164,6 +165,24 @@ void find_deep_trees(Mechanism& m) {
     }
 }
 
+// Set the units and levers of the dofs.
+void measure_dofs(Mechanism& m) {
+    std::vector<double> square(m.joints.size(), 0.0);  // by root
+    for (const Joint& j : m.joints) {
+        if (!(j.mass > 0.0)) continue;
+        const double trace = j.inertia.c[0][0] + j.inertia.c[1][1] + j.inertia.c[2][2];
+        square[j.root] = std::max(square[j.root], j.com.squaredNorm() + 0.5 * trace / j.mass);
+    }
+    m.unit.setOnes(m.nv);
+    m.lever.setOnes(m.nv);
+    for (int dof = 0; dof < m.nv; ++dof) {
+        const Joint& j = m.joints[m.dof_joint[dof]];
+        const int sliding = j.kind == JointKind::free_flyer ? 3 : j.kind == JointKind::planar ? 2 : 0;
+        const double radius = square[j.root] > 0.0 ? std::sqrt(square[j.root]) : 1.0;
+        (slides(j) || dof - j.iv < sliding ? m.unit : m.lever)[dof] = radius;
+    }
+}
+
 void lay_out_rows(Mechanism& m) {
     for (int dof = 0; dof < m.nv; ++dof) {
         m.row_offset.push_back(m.row_entries);
@@ -237,6 +256,7 @@ Mechanism read_mechanism(const void* opaque, Provider provider) {
     }
     order_dofs(m);
     find_deep_trees(m);
+    measure_dofs(m);
     lay_out_rows(m);
     if (provider == Provider::pinocchio) require_branches(m);
     return m;

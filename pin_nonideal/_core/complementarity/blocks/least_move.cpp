@@ -39,7 +39,13 @@ bool LeastMove::factor(int i) {
     return factored_[i] > 0;
 }
 
-// Largest component of the moves that reduce single residuals to zero.
+// Largest displacement of an unknown of a node, as a length.
+double LeastMove::length(const BlockNode& node, const VecX& move) const {
+    const auto own = [&node](const VecX& x) { return x.segment(node.first, node.size).array(); };
+    return (own(move) * own(lever)).abs().maxCoeff();
+}
+
+// Largest displacement of the moves that reduce single residuals to zero.
 double LeastMove::longest_single(int i, const VecX& r) {
     double longest = 0.0;
     scaled_.setZero();
@@ -57,7 +63,7 @@ double LeastMove::longest_single(int i, const VecX& r) {
             for (int side = 0; side < 2 && e.node[side] >= 0; ++side) {
                 const BlockNode& node = problem.nodes[e.node[side]];
                 problem.solve_mass(e.node[side], single_);
-                longest = std::max(longest, single_.segment(node.first, node.size).cwiseAbs().maxCoeff());
+                longest = std::max(longest, length(node, single_));
             }
         }
     }
@@ -97,9 +103,8 @@ bool LeastMove::seek(int i, const VecX& r, VecX& move) {
         }
         factors_[i].solve(move);
         exert(i, r, move);
-        for (int n : islands_[i].nodes)
-            size = std::max(size, move.segment(problem.nodes[n].first, problem.nodes[n].size).cwiseAbs().maxCoeff());
-        if (size * parameters.short_lever <= residual) return true;
+        for (int n : islands_[i].nodes) size = std::max(size, length(problem.nodes[n], move));
+        if (size <= parameters.max_move_ratio * residual) return true;
         if (longest < 0.0) longest = longest_single(i, r);
         if (size <= parameters.max_move_ratio * longest) return true;
     }

@@ -13,10 +13,9 @@ namespace pn {
 struct LeastMoveParameters {
     // Weight of a row, relative to the inertia that it moves, and the ratio of the next lower one.
     double max_weight = 1e8, weight_ratio = 1e-2;
-    // A move longer than this many times the longest move of a single row resolves no gap: rows contradict each other.
-    double max_move_ratio = 10.0;
-    // Lever [m] below which the length of single moves is computed to judge a move.
-    double short_lever = 0.1;
+    // A move longer than this many times the largest residual and the longest move of a single row resolves no gap: rows
+    // contradict each other.
+    double max_move_ratio = 5.0;
     // Largest part of a probing motion that rows leave to a node without freedom.
     double max_unheld_part = 1e-3;
 };
@@ -29,6 +28,7 @@ public:
     // Nodes, elements, M and J are set by the caller. J may change after pose. Moves then follow the new rows with the
     // factor of the old rows, and exert equal and opposite forces on two nodes.
     BlockProblem problem;
+    VecX lever;  // by unknown of the whole scene: length of a unit displacement, set by the caller
 
     // Prepare the problem once it is set. Return false if an inertia is not positive definite.
     bool pose();
@@ -42,6 +42,7 @@ public:
 
 private:
     bool factor(int island);
+    double length(const BlockNode& node, const VecX& move) const;
     double longest_single(int island, const VecX& r);
     void exert(int island, const VecX& r, VecX& move);
     bool seek(int island, const VecX& r, VecX& move);

@@ -41,7 +41,8 @@ void ModeChanges::change(FoundEvent event) {
     });
     if (failure) {
         restore_last(before, has_impact);
-        const bool of_hand_over = event.of_hand_over && !has_impact && is_of_closed_contacts(*failure);
+        const bool of_hand_over = !has_impact && ((event.of_hand_over && is_of_closed_contacts(*failure)) ||
+                                                  is_of_contradicting_contacts(*failure));
         if (!bridge_with_time_stepping(*failure, of_hand_over)) throw *failure;
         return;
     }
@@ -109,6 +110,11 @@ bool ModeChanges::is_of_closed_contacts(const Failure& failure) {
     using Kind = Failure::Kind;
     return failure.kind == Kind::closure || failure.kind == Kind::inconsistent || failure.kind == Kind::not_finite ||
            failure.kind == Kind::step_size;
+}
+
+bool ModeChanges::is_of_contradicting_contacts(const Failure& failure) const {
+    return failure.kind == Failure::Kind::inconsistent && failure.value > 0.0 &&
+           std::all_of(failure.elements.begin(), failure.elements.end(), [&](int block) { return block >= p.first_gap; });
 }
 
 bool ModeChanges::bridge_with_time_stepping(const Failure& failure, bool of_hand_over) {

@@ -40,6 +40,8 @@ public:
     bool bridge_with_time_stepping(const Failure& failure, bool of_hand_over = false);
     // Check if a step failed because closed contacts contradict each other or the accuracy.
     static bool is_of_closed_contacts(const Failure& failure);
+    // Check if rows of closed contacts alone contradict each other, which are nearly dependent then.
+    bool is_of_contradicting_contacts(const Failure& failure) const;
     // Bridge an accumulation of events, and select modes at the new state.
     void bridge_chatter(int element);
 

@@ -17,7 +17,9 @@ static void hold_locked(const Program& p, const Workspace& w, VecX& x) {
 }
 
 ContactProjection::ContactProjection(const Program& p)
-    : blocks_(p), flyers_(MeanVelocity::flyers(p)), r_(VecX::Zero(p.layout.rows)), move_(VecX::Zero(p.mechanism.nv)) {}
+    : blocks_(p), flyers_(MeanVelocity::flyers(p)), r_(VecX::Zero(p.layout.rows)), move_(VecX::Zero(p.mechanism.nv)) {
+    least_.lever = p.mechanism.lever;
+}
 
 // Add an element of the rows of a block, or join them to the last element.
 void ContactProjection::add(int block, int rows, bool joined) {

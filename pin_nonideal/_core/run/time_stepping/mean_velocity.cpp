@@ -19,7 +19,8 @@ std::vector<MeanVelocity::FreeFlyer> MeanVelocity::flyers(const Program& p) {
     return out;
 }
 
-MeanVelocity::MeanVelocity(const Program& p) : flyers_(flyers(p)), turning_(VecX::Zero(p.mechanism.nv)) {}
+MeanVelocity::MeanVelocity(const Program& p)
+    : flyers_(flyers(p)), unit_(p.mechanism.unit), turning_(VecX::Zero(p.mechanism.nv)) {}
 
 void MeanVelocity::begin(double h, const VecX& v0) {
     h_ = h;
@@ -47,7 +48,7 @@ void MeanVelocity::end(const VecX& a, VecX& v1) {
 bool MeanVelocity::move() {
     next_ = 0.5 * (start_ + end_);
     double change = 0.0;
-    for (int k = 0; k < next_.size(); ++k) change = std::max(change, std::abs(next_[k] - value_[k]));
+    for (int k = 0; k < next_.size(); ++k) change = std::max(change, std::abs(next_[k] - value_[k]) / unit_[k]);
     const double allowed = moves_ == 0 ? parameters.configuration_rounding : parameters.configuration_tolerance;
     if (moves_ == parameters.max_sweeps || h_ * change <= allowed) return false;
     value_ = next_;

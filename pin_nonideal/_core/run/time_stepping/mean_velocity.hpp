@@ -8,7 +8,7 @@
 namespace pn {
 
 struct MeanVelocityParameters {
-    // Change of the configuration in a step [rad or m] that counts as rounding.
+    // Change of the configuration in a step that counts as rounding [rad, or radius of the tree].
     double configuration_rounding = 1e-13;
     // Change by a further sweep below which no sweep follows. The second sweep makes the step second order. Fast motion
     // needs more sweeps to conserve its energy.
@@ -60,6 +60,7 @@ private:
     void measure();
 
     std::vector<FreeFlyer> flyers_;
+    VecX unit_;  // by dof
     double h_ = 0.0;
     VecX value_, start_, end_, next_;
     VecX turning_;  // rates of the linear velocities by turning axes
