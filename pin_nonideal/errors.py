@@ -262,11 +262,11 @@ _parts.maxlist = _parts.maxtuple = _parts.maxdict = _parts.maxset = _parts.maxfr
 _parts.maxlevel, _parts.maxstring, _parts.maxother = 3, 30, 30
 
 
-def _shorten(text: str, most: int, end: int = 0) -> str:
+def _shorten(text: str, max_length: int, end: int = 0) -> str:
     """Return a text, or its beginning and its last `end` characters around " ... "."""
-    if len(text) <= most:
+    if len(text) <= max_length:
         return text
-    return f"{text[: most - end - 5]} ... {text[len(text) - end :]}".rstrip()
+    return f"{text[: max_length - end - 5]} ... {text[len(text) - end :]}".rstrip()
 
 
 def _is_close(name: str, known: str) -> bool:

@@ -35,28 +35,28 @@ def effort_limits(u: object, model: Model, acts: Sequence[Mask]) -> tuple[Array,
         return None
     if len(outer) == 1:
         return _efforts(outer[0], model)
-    least, most = np.full(model.nv, -np.inf), np.full(model.nv, np.inf)
+    lower, upper = np.full(model.nv, -np.inf), np.full(model.nv, np.inf)
     first = 0
     for drive in outer:
         count = len(requesting_drives(drive))
         if isinstance(drive, EffortLimits):
             own = np.logical_or.reduce(acts[first : first + count])
-            for all_limits, limits in zip((least, most), _efforts(drive, model), strict=True):
+            for all_limits, limits in zip((lower, upper), _efforts(drive, model), strict=True):
                 all_limits[own] = limits[own]
         first += count
-    return least, most
+    return lower, upper
 
 
 def _efforts(u: EffortLimits, model: Model) -> tuple[Array, Array]:
     """Return the lower and upper effort limit of each degree of freedom; no limit is infinite."""
     if u.effort is not None:
         if isinstance(u.effort, float):
-            most = np.full(model.nv, u.effort)
+            upper = np.full(model.nv, u.effort)
         else:
-            most = named_joint_values(model, u.effort, f"{words(u)}: effort", others=np.inf)
-        return -most, most
-    least, most = model.lowerEffortLimit.copy(), model.upperEffortLimit.copy()
-    unstated = least >= most
-    least[unstated | (least <= -UNLIMITED_EFFORT)] = -np.inf
-    most[unstated | (most >= UNLIMITED_EFFORT)] = np.inf
-    return np.ascontiguousarray(least), np.ascontiguousarray(most)
+            upper = named_joint_values(model, u.effort, f"{words(u)}: effort", others=np.inf)
+        return -upper, upper
+    lower, upper = model.lowerEffortLimit.copy(), model.upperEffortLimit.copy()
+    unstated = lower >= upper
+    lower[unstated | (lower <= -UNLIMITED_EFFORT)] = -np.inf
+    upper[unstated | (upper >= UNLIMITED_EFFORT)] = np.inf
+    return np.ascontiguousarray(lower), np.ascontiguousarray(upper)

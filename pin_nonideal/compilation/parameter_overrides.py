@@ -155,10 +155,10 @@ def _body(compiled: CompiledScene, name: str, entries: Mapping[str, object], n: 
     good = heavy if not bodies else moments[:, 0] >= -ROUNDING * moments[:, 2]
     if not good.all():
         k = int(np.argmin(good))
-        least = f" and a least moment of {moments[k, 0]:g} kg m^2" if bodies else ""
+        moment = f" and a least moment of {moments[k, 0]:g} kg m^2" if bodies else ""
         raise InputError(
             f"{who}: masses must be positive, and so moments of inertia about the center of mass; "
-            f"run {k} has a mass of {mass[k]:g} kg{least}"
+            f"run {k} has a mass of {mass[k]:g} kg{moment}"
         )
     return {
         ("body", joint, "mass"): mass,

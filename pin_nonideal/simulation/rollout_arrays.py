@@ -50,8 +50,8 @@ class RunArrays:
         return len(self.t)
 
     def __repr__(self) -> str:
-        most, failed = self.t.shape[1], len(self.failures)
-        return f"<RunArrays: {len(self)} runs of up to {most} samples, {failed} failed>"
+        max_samples, failed = self.t.shape[1], len(self.failures)
+        return f"<RunArrays: {len(self)} runs of up to {max_samples} samples, {failed} failed>"
 
     @property
     def last(self) -> tuple[Array, Array]:
@@ -113,11 +113,11 @@ def run_arrays(
         )
     except KeyboardInterrupt:
         raise RunInterrupted("the runs were interrupted") from None
-    most = t.size // n if n else 0
+    max_samples = t.size // n if n else 0
     runs = RunArrays(
-        t.reshape(n, most),
-        q.reshape(n, most, -1) if n * most else np.zeros((n, most, q0.shape[1])),
-        v.reshape(n, most, -1) if n * most else np.zeros((n, most, v0.shape[1])),
+        t.reshape(n, max_samples),
+        q.reshape(n, max_samples, -1) if n * max_samples else np.zeros((n, max_samples, q0.shape[1])),
+        v.reshape(n, max_samples, -1) if n * max_samples else np.zeros((n, max_samples, v0.shape[1])),
         samples.astype(np.int64),
         violation,
         steps.astype(np.int64),
@@ -131,8 +131,12 @@ def _of_outcomes(scene: Scene, outcomes: Sequence[core.Outcome]) -> RunArrays:
     """Return the samples of runs whose components took their own steps."""
     n, (nq, nv) = len(outcomes), (scene.model.nq, scene.model.nv)
     samples = np.array([len(one.t) for one in outcomes], dtype=np.int64)
-    most = int(samples.max(initial=0))
-    t, q, v = np.full((n, most), np.nan), np.full((n, most, nq), np.nan), np.full((n, most, nv), np.nan)
+    max_samples = int(samples.max(initial=0))
+    t, q, v = (
+        np.full((n, max_samples), np.nan),
+        np.full((n, max_samples, nq), np.nan),
+        np.full((n, max_samples, nv), np.nan),
+    )
     for i, one in enumerate(outcomes):
         t[i, : samples[i]] = one.t
         q[i, : samples[i]] = one.q.reshape(-1, nq)

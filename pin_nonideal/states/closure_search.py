@@ -87,9 +87,9 @@ class ClosureSearch:
         phi = np.where(self._gaps, np.minimum(phi, 0.0), phi)
         weighted = A * self.unit
         reach = np.linalg.norm(weighted, axis=1)
-        most = np.abs(weighted[:, self._slides]).max(axis=1, initial=0.0)
+        max_slide = np.abs(weighted[:, self._slides]).max(axis=1, initial=0.0)
         acts = reach > MIN_ROW_LENGTH * reach.max(initial=0.0)
-        far = self.length * np.divide(np.abs(phi) * most, reach**2, out=np.zeros_like(phi), where=acts)
+        far = self.length * np.divide(np.abs(phi) * max_slide, reach**2, out=np.zeros_like(phi), where=acts)
         return np.where(self._slides, max(self.length, _largest(far)), 1.0)
 
     def _rows(

@@ -63,10 +63,10 @@ class UnilateralClosure(Search):
         for _ in range(MAX_SETTLINGS):
             self._hold(np.zeros(0, dtype=int))
             free_iterate = self._place(iterate.q)
-            least = self._least(free_iterate, free_iterate.move)
-            if least is None:
+            move = self._least(free_iterate, free_iterate.move)
+            if move is None:
                 break
-            self._hold(least.touching)
+            self._hold(move.touching)
             start = self._retract(iterate.q)
             if start is None:
                 break

@@ -151,9 +151,9 @@ class Search:
         open_iterate = self._place(self.q0)
         starts, further, often = STARTS, 0, 0
         generator = np.random.default_rng(0)  # a fixed seed makes the result deterministic
-        most = MAX_STARTS if len(self.unit) <= FEW_FREEDOMS else 0
+        max_starts = MAX_STARTS if len(self.unit) <= FEW_FREEDOMS else 0
         k = 0
-        while k < starts or (k < most and (further and often < OFTEN if best else fallback is None)):
+        while k < starts or (k < max_starts and (further and often < OFTEN if best else fallback is None)):
             longest = 1.0 if best is None else max(1.0, self._longest(best.q))
             spread = longest * SPREADS[k % len(SPREADS)] * generator.standard_normal(len(self.unit))
             k += 1

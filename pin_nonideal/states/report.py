@@ -77,11 +77,11 @@ def report_of(
     """
     (q, v), (on, v_on) = start, projected
     move, change = pin.difference(model, q, on), v_on - v
-    distance, most, moved = _largest_change(model, unit, mass, q, move)
+    distance, max_change, moved = _largest_change(model, unit, mass, q, move)
     velocity_distance, fastest, changed = _largest_change(model, unit, mass, on, change)
     return ProjectionReport(
         distance,
-        most,
+        max_change,
         moved,
         gap,
         iterations if move.any() else 0,

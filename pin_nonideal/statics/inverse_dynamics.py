@@ -161,10 +161,10 @@ def _bounds(scene: Scene, bounds: object, dofs: list[int]) -> tuple[Array, Array
             return np.full(len(dofs), float(array(what, entry, ())))
         return array(what, entry, (len(dofs),))
 
-    least, largest = bound(0, -np.inf), bound(1, np.inf)
-    if not (least < largest).all():
+    lower, upper = bound(0, -np.inf), bound(1, np.inf)
+    if not (lower < upper).all():
         raise InputError("inverse_dynamics: bounds must leave room: each least torque below the largest")
-    return least, largest
+    return lower, upper
 
 
 def _allowed_residual(rest: AtRest, q: Array, A: Array, b: Array, a: Array) -> Array:
@@ -273,14 +273,14 @@ def _bounded_least_squares(
         return np.asarray(u)
     from scipy.optimize import lsq_linear
 
-    least, largest = limits
+    lower, upper = limits
     left, values, right = np.linalg.svd(scaled, full_matrices=False)
     G = left @ (np.where(values > MIN_SINGULAR_VALUE, values, 0.0)[:, None] * right) * lengths
     weight = 1e4 * max(1.0, float(np.linalg.norm(G)))
     rows = np.vstack([weight * G, np.eye(G.shape[1])])
     near = lsq_linear(rows, np.append(weight * needed, np.zeros(G.shape[1])), limits, method="bvls").x
-    room = 1e-9 * (largest - least)
-    free = (near > least + room) & (near < largest - room)
-    u = np.where(near <= least + room, least, np.where(near >= largest - room, largest, 0.0))
+    room = 1e-9 * (upper - lower)
+    free = (near > lower + room) & (near < upper - room)
+    u = np.where(near <= lower + room, lower, np.where(near >= upper - room, upper, 0.0))
     u[free] = minimum_norm(scaled[:, free], needed - G[:, ~free] @ u[~free], lengths[free])
-    return np.asarray(np.clip(u, least, largest))
+    return np.asarray(np.clip(u, lower, upper))

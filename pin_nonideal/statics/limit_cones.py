@@ -228,10 +228,10 @@ class LimitCones:
         )
         return np.zeros(several) if optimum.x is None else np.asarray(optimum.x[self.count :])
 
-    def _within_cones(self, factor: float, sign: float = 0.0, most: float = 0.0) -> tuple[float, Array]:
+    def _within_cones(self, factor: float, sign: float = 0.0, max_excess: float = 0.0) -> tuple[float, Array]:
         """Solve the programs of more and more cuts until the forces lie within all cones."""
         for _ in range(MAX_CUTS):
-            excess, x = self._program(factor, sign, most)
+            excess, x = self._program(factor, sign, max_excess)
             if not len(x):
                 break
             outside = [
@@ -257,13 +257,13 @@ class LimitCones:
         row, constant = self._limit(e, factor)
         return float(np.linalg.norm(x[self.parts[e]]) - row @ x - constant)
 
-    def _program(self, factor: float, sign: float, most: float) -> tuple[float, Array]:
+    def _program(self, factor: float, sign: float, max_excess: float) -> tuple[float, Array]:
         """Solve the linear program of the current cuts: n f - limit <= s for each cut.
 
         Args:
             factor: factor of all limits.
-            sign: 0 for the least s; otherwise the largest sign times the additional torque, with s <= most.
-            most: see sign.
+            sign: 0 for the least s; otherwise the largest sign times the additional torque.
+            max_excess: maximum s, with a sign.
 
         Returns:
             s and the unknowns; s is infinite if nothing balances, and there are no unknowns without bound.
@@ -278,7 +278,7 @@ class LimitCones:
             rows.append(np.append(row, -1.0))
             bounds.append(constant)
         limits: list[tuple[float | None, float | None]] = [(None, None)] * self.count
-        limits.append((0.0, most if sign else None))
+        limits.append((0.0, max_excess if sign else None))
         for first in self.contacts:
             limits[first] = (0.0, None)
         for open_element in self.open:

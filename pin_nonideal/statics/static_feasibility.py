@@ -131,14 +131,14 @@ def _unheld(scene: Scene, at_rest: AtRest, q: Array, cones: LimitCones) -> str:
     rows = {first: name for name, (first, _, contact) in compiled_scene(scene).rows.items() if contact}
     parts = []
     if pulls:
-        most = max(pulls.values())
+        largest = max(pulls.values())
         parts.append(
-            f"contacts would have to pull, with up to {most:.4g} N: {_quote([rows[k] for k in pulls])}"
+            f"contacts would have to pull, with up to {largest:.4g} N: {_quote([rows[k] for k in pulls])}"
         )
     if missing_friction:
         names = _quote([scene.element_names[e] for e in missing_friction])
-        most = max(missing_friction.values())
-        parts.append(f"friction without a load would have to hold up to {most:.4g} (N or N m): {names}")
+        largest = max(missing_friction.values())
+        parts.append(f"friction without a load would have to hold up to {largest:.4g} (N or N m): {names}")
     return "; ".join(parts) or "no forces balance the scene"
 
 

@@ -161,8 +161,8 @@ def _independent_rows(
     if gap > tolerance:
         return None, q, gap, ""
     generator = np.random.default_rng(5)
-    independent, rank, rounded, least = _independent(model, runner, q, tolerance)
-    nearest = [least]
+    independent, rank, rounded, smallest = _independent(model, runner, q, tolerance)
+    nearest = [smallest]
     for _ in range(MAX_PROBES):
         free = _null_space(model, runner, q, tolerance)
         if not free.shape[1]:
@@ -209,13 +209,13 @@ def _independent(
     rest, rounded = _unit_rows(model, runner, q, tolerance)
     values = np.linalg.svd(rest, compute_uv=False) if rest.size else np.zeros(0)
     rounded = rounded or bool(((values > ROUNDING) & (values <= tolerance)).any())
-    least = float(values[values > tolerance].min(initial=np.inf))
+    smallest = float(values[values > tolerance].min(initial=np.inf))
     independent = np.zeros(len(rest), dtype=bool)
     while True:
         length = np.linalg.norm(rest, axis=1)
         best = int(np.argmax(length)) if len(rest) else 0
         if not len(rest) or length[best] <= tolerance:
-            return independent, int(independent.sum()), rounded, least
+            return independent, int(independent.sum()), rounded, smallest
         independent[best] = True
         direction = rest[best] / length[best]
         rest = rest - np.outer(rest @ direction, direction)

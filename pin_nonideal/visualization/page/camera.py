@@ -135,16 +135,16 @@ def _fixed_corners(motion: Motion, visuals: list[Visual], points: Array) -> list
 
     A large floor would make the moving bodies small.
     """
-    least, most = points.reshape(-1, 3).min(axis=0), points.reshape(-1, 3).max(axis=0)
-    room, boxes = 2.0 * float(np.linalg.norm(most - least)), []
+    lower, upper = points.reshape(-1, 3).min(axis=0), points.reshape(-1, 3).max(axis=0)
+    room, boxes = 2.0 * float(np.linalg.norm(upper - lower)), []
     for visual in (v for v in visuals if v.joint == 0):
         corners = np.array(_corners(motion, visual))
         if not len(corners):
             continue
-        low = np.minimum(least, corners[:, 0].min(axis=0))
-        high = np.maximum(most, corners[:, 0].max(axis=0))
+        low = np.minimum(lower, corners[:, 0].min(axis=0))
+        high = np.maximum(upper, corners[:, 0].max(axis=0))
         if np.linalg.norm(high - low) <= room:
-            least, most = low, high
+            lower, upper = low, high
             boxes.append(corners)
     return boxes
 

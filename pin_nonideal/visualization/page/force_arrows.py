@@ -131,11 +131,11 @@ def _above_rounding(arrows: list[Arrow], model: pin.Model, size: float) -> list[
     scales = weight_scales(model, size)
     force = max([scales["N"], *(arrow.largest() for arrow in arrows if arrow.unit == "N")])
     moment = max([scales["N m"], *(arrow.largest() for arrow in arrows if arrow.unit == "N m")])
-    least = {
+    min_size = {
         "N": MIN_RELATIVE_SIZE * max(force, moment / size),
         "N m": MIN_RELATIVE_SIZE * max(moment, force * size),
     }
-    return [arrow for arrow in arrows if arrow.largest() > least[arrow.unit]]
+    return [arrow for arrow in arrows if arrow.largest() > min_size[arrow.unit]]
 
 
 def _reaction(

@@ -143,8 +143,8 @@ class _Frames:
 
     def __init__(self, run: Trajectory, share: int) -> None:
         # Many ghosts have fewer frames each.
-        self.least = max(MIN_FRAMES // max(share // 4, 1), 60)
-        self.most = MAX_NUMBERS // share
+        self.min_frames = max(MIN_FRAMES // max(share // 4, 1), 60)
+        self.max_frames = MAX_NUMBERS // share
         self.run, self.t, self.cubics = run, np.asarray(run.t, dtype=np.float64), Cubics(run)
         self.tracks = Tracks(run.scene.model)
         start = self.tracks.placements(self.tracks.coordinates(run.q[:1]))[0]
@@ -184,15 +184,17 @@ class _Frames:
 
     def choose(self) -> None:
         """Set the samples, thinned if there are too many, and frames in between where the motion is fast."""
-        most = int(np.clip(self.most // max(self.tracks.width, 1), 2 * self.least, MAX_FRAMES // 10))
-        self.before = _base(self.run, self.size, most)
+        max_frames = int(
+            np.clip(self.max_frames // max(self.tracks.width, 1), 2 * self.min_frames, MAX_FRAMES // 10)
+        )
+        self.before = _base(self.run, self.size, max_frames)
         self.part = np.zeros(len(self.before))
         self.q = np.asarray(self.run.q[self.before])
         self.rows = self.tracks.steady(self.tracks.coordinates(self.q))
-        longest = (self.t[-1] - self.t[0]) / self.least
+        longest = (self.t[-1] - self.t[0]) / self.min_frames
         open_ones = np.ones(max(len(self.before) - 1, 0), dtype=bool)
         for _ in range(MAX_BISECTIONS):
-            room = most - len(self.before)
+            room = max_frames - len(self.before)
             where = np.flatnonzero(open_ones & self._divisible())
             if room <= 0 or not len(where):
                 return
@@ -284,16 +286,16 @@ def _resolved_intervals(run: Trajectory, size: float) -> NDArray[np.bool_]:
     )
 
 
-def _base(run: Trajectory, size: float, most: int) -> NDArray[np.int64]:
+def _base(run: Trajectory, size: float, max_frames: int) -> NDArray[np.int64]:
     """Return all samples, or half of the maximum number of frames, evenly along the motion."""
     count = len(run.t)
-    if count <= most // 2:
+    if count <= max_frames // 2:
         return np.arange(count)
     speed = np.abs(run.v).max(axis=1, initial=0.0) / min(1.0, size)
     h = np.diff(np.asarray(run.t, dtype=float))
     way = np.append(0.0, np.cumsum(h * (speed[1:] + speed[:-1]) / 2.0))
     way = way / (way[-1] or 1.0) + np.linspace(0.0, 1.0, count) / 4.0
-    even = np.searchsorted(way, np.linspace(0.0, way[-1], most // 2))
+    even = np.searchsorted(way, np.linspace(0.0, way[-1], max_frames // 2))
     return np.unique(np.clip(np.append(even, [0, count - 1]), 0, count - 1))
 
 

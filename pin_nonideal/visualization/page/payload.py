@@ -202,8 +202,8 @@ def _without_noise(plot: Plot, rounding: dict[str, float]) -> Plot:
     """Return a plot with zero in place of rounding, which only logarithmic axes show."""
     if plot.log:
         return plot
-    least = rounding_of((plot.unit, values) for values in plot.curves.values())
-    level = max(rounding.get(plot.unit, 0.0), least.get(plot.unit, 0.0))
+    curve_rounding = rounding_of((plot.unit, values) for values in plot.curves.values())
+    level = max(rounding.get(plot.unit, 0.0), curve_rounding.get(plot.unit, 0.0))
     return replace(plot, curves={k: without_rounding(v, level) for k, v in plot.curves.items()})
 
 

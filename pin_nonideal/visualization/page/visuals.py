@@ -93,16 +93,16 @@ class Visual:
     color: Color
 
 
-def visuals_of(geometry_model: pin.GeometryModel, most: int | None = None) -> list[Visual]:
+def visuals_of(geometry_model: pin.GeometryModel, max_triangles: int | None = None) -> list[Visual]:
     """Return one visual for each object of a geometry model.
 
     Args:
         geometry_model: model of the shapes.
-        most: maximum number of triangles of an object; larger objects are omitted. None sets no limit.
+        max_triangles: maximum number of triangles of an object; larger ones are omitted. None for no limit.
     """
     visuals = []
     for item in geometry_model.geometryObjects:
-        if most is not None and getattr(item.geometry, "num_tris", 0) > most:
+        if max_triangles is not None and getattr(item.geometry, "num_tris", 0) > max_triangles:
             continue
         shape, offset = shape_of(item.geometry, None if item.overrideMaterial else item.meshPath)
         red, green, blue, opacity = (float(value) for value in item.meshColor)

@@ -153,16 +153,16 @@ def _frictions(run: Trajectory, name: str, over_load: bool) -> list[Relation]:
         place.curves[law] = _broken(x, np.abs(force) if over_load else force, record.mode)
         if record.limit is not None and record.limit.ndim == 1:
             speed = np.abs(run.v[:, run.scene.model.joints[known[law]].idx_v])
-            most = record.limit + _viscous(run, law) * speed
-            place.bounds[law] = (x, most) if over_load else _opposed(x, most, record.mode)
+            limit = record.limit + _viscous(run, law) * speed
+            place.bounds[law] = (x, limit) if over_load else _opposed(x, limit, record.mode)
     return list(by_unit.values())
 
 
-def _opposed(x: Array, most: Array, mode: NDArray[np.int8] | None) -> tuple[Array, Array]:
+def _opposed(x: Array, limit: Array, mode: NDArray[np.int8] | None) -> tuple[Array, Array]:
     """Return the largest friction of slipping samples against their motion, and of the others both ways."""
     slips = np.zeros(len(x), dtype=int) if mode is None else np.sign(np.asarray(mode, dtype=int))
     forth, back = slips >= 0, slips <= 0
-    return np.concatenate([x[forth], x[back]]), np.concatenate([-most[forth], most[back]])
+    return np.concatenate([x[forth], x[back]]), np.concatenate([-limit[forth], limit[back]])
 
 
 def _viscous(run: Trajectory, name: str) -> float:
