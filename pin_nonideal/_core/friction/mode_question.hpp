@@ -24,6 +24,10 @@ ModeQuestion question(const Program& p, Workspace& w, const VecX& v, int also = 
 ModeQuestion first_question(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 // Set the mode of a moving element from its slip velocity in the rows last evaluated.
 void follow_velocity(const Program& p, Workspace& w, int element, ModeQuestion& question);
+// Set the slip directions of moving elements again after a projection, if steps solve for directions. The explicit method
+// reads the slip velocities themselves. Updates the kinematics.
+void follow_projection(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
+                       const std::vector<int>& at_rest);
 
 // Check if an element sticks or has zero slip speed at (q, v), up to rounding. Rows must be evaluated.
 bool at_rest(const Program& p, const Workspace& w, int element, const VecX& v);

@@ -50,6 +50,7 @@ bool try_previous_modes(const Program& p, Workspace& w, double t, VecX& q, VecX&
             if ((v - v_before).cwiseAbs().maxCoeff() >
                 mode_update_parameters.min_velocity_change * (1.0 + v_before.cwiseAbs().maxCoeff()))
                 break;
+            follow_projection(p, w, t, q, v, question.at_rest);
             begin_step(p, w, t, q, v);
         } catch (const Failure& failure) {
             if (failure.kind != Failure::Kind::inconsistent) throw;

@@ -10,7 +10,8 @@
 namespace pn {
 
 static bool of_modes(const Failure& failure) {
-    return failure.kind == Failure::Kind::not_converged || failure.kind == Failure::Kind::paradox;
+    return failure.kind == Failure::Kind::not_converged || failure.kind == Failure::Kind::paradox ||
+           failure.kind == Failure::Kind::unmet_law;
 }
 
 ModeChanges::ModeChanges(System& system, Progress& progress, const Options& options, Torques& torques, Output& output,
@@ -107,7 +108,9 @@ void ModeChanges::bridge(int element) {
 }
 
 // Check if the solver failed, which proves nothing.
-bool ModeChanges::undecided(const Failure& failure) { return failure.kind == Failure::Kind::not_converged; }
+bool ModeChanges::undecided(const Failure& failure) {
+    return failure.kind == Failure::Kind::not_converged || failure.kind == Failure::Kind::unmet_law;
+}
 
 bool ModeChanges::of_closed_contacts(const Failure& failure) {
     using Kind = Failure::Kind;
@@ -117,7 +120,8 @@ bool ModeChanges::of_closed_contacts(const Failure& failure) {
 
 bool ModeChanges::step_over(const Failure& failure, bool of_hand_over) {
     if (options_.method.outside() || !(system_.ne > 0 || system_.ng > 0)) return false;
-    const bool of_elements = system_.ne > 0 && of_modes(failure) && !failure.elements.empty();
+    const bool of_elements = system_.ne > 0 && of_modes(failure) &&
+                             failure.kind != Failure::Kind::unmet_law && !failure.elements.empty();
     const int element = of_elements ? failure.elements.front() : 0;
     if (!(of_hand_over || undecided(failure) || chatter_.is_zeno() || creeps())) return false;
     for (;;) {
