@@ -55,6 +55,11 @@ class FailureKind(enum.Enum):
     elements: the degree of freedom, and its cause: 0 the actuation, 1 given forces, 2 laws; value: rate
     """
 
+    unmet_law = 13
+    """
+    elements: the law (0 motion, 1 Signorini, 2 limits, 3 dissipation), and its dof, block or frictional element; value: residual
+    """
+
     steps = 8
     """value: number of steps, which is all that the run may take"""
 
@@ -365,6 +370,8 @@ class Runner:
 
     def project(self, q: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], v: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], t: float, max_residual: float) -> tuple[Annotated[NDArray[numpy.float64], dict(shape=(None,))], Annotated[NDArray[numpy.float64], dict(shape=(None,))], float, float, float]: ...
 
+    def law_residuals(self, q: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], v: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], t: float = 0.0, tau: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None, modes: Sequence[Mode] | None = None, a: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None, loads: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None, friction: Sequence[Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]] | None = None) -> list[tuple[float, int]]: ...
+
     def time_evaluations(self, q: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], v: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], t: float, count: int) -> float: ...
 
     @property
@@ -588,6 +595,9 @@ class Outcome:
 
     @property
     def contact_misses(self) -> tuple[float, float, float]: ...
+
+    @property
+    def motion_residual(self) -> float: ...
 
     @property
     def stopped(self) -> BaseException | None: ...

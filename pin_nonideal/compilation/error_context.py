@@ -27,6 +27,7 @@ from pin_nonideal.states.rows import block_names
 from pin_nonideal.types import Model
 
 MAX_NAMED = 4  # names in a message
+LAWS = ("the equation of motion", "Signorini's conditions", "the limit of friction", "maximum dissipation")
 
 
 def open_loop_error(name: str, gaps: dict[str, float], t: float, after: str = "") -> LoopClosureError:
@@ -105,6 +106,11 @@ def named_failure(
         names = [program.element_names[i] for i in failure.elements]
         blocks = block_names(program)
         return _modes_error(names or [blocks[i] for i in program.contacts], t)
+    if kind is kinds.unmet_law:
+        law, index = failure.elements
+        dof_names = [str(model.names[joint_of(model, i)]) for i in range(model.nv)]
+        names = [dof_names, block_names(program), program.element_names, program.element_names][law]
+        return _law_error(LAWS[law], names[index], value, t)
     if kind is kinds.closure:
         name = program.block_names[failure.elements[0]]
         return open_loop_error(name, {name: value}, t)
@@ -272,6 +278,16 @@ def _modes_error(names: Sequence[str], t: float) -> RunError:
         'tighten rtol, use method="moreau", or give modes to '
         "solve",
         element=", ".join(names),
+        time=t,
+    )
+
+
+def _law_error(law: str, name: str, residual: float, t: float) -> RunError:
+    return FrictionConvergenceError(
+        f'no motion that satisfies {law} at "{name}" was found at t = {t:.4g} s: the residual is '
+        f"{residual:.1e} of the largest force; change an initial value a little, tighten rtol, or use "
+        'method="moreau"',
+        element=name,
         time=t,
     )
 

@@ -29,6 +29,7 @@ def outcome_stats(outcome: core.Outcome, wall: float) -> Stats:
         outcome.projections,
         outcome.iterations,
         wall,
+        outcome.motion_residual,
         *outcome.contact_misses,
         outcome.limited,
         outcome.rounding,

@@ -71,9 +71,11 @@ class Stats:
         projections: projections that moved the state.
         iterations: iterations of the implicit reaction equation.
         wall_s: wall time [s].
-        signorini: largest residual of w_n >= 0, f_n >= 0, f_n w_n = 0 of unilateral contacts in time
-            stepping, relative to the scale that `ConeResiduals` defines.
-        coulomb: largest residual of |f_t| <= mu f_n.
+        motion: largest residual of the equation of motion, relative to the largest force of the scene; 0 in
+            time stepping, and in scenes without friction and contacts.
+        signorini: largest residual of w_n >= 0, f_n >= 0, f_n w_n = 0 of unilateral contacts, relative to the
+            largest force of the scene. In time stepping the scale is that of `ConeResiduals`.
+        coulomb: largest residual of |f_t| <= mu f_n and |f| <= limit.
         dissipation: largest residual of maximum dissipation.
         limited_by_rounding: accepted steps whose error exceeds the tolerances because of rounding in the
             accelerations; shorter steps would not reduce it.
@@ -88,6 +90,7 @@ class Stats:
     projections: int = 0
     iterations: int = 0
     wall_s: float = 0.0
+    motion: float = 0.0
     signorini: float = 0.0
     coulomb: float = 0.0
     dissipation: float = 0.0

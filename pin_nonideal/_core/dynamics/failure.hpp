@@ -15,7 +15,7 @@ namespace pn {
 struct Failure : std::exception {
     enum class Kind {
         singular_mass, inconsistent, not_finite, paradox, not_converged, closure, step_size, stiff, steps, wall,
-        interrupted, impact_energy, growing
+        interrupted, impact_energy, growing, unmet_law
     };
     Kind kind;
     double time = 0.0;

@@ -109,6 +109,12 @@ void add_forces_by_law(const Program& p, const Workspace& w, const VecX& v, std:
         }, each);
 }
 
+void add_law_forces(const Program& p, const Workspace& w, const VecX& v, VecX& C) {
+    GeneralizedForce sink{p, w.now, C};
+    const LawState state = law_state(w, v);
+    for (const Law& each : p.laws) std::visit([&](const auto& law) { law.act(state, sink); }, each);
+}
+
 void add_body_forces(const Program& p, const Workspace& w, std::vector<Force>& body) {
     BodyForces sink{p, w.now, body};
     const LawState state = law_state(w, w.now.v);

@@ -1,5 +1,6 @@
 #include "dynamics/reported_loads.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "complementarity/cone/solver.hpp"
@@ -63,6 +64,9 @@ ReportedLoads::ReportedLoads(const Program& p, Workspace& w) : w_(w) {
     const VecX lam = reactions(p, w).lam;
     const MatX& free = free_multipliers(p.blocks, w.now.B, p.described, w.now.rows);
     const StickingShares shares(p, w, lam, free);
+    const std::vector<char>& locked = w.now.terms.locked;
+    const bool is_free = std::find(locked.begin(), locked.end(), char(1)) == locked.end();
+    in_cones_ = shares.known && !shares.outside && is_free;
     if (!shares.outside || !shares.known) return;
 
     const int n = static_cast<int>(shares.rows.size());
@@ -83,6 +87,7 @@ ReportedLoads::ReportedLoads(const Program& p, Workspace& w) : w_(w) {
     Reactions& r = w.now.reactions;
     for (int k = 0; k < n; ++k) r.lam[shares.rows[k]] = f[k];
     r.swept = false;
+    in_cones_ = is_free;
 }
 
 ReportedLoads::~ReportedLoads() {

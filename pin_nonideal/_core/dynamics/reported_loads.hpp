@@ -24,10 +24,13 @@ public:
     ~ReportedLoads();
     ReportedLoads(const ReportedLoads&) = delete;
     ReportedLoads& operator=(const ReportedLoads&) = delete;
+    // Check if the multipliers of all sticking elements are within the cones, and no joint sticks.
+    bool are_in_cones() const { return in_cones_; }
 
 private:
     Workspace& w_;
     VecX minimum_norm_;  // empty if the multipliers stayed
+    bool in_cones_ = false;
 };
 
 }  // namespace pn

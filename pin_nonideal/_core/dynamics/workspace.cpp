@@ -68,6 +68,13 @@ static void size(const Program& p, const Evaluation& now, Scratch& scratch) {
     scratch.unknown = scratch.image = scratch.shifted = VecX::Zero(p.unknowns());
     scratch.subtree_force = scratch.body_inertia = scratch.body_residual = now.body_force;
     scratch.law_force.assign(p.law_names.size(), VecX::Zero(nv));
+    MotionForces& forces = scratch.forces;
+    for (VecX* x : {&forces.given, &forces.magnitude, &scratch.law_weight, &scratch.law_residual, &scratch.law_magnitude})
+        *x = VecX::Zero(nv);
+    forces.lam = forces.shared_lam = VecX::Zero(p.layout.rows);
+    forces.friction = forces.shared_friction = now.slip_force;
+    forces.limits = now.load;
+    forces.is_determined.assign(now.load.size(), 1);
 }
 
 Workspace::Workspace(Workspace&&) noexcept = default;

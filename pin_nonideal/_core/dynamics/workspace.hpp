@@ -9,6 +9,7 @@
 
 #include "constraints/rank.hpp"
 #include "dynamics/implicit_drives.hpp"
+#include "dynamics/motion_forces.hpp"
 #include "dynamics/program.hpp"
 #include "complementarity/fixed_point/equation.hpp"
 #include "math/tolerances.hpp"
@@ -26,7 +27,8 @@ constexpr double rank_tolerance_sticking = 3e-7;
 
 struct Counters {
     long evaluations = 0, factorizations = 0, projections = 0, iterations = 0;
-    double signorini = 0.0, coulomb = 0.0, dissipation = 0.0;  // largest violations of the contact laws in time stepping
+    // Largest residuals of accepted motions: equation of motion, and laws of contact and friction.
+    double motion = 0.0, signorini = 0.0, coulomb = 0.0, dissipation = 0.0;
 };
 
 // Uniqueness of the motion under the laws. It is never proven if user functions are among the laws.
@@ -140,6 +142,8 @@ struct Scratch {
     std::vector<Force> subtree_force;
     std::vector<Force> body_inertia, body_residual;  // refinement in deep trees
     std::vector<VecX> law_force;  // C of each law, for its power
+    MotionForces forces;          // forces of the motion whose laws are checked
+    VecX law_weight, law_residual, law_magnitude;  // by dof
 };
 
 struct Workspace {

@@ -50,7 +50,9 @@ bool try_previous_modes(const Program& p, Workspace& w, double t, VecX& q, VecX&
         const auto failure = attempt({Failure::Kind::inconsistent}, [&] {
             project_into_modes(p, w, t, q, v);
             keeps_velocity = !((v - v_before).cwiseAbs().maxCoeff() > max_change);
-            if (keeps_velocity) begin_step(p, w, t, q, v);
+            if (!keeps_velocity) return;
+            follow_projection(p, w, t, q, v, query.at_rest);
+            begin_step(p, w, t, q, v);
         });
         if (failure || !keeps_velocity) break;
         const std::optional<int> changed = update_modes(p, w, t, q, v, query.at_rest, modes);

@@ -45,6 +45,9 @@ void bind_failures(nb::module_& m) {
         .value("stiff", Kind::stiff, "elements: the degree of freedom; value: rate")
         .value("growing", Kind::growing,
                "elements: the degree of freedom, and its cause: 0 the actuation, 1 given forces, 2 laws; value: rate")
+        .value("unmet_law", Kind::unmet_law,
+               "elements: the law (0 motion, 1 Signorini, 2 limits, 3 dissipation), and its dof, block or frictional "
+               "element; value: residual")
         .value("steps", Kind::steps, "value: number of steps, which is all that the run may take")
         .value("wall", Kind::wall, "value: wall time, which is all that the run may take")
         .value("interrupted", Kind::interrupted);

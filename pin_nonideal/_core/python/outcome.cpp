@@ -105,6 +105,7 @@ void bind_outcome(nb::module_& m) {
         .def_prop_ro("contact_misses", [](const Outcome& o) {
             return std::make_tuple(o.counters.signorini, o.counters.coulomb, o.counters.dissipation);
         })
+        .def_prop_ro("motion_residual", [](const Outcome& o) { return o.counters.motion; })
         .def_prop_ro("stopped", stopped, nb::for_getter(nb::sig("def stopped(self) -> BaseException | None")));
 }
 

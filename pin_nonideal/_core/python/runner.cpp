@@ -59,8 +59,12 @@ void Runner::set(const Array& q_in, const Array& v_in, const std::optional<Array
 }
 
 void Runner::choose_modes(double t, const std::optional<std::vector<Mode>>& modes) {
-    if (!p->gaps.empty()) return choose_contacts(t, modes);
-    choose_friction(t, modes, nullptr);
+    state_.open.clear();
+    if (!p->gaps.empty()) choose_contacts(t, modes);
+    else choose_friction(t, modes, nullptr);
+    if (modes) return;
+    const LawResiduals laws = check_laws(*p, *w, t, q, v, state_);
+    if (!laws.are_small()) throw laws.failure(t);
 }
 
 // Close the touching contacts that do not separate and carry nonnegative loads. Given modes apply to all elements.
@@ -74,6 +78,8 @@ void Runner::choose_contacts(double t, const std::optional<std::vector<Mode>>& m
         update_kinematics(*p, *w, t, q, v);
         choose_friction(t, modes, joint_motion);
     });
+    for (size_t i = 0; i < query.rest.size(); ++i)
+        if (query.rest[i] && !w->state.closed[i]) state_.open.push_back(static_cast<int>(i));
     if (!modes && !slip_opposes_friction(*p, *w, v)) throw Failure(Failure::Kind::not_converged, t, w->now.slipping);
 }
 
@@ -336,6 +342,29 @@ Outcome Runner::resume(const nb::bytes& state, const Options& with) {
     return {w->counters, std::move(recording)};
 }
 
+std::vector<std::pair<double, int>> Runner::law_residuals(const Array& q_in, const Array& v_in, double t,
+                                                          const std::optional<Array>& tau,
+                                                          const std::optional<std::vector<Mode>>& modes,
+                                                          const std::optional<Array>& a, const std::optional<Array>& loads,
+                                                          const std::optional<std::vector<Array>>& friction) {
+    set(q_in, v_in, tau);
+    choose_modes(t, modes);
+    MotionForces forces = motion_forces(*p, *w, t, q, v);
+    if (loads && loads->shape(0) != p->gaps.size()) throw std::invalid_argument("loads do not fit the contacts");
+    for (size_t i = 0; loads && i < p->gaps.size(); ++i) {
+        const Block& block = p->blocks[p->gaps[i].block];
+        if (w->state.closed[i] && !block.kept.empty()) forces.lam[block.row] = forces.shared_lam[block.row] = (*loads)(i);
+    }
+    if (friction && friction->size() != p->frictions.size()) throw std::invalid_argument("friction does not fit");
+    for (size_t e = 0; friction && e < friction->size(); ++e)
+        for (int k = 0; k < p->frictions[e].dim; ++k)
+            forces.friction[e][k] = forces.shared_friction[e][k] = (*friction)[e](k);
+    const VecX acceleration = a ? VecX(map(*a)) : w->now.a;
+    const LawResiduals r = pn::law_residuals(*p, *w, t, v, acceleration, forces, state_);
+    return {{r.motion.size, r.motion.index}, {r.signorini.size, r.signorini.index},
+            {r.coulomb.size, r.coulomb.index}, {r.dissipation.size, r.dissipation.index}};
+}
+
 double Runner::time_evaluations(const Array& q_in, const Array& v_in, double t, int count) {
     set(q_in, v_in, {});
     choose_modes(t, {});
@@ -372,6 +401,8 @@ nb::class_<Runner> bind_runner(nb::module_& m) {
         .def("terms", &Runner::terms, "q"_a, "v"_a)
         .def("energies", &Runner::energies, "q"_a, "v"_a)
         .def("project", &Runner::project, "q"_a, "v"_a, "t"_a, "max_residual"_a)
+        .def("law_residuals", &Runner::law_residuals, "q"_a, "v"_a, "t"_a = 0.0, "tau"_a = nb::none(),
+             "modes"_a = nb::none(), "a"_a = nb::none(), "loads"_a = nb::none(), "friction"_a = nb::none())
         .def("time_evaluations", &Runner::time_evaluations, "q"_a, "v"_a, "t"_a, "count"_a)
         .def_prop_ro("rank", &Runner::constraint_rank)
         // If several motions are possible: true takes the one nearest to the last motion, false raises.

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "contact/onset.hpp"
+#include "dynamics/law_residuals.hpp"
 #include "python/arrays.hpp"
 #include "python/outcome.hpp"
 #include "python/reused_run.hpp"
@@ -68,6 +69,13 @@ struct Runner {
     // If the residual before exceeds `max_residual`, nothing moves.
     std::tuple<Numbers, Numbers, double, double, double> project(const Array& q_in, const Array& v_in, double t,
                                                                  double max_residual);
+    // Return the largest residual of each law and the index of its dof, block or friction element, in the order of
+    // LawResiduals. The accelerations, contact loads and friction forces replace those of the motion if given.
+    std::vector<std::pair<double, int>> law_residuals(const Array& q_in, const Array& v_in, double t,
+                                                      const std::optional<Array>& tau,
+                                                      const std::optional<std::vector<Mode>>& modes,
+                                                      const std::optional<Array>& a, const std::optional<Array>& loads,
+                                                      const std::optional<std::vector<Array>>& friction);
     double time_evaluations(const Array& q_in, const Array& v_in, double t, int count);
 
     // Simulate with the options read last.
@@ -76,6 +84,7 @@ struct Runner {
 
 private:
     ReusedRun run_;  // kept run, which records only states
+    MotionState state_;  // of the motion whose modes were chosen last
 
     // Set the state and the torques. Throw std::invalid_argument if they do not fit the model, which Python explains.
     void set(const Array& q_in, const Array& v_in, const std::optional<Array>& tau);

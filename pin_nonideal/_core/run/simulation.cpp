@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "dynamics/evaluation.hpp"
+#include "dynamics/law_residuals.hpp"
 #include "dynamics/projection.hpp"
 #include "dynamics/step_start.hpp"
 #include "math/tolerances.hpp"
@@ -266,6 +267,18 @@ void Simulation::find_event() {
         if (const auto found = locator.locate()) event = *found;
     if (!value_events.empty() && value_events.locate(event.has_value()))
         event = FoundEvent{FoundEvent::Kind::user, value_events.found().front(), stepper.t0 + stepper.h};
+    // A motion that violates a law ends here, and modes are selected anew.
+    if (system.has_events() && !(event && event->changes_modes()) && !satisfies_laws())
+        event = FoundEvent{FoundEvent::Kind::lift, -1, stepper.t0 + stepper.h};
+}
+
+// Check the laws of the motion at the step's end.
+bool Simulation::satisfies_laws() {
+    MotionState state;
+    if (options.method.adaptive() && !options.method.outside()) state.slip_error = 1.0 / norm.of_speed(1.0);
+    state.is_end = true;
+    system.read(stepper.y1);
+    return check_laws(p, w, stepper.t0 + stepper.h, system.q, system.v, state).are_small();
 }
 
 bool Simulation::locate_event(const Proposal& proposal) {

@@ -70,6 +70,7 @@ protected:
     // Return the length of a step up to the next hand-over of a closed contact, after passing the hand-overs at this time.
     std::optional<double> to_hand_over();
     void find_event();
+    bool satisfies_laws();
     bool recover(const Failure& failure);
     void restore_guess();
     void back_to_start();

@@ -6,6 +6,7 @@
 #include "contact/impact.hpp"
 #include "contact/queries.hpp"
 #include "dynamics/evaluation.hpp"
+#include "dynamics/law_residuals.hpp"
 #include "dynamics/state_projection.hpp"
 #include "dynamics/friction_limit.hpp"
 #include "dynamics/step_start.hpp"
@@ -33,6 +34,7 @@ void resolve_together(System& system, double t, ModeQuery& mode_query, bool stri
         if (!strikes) restore_motion(p, w, t, system.v);
         // Sticking elements get zero slip velocity, without rounding.
         project(p, w, t, system.q, system.v);
+        follow_projection(p, w, t, system.q, system.v, resting);
         begin_step(p, w, t, system.q, system.v);
         // Nearly redundant sticking elements can leave a slipping element a velocity that opposes its mode.
         const auto moving = std::stable_partition(resting.begin(), resting.end(), [&](int e) {
@@ -99,6 +101,7 @@ struct FrictionSwitch {
     const std::vector<Mode>& before;
     ModeQuery mode_query;
     int held = -1;  // element that has just reached its limit
+    std::vector<char> rest;  // contacts at rest, by gap
 
     // `joint_motion`: onset motion of all contacts, if known.
     void find(const OnsetMotion* joint_motion) {
@@ -157,6 +160,7 @@ void close_and_find(System& system, double t, bool starts, FrictionSwitch& frict
     if (event && !event->of_gap()) query.arrived_element = event->index;
     query.at_limit = friction.at_limit();
     query.after_impact = landing;
+    friction.rest = query.rest;
     const VecX q = system.q, v = system.v;
     select_active_contacts(p, system.w, t, q, v, query, [&](const OnsetMotion* joint_motion) {
         system.q = q;
@@ -186,8 +190,9 @@ std::vector<Event> changes_since(const System& system, double t, const std::vect
     return changes;
 }
 
-std::vector<Event> switch_modes(System& system, double t, VecX& y, VecX& dy, const std::optional<FoundEvent>& event,
-                                std::vector<int>* released) {
+// Select new modes as switch_modes does. `laws`: residuals of their motion.
+static std::vector<Event> select_modes(System& system, double t, VecX& y, VecX& dy, const std::optional<FoundEvent>& event,
+                                       std::vector<int>* released, LawResiduals& laws) {
     const Program& p = system.p;
     Workspace& w = system.w;
     system.read(y);
@@ -195,7 +200,7 @@ std::vector<Event> switch_modes(System& system, double t, VecX& y, VecX& dy, con
     const std::vector<Mode> before = w.state.mode;
     const std::vector<char> closed = w.state.closed;
     const std::vector<Vec3> directions = w.state.slip_direction;
-    FrictionSwitch friction{system, t, event, before, {}};
+    FrictionSwitch friction{system, t, event, before, {}, -1, {}};
     if (p.gaps.empty()) friction.find(nullptr);
     else close_and_find(system, t, !event, friction);
     if (released && event && (event->kind == FoundEvent::Kind::lift || event->in_vain))
@@ -205,6 +210,11 @@ std::vector<Event> switch_modes(System& system, double t, VecX& y, VecX& dy, con
         system.write(y);
         w.state.is_hyperstatic = shares_load(system, t, friction.mode_query.at_rest, friction.held);
     }
+    MotionState state;
+    for (int i = 0; i < static_cast<int>(friction.rest.size()); ++i)
+        if (friction.rest[i] && !w.state.closed[i]) state.open.push_back(i);
+    system.read(y);
+    laws = check_laws(p, w, t, system.q, system.v, state);
     system.rate_of_evaluation(t, y, dy);
     if (!event) return {};
     linger(w.state, before, *event);
@@ -212,6 +222,28 @@ std::vector<Event> switch_modes(System& system, double t, VecX& y, VecX& dy, con
     const bool turned = e >= 0 && before[e] == 1 && w.state.mode[e] == 1 && p.frictions[e].dim > 1 &&
                         directions[e].dot(w.state.slip_direction[e]) < 0.0;
     return changes_since(system, t, closed, before, turned ? e : -1);
+}
+
+std::vector<Event> switch_modes(System& system, double t, VecX& y, VecX& dy, const std::optional<FoundEvent>& event,
+                                std::vector<int>* released) {
+    Workspace& w = system.w;
+    const VecX at_event = y;
+    const RunState before = w.state;
+    LawResiduals laws;
+    const std::vector<Event> changes = select_modes(system, t, y, dy, event, released, laws);
+    if (laws.are_small()) return changes;
+    // As at the start of a run, where no mode is known: from the velocities before the projection, then after it.
+    const VecX projected = y;
+    for (const VecX* from : {&at_event, &projected}) {
+        if (!event && from == &at_event) continue;
+        y = *from;
+        if (released) released->clear();
+        set_contacts(system.p, w, before.closed, before.mode);
+        w.state = before;
+        select_modes(system, t, y, dy, std::nullopt, nullptr, laws);
+        if (laws.are_small()) return event ? changes_since(system, t, before.closed, before.mode) : std::vector<Event>();
+    }
+    throw laws.failure(t);
 }
 
 bool contacts_strike(System& system, double t, const VecX& y, bool starts) {

@@ -10,7 +10,8 @@
 namespace pn {
 
 static bool is_of_modes(const Failure& failure) {
-    return failure.kind == Failure::Kind::not_converged || failure.kind == Failure::Kind::paradox;
+    return failure.kind == Failure::Kind::not_converged || failure.kind == Failure::Kind::paradox ||
+           failure.kind == Failure::Kind::unmet_law;
 }
 
 ModeChanges::ModeChanges(System& system, Progress& progress, const Options& options, Torques& torques, Output& output,
@@ -104,7 +105,9 @@ void ModeChanges::bridge_chatter(int element) {
 }
 
 // Check if the solver failed, which proves nothing.
-bool ModeChanges::is_undecided(const Failure& failure) { return failure.kind == Failure::Kind::not_converged; }
+bool ModeChanges::is_undecided(const Failure& failure) {
+    return failure.kind == Failure::Kind::not_converged || failure.kind == Failure::Kind::unmet_law;
+}
 
 bool ModeChanges::is_of_closed_contacts(const Failure& failure) {
     using Kind = Failure::Kind;
@@ -120,7 +123,8 @@ bool ModeChanges::is_of_contradicting_contacts(const Failure& failure) const {
 bool ModeChanges::bridge_with_time_stepping(const Failure& failure, bool of_hand_over) {
     if (!of_hand_over && !is_recoverable(failure)) return false;
     if (options_.method.outside() || !(system_.ne > 0 || system_.ng > 0)) return false;
-    const bool of_elements = system_.ne > 0 && is_of_modes(failure) && !failure.elements.empty();
+    const bool of_elements = system_.ne > 0 && is_of_modes(failure) && failure.kind != Failure::Kind::unmet_law &&
+                             !failure.elements.empty();
     const int element = of_elements ? failure.elements.front() : 0;
     if (!(of_hand_over || is_undecided(failure) || chatter_.is_zeno() || is_creeping())) return false;
     for (;;) {

@@ -11,8 +11,8 @@
 namespace pn {
 
 static void fields(Archive& a, Counters& x) {
-    auto& [evaluations, factorizations, projections, iterations, signorini, coulomb, dissipation] = x;
-    a(evaluations, factorizations, projections, iterations, signorini, coulomb, dissipation);
+    auto& [evaluations, factorizations, projections, iterations, motion, signorini, coulomb, dissipation] = x;
+    a(evaluations, factorizations, projections, iterations, motion, signorini, coulomb, dissipation);
 }
 
 void fields(Archive& a, Modes& x) {
@@ -148,7 +148,7 @@ void from_bytes(const std::string& bytes, System& system, Progress& progress, Re
 }
 
 std::string state_layout() {
-    const size_t sizes[] = {sizeof(RunState), sizeof(Progress), sizeof(Recording), sizeof(long)};
+    const size_t sizes[] = {sizeof(RunState), sizeof(Counters), sizeof(Progress), sizeof(Recording), sizeof(long)};
     std::string layout;
     for (size_t size : sizes) layout += std::to_string(size) + ".";
     return layout;
