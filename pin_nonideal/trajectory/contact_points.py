@@ -84,7 +84,8 @@ def contact_record(run: RunFields, name: str) -> ContactRecord:
         raise UnknownNameError(f'no contact "{name}" in this run{nearest(name, [*framed, *known])}')
     bodies = [contact_bodies(scene, key) for key in points]
     joint, other = bodies[0].joint, bodies[0].other
-    # Some points of two boxes belong to the first box and others to the second.
+    if len(points) > 1:  # some points of two boxes are on the first box and others on the second
+        joint, other = max(joint, other), min(joint, other)
     sign = np.array([1.0 if body.joint == joint else -1.0 for body in bodies])
     forces = np.stack([framed[key] for key in points], axis=1) * sign[:, None]
     loads = np.stack([run.lam[:, run.rows[key][1] - 1] for key in points], axis=1)

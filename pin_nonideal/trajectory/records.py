@@ -181,7 +181,8 @@ class ContactRecord:
     Attributes:
         name: name of the contact or of the `GeometryContact`.
         points: names of its contact points.
-        bodies: names of the joints of the two bodies; the force acts on the first. "universe" is the world.
+        bodies: names of the joints of the two bodies; "universe" is the world. The force acts on the first:
+            the body of the contact's first frame, or for several points the later joint of the model.
         closed: whether a contact point is closed, (nt,).
         force: resultant of the normal forces and the friction, in world axes [N], (nt, 3).
         torque: moment of these forces about `center`, in world axes [N m], (nt, 3). It does not include
