@@ -37,6 +37,10 @@ class LoweringContext(NamedTuple):
     reactions: ReactionNames
 
 
+# Limits below are zero, because their squares underflow [N m or N].
+MIN_LIMIT = 1e-150
+
+
 class FrictionSite(NamedTuple):
     """Slip directions of one friction element of a law, and its load.
 
@@ -252,6 +256,7 @@ def _dry(law: JointFriction, name: str, out: core.Builder, index: int, site: Fri
     if block < 0:
         block = out.add_dof_slip(element, dof=site.dof, count=site.dofs)
     mu = law.mu if site.mu is None else site.mu
+    constant = (law.coulomb + law.preload) * site.lever
     out.add_friction(
         index,
         block,
@@ -263,7 +268,7 @@ def _dry(law: JointFriction, name: str, out: core.Builder, index: int, site: Fri
         row=site.row,
         axis=list(site.axis),
         axis_dof=site.axis_dof,
-        constant=(law.coulomb + law.preload) * site.lever,
+        constant=constant if constant > MIN_LIMIT else 0.0,
         mu=mu * site.lever,
         radius=law.radius,
         axial_radius=law.axial_radius,

@@ -36,7 +36,7 @@ struct Laws {
     const MotionForces& forces;
     const MotionState& state;
     VecX &weight, &left, &magnitude;
-    double scale = min_scale, slip_error = 0.0;
+    double scale = law_residual_parameters.min_force, slip_error = 0.0;
     LawResiduals out;
 
     void weigh() {
@@ -62,9 +62,8 @@ struct Laws {
             for (size_t k = 0; k < n; ++k) subtract(block.support[l], *A++ * f[k]);
     }
 
-    // M a + nle - tau - C - A^T lam, Eq. (4).
     void check_motion() {
-        multiply_M(p.mechanism, w.now.terms, a, left);
+        multiply_M(p.mechanism, w.now.terms, a, left);  // M a + nle - tau - C - A^T lam, Eq. (4)
         magnitude = left.cwiseAbs() + forces.magnitude;
         left -= forces.given;
         for (int i : w.now.rows.blocks)
@@ -255,7 +254,7 @@ LawResiduals law_residuals(const Program& p, Workspace& w, double t, const VecX&
                            const MotionForces& forces, const MotionState& state) {
     Scratch& s = w.scratch;
     const double speed = 1.0 + v.cwiseAbs().maxCoeff();
-    Laws laws{p, w, v, a, forces, state, s.law_weight, s.law_residual, s.law_magnitude, min_scale,
+    Laws laws{p, w, v, a, forces, state, s.law_weight, s.law_residual, s.law_magnitude, law_residual_parameters.min_force,
               std::max(state.slip_error, min_directed_speed * speed), {}};
     laws.weigh();
     laws.check_motion();

@@ -16,6 +16,8 @@ namespace pn {
 struct LawResidualParameters {
     // Largest residual of a motion that satisfies the laws.
     double tolerance = 1e-10;
+    // Smallest scale of the forces, in their units: powers of smaller forces underflow.
+    double min_force = 1e-140;
     // Slip acceleration of elements that begin to slip exactly at their limits. Its direction is not defined.
     double onset_acceleration = 1e-6;
     // Largest residual of friction while rows are so close to a singular position that their orthogonal factorization is
