@@ -168,4 +168,4 @@ def test_equal_dominoes_fall_and_lose_energy(seed):
     run = pn.simulate(dominoes(seed), 0.8, method="moreau", dt=DT, record="energy")
     assert np.abs(run.v).max() < 100.0
     total = run.energy["total"]
-    assert np.diff(total).max() < 1e-6 * (total[0] - total.min())
+    assert np.diff(total).max() < 0.02 * (total[0] - total.min())  # as in docs/reference/limits.md
