@@ -84,6 +84,11 @@ def contact_record(run: RunFields, name: str) -> ContactRecord:
         raise UnknownNameError(f'no contact "{name}" in this run{nearest(name, [*framed, *known])}')
     bodies = [contact_bodies(scene, key) for key in points]
     joint, other = bodies[0].joint, bodies[0].other
+    if len({frozenset(body[:2]) for body in bodies}) > 1:
+        raise InputError(
+            f'contact("{name}") must name the points of two bodies; "{points[0]}" and others are on several '
+            "bodies: name one of them"
+        )
     if len(points) > 1:  # some points of two boxes are on the first box and others on the second
         joint, other = max(joint, other), min(joint, other)
     sign = np.array([1.0 if body.joint == joint else -1.0 for body in bodies])

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
-from pin_nonideal.types import Array
+from pin_nonideal.types import Array, Table
+
+from .missing_array import RunField
 
 # Groups of a Trajectory, with the value of `record` that records them.
 RECORD_OF = {
@@ -42,20 +43,11 @@ class Group(dict[str, Array]):
         raise UnknownNameError(f'run.{self.field} has no "{name}"{nearest(str(name), self)}')
 
 
-class GroupField:
-    """Attribute of a Trajectory that returns its `Group`.
+class GroupField(RunField):
+    """Attribute of a Trajectory that returns its `Group`."""
 
-    Args:
-        field: field of the Trajectory.
-    """
-
-    def __init__(self, field: str) -> None:
-        self._field = field
-
-    def __get__(self, run: object, owner: object = None) -> Any:
-        if run is None:
-            return self
-        fields = vars(run)
+    def value(self, fields: Table) -> Group:
+        """Return the group, and store it if its arrays were recorded."""
         arrays = fields[self._field]
         if isinstance(arrays, Group):
             return arrays

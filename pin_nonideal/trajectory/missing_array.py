@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, NoReturn
 
 from pin_nonideal.errors import InputError
-from pin_nonideal.types import Array
+from pin_nonideal.types import Array, Table
 
 NOT_RECORDED = "was not recorded; pass record={} to simulate"
 # Reason why a run does not have an array of a Trajectory.
@@ -74,8 +74,8 @@ def missing_array(array: str, reason: str) -> Any:
     return MissingArray(f"{array} {reason}")
 
 
-class ArrayField:
-    """Attribute of a Trajectory that returns an array, or its stand-in if the run did not record it.
+class RunField:
+    """Attribute of a Trajectory whose value depends on the field of that name.
 
     Args:
         field: field of the Trajectory.
@@ -85,9 +85,23 @@ class ArrayField:
         self._field = field
 
     def __get__(self, run: object, owner: object = None) -> Any:
-        if run is None:
-            return self
-        array = vars(run)[self._field]
+        return self if run is None else self.value(vars(run))
+
+    def value(self, fields: Table) -> object:
+        """Return the value of the attribute.
+
+        Args:
+            fields: fields of the Trajectory.
+        """
+        raise NotImplementedError
+
+
+class ArrayField(RunField):
+    """Attribute of a Trajectory that returns an array, or its stand-in if the run did not record it."""
+
+    def value(self, fields: Table) -> Any:
+        """Return the array or its stand-in."""
+        array = fields[self._field]
         return missing_array(f"run.{self._field}", REASONS[self._field]) if array is None else array
 
     def __set__(self, run: object, array: Array | None) -> None:

@@ -182,7 +182,8 @@ class Trajectory(RunFields):
             Record of the contact.
 
         Raises:
-            InputError: the run did not record "forces" or has no scene, or the contact has no contact point.
+            InputError: the run did not record "forces" or has no scene, the contact has no contact point, or
+                contacts of this name with numbers are on several bodies.
             UnknownNameError: there is no such contact.
         """
         return contact_record(self, name)

@@ -91,3 +91,15 @@ def test_errors_name_the_pair_and_the_record() -> None:
     stop = pn.Scene(model, contacts=[pn.JointLimit("lift", lower=0.0, name="stop")])
     with pytest.raises(pn.InputError, match=r'contact\("stop lower"\) has no contact point; see run.force'):
         pn.simulate(stop, 0.01, record="forces").contact("stop lower")
+
+
+def test_numbered_contacts_of_several_bodies_are_no_pair() -> None:
+    """Their forces would cancel or add without a meaning."""
+    scene = stack(2)
+    feet = [pn.PointContact(f"box {k}", height=-1.0, name=f"foot {k}") for k in range(2)]
+    run = pn.simulate(scene.replace(add_contacts=feet), 0.01, record="forces")
+    with pytest.raises(
+        pn.InputError, match=r'contact\("foot"\) must name the points of two bodies; "foot 0"'
+    ):
+        run.contact("foot")
+    assert run.contact("foot 1").bodies == ("box 1", "universe")

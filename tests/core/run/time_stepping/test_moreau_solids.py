@@ -161,11 +161,21 @@ def dominoes(seed: int) -> pn.Scene:
     return pn.Scene(model, contacts=contacts, collision_model=shapes, v0=v)
 
 
-# Speeds of 1e22 and NaN in seeds 2 and 31, if the rates of edges are linear in a step.
-@pytest.mark.parametrize("seed", seeds(range(60), always=(2, 31), count=3))
+def largest_rise(seed):
+    """Return the largest rise of the energy in a step, relative to the energy that the dominoes lose."""
+    run = pn.simulate(dominoes(seed), 0.8, method="moreau", dt=DT, record="energy")
+    total = run.energy["total"]
+    return np.diff(total).max() / (total[0] - total.min())
+
+
+# Speeds of 1e22 and NaN in seeds 2 and 31, and a rise in 56, if the rates of edges are linear in a step.
+@pytest.mark.parametrize("seed", [0, 1, 2, 31, 56])
 def test_equal_dominoes_fall_and_lose_energy(seed):
     """The edges of equal boxes turn far within a step, and corners of both share places."""
-    run = pn.simulate(dominoes(seed), 0.8, method="moreau", dt=DT, record="energy")
-    assert np.abs(run.v).max() < 100.0
-    total = run.energy["total"]
-    assert np.diff(total).max() < 0.02 * (total[0] - total.min())  # as in docs/reference/limits.md
+    assert largest_rise(seed) < 1e-6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(160))
+def test_what_turning_edges_add_is_within_the_documented_limit(seed):
+    assert largest_rise(seed) < 0.02
