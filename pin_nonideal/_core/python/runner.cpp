@@ -62,9 +62,6 @@ void Runner::choose_modes(double t, const std::optional<std::vector<Mode>>& mode
     state_.open.clear();
     if (!p->gaps.empty()) choose_contacts(t, modes);
     else choose_friction(t, modes, nullptr);
-    if (modes) return;
-    const LawResiduals laws = check_laws(*p, *w, t, q, v, state_);
-    if (!laws.are_small()) throw laws.failure(t);
 }
 
 // Close the touching contacts that do not separate and carry nonnegative loads. Given modes apply to all elements.
@@ -130,6 +127,10 @@ Instant Runner::solve(const Array& q_in, const Array& v_in, double t, const std:
     set(q_in, v_in, tau);
     const Frozen stands_still(w->now, frozen);
     choose_modes(t, modes);
+    if (!modes) {
+        const LawResiduals laws = check_laws(*p, *w, t, q, v, state_);
+        if (!laws.are_small()) throw laws.failure(t);
+    }
     const Uniqueness unique = w->now.several ? Uniqueness::several : w->state.unique;
     const ReportedLoads loads(*p, *w);
     Instant out;
