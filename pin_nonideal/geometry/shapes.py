@@ -64,10 +64,10 @@ def geometry_object(who: str, name: str, geometry: GeometryModel) -> GeometryObj
     Raises:
         UnknownNameError: the collision model has no such object.
     """
-    known = [g.name for g in geometry.geometryObjects]
-    if name not in known:
+    if not geometry.existGeometryName(name):
+        known = [g.name for g in geometry.geometryObjects]
         raise UnknownNameError(f'{who}: no geometry "{name}" in the collision model{nearest(name, known)}')
-    return geometry.geometryObjects[known.index(name)]
+    return geometry.geometryObjects[geometry.getGeometryId(name)]
 
 
 def shape_of(who: str, item: GeometryObject, model: Model) -> Shape:

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <map>
 #include <utility>
 #include <vector>
 
@@ -9,17 +10,17 @@
 
 namespace pn {
 
-// Order of all blocks, and the dofs that they share. Blocks with the same support are treated alike.
+// Positions of common dofs in two supports.
+using CommonDofs = std::vector<std::pair<int, int>>;
+
+// Order of all blocks, and the dofs that they share. Blocks with the same support are treated alike. Dofs that belong to
+// the same supports, such as those of a free body, form a group.
 struct RowLayout {
     int rows = 0;
-    std::vector<int> place;      // position of each block in the order of elimination
-    std::vector<int> support;    // number of each block's support
-    using Common = std::vector<std::pair<int, int>>;  // positions of common dofs in two supports
-    struct Neighbor {  // support with common dofs
-        int support, common;
-    };
-    std::vector<std::vector<Neighbor>> neighbors;  // of each support, itself included
-    std::vector<Common> commons;                   // one list for each two supports
+    int group_count = 0;
+    std::vector<int> place;                // position of each block in the order of elimination
+    std::vector<int> support;              // number of each block's support
+    std::vector<std::vector<int>> groups;  // of each support. Supports with a common group have common dofs
 };
 
 RowLayout layout_rows(const std::vector<Block>& blocks, int nv);
@@ -29,7 +30,7 @@ RowLayout layout_rows(const std::vector<Block>& blocks, int nv);
 class Envelope {
 public:
     struct Pair {  // block and an earlier one, or itself, with common dofs
-        int block, other, common;
+        int block, other, common;  // common: index for common()
     };
     std::vector<int> position;  // position of each kept row in use
     std::vector<int> row_at;    // kept rows in the order of elimination
@@ -39,12 +40,19 @@ public:
     size_t entries = 0;
 
     int size() const { return static_cast<int>(row_at.size()); }
+    const CommonDofs& common(int i) const { return commons_[i]; }
     // Set up the envelope of the rows of some blocks.
     void select(const RowLayout& layout, const std::vector<Block>& all, const std::vector<int>& used);
 
 private:
+    int find_common(const Block& one, int support, const Block& other, int other_support);
+
     std::vector<int> order_;
     std::vector<std::vector<int>> of_support_;  // blocks with the same support that have a place
+    std::vector<std::vector<int>> of_group_;    // supports of these blocks, by group of dofs
+    std::vector<int> visitor_;                  // by support: last block that met it
+    std::vector<CommonDofs> commons_;           // of supports that were in use together
+    std::map<std::pair<int, int>, int> common_of_;
 };
 
 }  // namespace pn

@@ -13,7 +13,7 @@ namespace pn {
 // Compute the entries of G = B B^T below the diagonal for n1 rows of one block, from position p1, and n2 rows of
 // another, from p2. The sum runs over their common dofs.
 template <int n1, int n2>
-static void multiply_tile(const double* X, int r1, const double* Y, int r2, const RowLayout::Common& common,
+static void multiply_tile(const double* X, int r1, const double* Y, int r2, const CommonDofs& common,
                           const Envelope& at, int p1, int p2, double* G) {
     double sum[n1][n2] = {};
     for (const auto& [l, k] : common) {
@@ -31,7 +31,7 @@ static void multiply_tile(const double* X, int r1, const double* Y, int r2, cons
 
 // Multiply the rows of two blocks, one tile at a time. The rows of a block are adjacent in the layout, and those of the
 // first block do not precede those of the second.
-static PN_INLINE void multiply_blocks(const Block& b1, const Block& b2, const RowLayout::Common& common,
+static PN_INLINE void multiply_blocks(const Block& b1, const Block& b2, const CommonDofs& common,
                                       const std::vector<double>& B, RowSystem& s) {
     const int r1 = static_cast<int>(b1.kept.size()), r2 = static_cast<int>(b2.kept.size());
     const double *X = B.data() + b1.offset, *Y = B.data() + b2.offset;
@@ -46,9 +46,9 @@ static PN_INLINE void multiply_blocks(const Block& b1, const Block& b2, const Ro
         }
 }
 
-void delassus(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B, RowSystem& s) {
+void delassus(const std::vector<Block>& blocks, const std::vector<double>& B, RowSystem& s) {
     for (const auto& [block, other, common] : s.envelope.pairs)
-        multiply_blocks(blocks[block], blocks[other], layout.commons[common], B, s);
+        multiply_blocks(blocks[block], blocks[other], s.envelope.common(common), B, s);
 }
 
 void scale_to_unit_length(const std::vector<char>& use, RowSystem& s) {
@@ -122,9 +122,8 @@ static PN_INLINE bool factor_cholesky(RowSystem& s) {
     return true;
 }
 
-PN_WIDE void factor_rows(const RowLayout& layout, const std::vector<Block>& blocks, const std::vector<double>& B,
-                         RowSystem& s) {
-    delassus(layout, blocks, B, s);
+PN_WIDE void factor_rows(const std::vector<Block>& blocks, const std::vector<double>& B, RowSystem& s) {
+    delassus(blocks, B, s);
     scale_to_unit_length(s.active, s);
     s.min_pivot = 1.0;
     bool vanishes = false;

@@ -39,8 +39,6 @@ Line line_of(const Program& p, const Workspace& w, int block, int row) {
     return {unit.point, p.blocks[block].joint1 > p.blocks[block].joint2 ? unit.force : -unit.force};
 }
 
-std::pair<int, int> bodies(const Block& block) { return std::minmax({block.joint1, block.joint2}); }
-
 bool rubs_the_same(const Friction& a, const Friction& b) {
     return a.mu == b.mu && a.constant == b.constant && a.radius == b.radius && a.axial_radius == b.axial_radius &&
            a.inverse_span == b.inverse_span && a.static_ratio == b.static_ratio &&
@@ -58,7 +56,7 @@ bool rub_and_bounce_the_same(const Program& p, const Gap& a, const Gap& b) {
 }  // namespace
 
 bool same_bodies(const Program& p, int gap, int other) {
-    return bodies(p.blocks[p.gaps[gap].block]) == bodies(p.blocks[p.gaps[other].block]);
+    return p.bodies_of_gap[gap] == p.bodies_of_gap[other];
 }
 
 bool are_duplicates(const Program& p, int gap, int other) {
@@ -67,10 +65,11 @@ bool are_duplicates(const Program& p, int gap, int other) {
 }
 
 bool coincide(const Program& p, const Workspace& w, int gap, int other) {
+    if (!same_bodies(p, gap, other)) return false;
     const Gap &a = p.gaps[gap], &b = p.gaps[other];
     if (are_duplicates(p, gap, other)) return true;
     if (!w.now.values[a.block].geometric || !w.now.values[b.block].geometric) return false;
-    if (bodies(p.blocks[a.block]) != bodies(p.blocks[b.block]) || !rub_and_bounce_the_same(p, a, b)) return false;
+    if (!rub_and_bounce_the_same(p, a, b)) return false;
     const Line one = line_of(p, w, a.block, 0), two = line_of(p, w, b.block, 0);
     const double size = 1.0 + one.point.norm();
     const double tolerance = contact_query_parameters.coincidence_tolerance;
@@ -86,7 +85,9 @@ void remove_coincident(const Program& p, const Workspace& w, std::vector<int>& l
     size_t left = 0;
     for (int gap : list) {
         const auto end = list.begin() + static_cast<std::ptrdiff_t>(left);
-        const auto same = std::find_if(list.begin(), end, [&](int other) { return coincide(p, w, gap, other); });
+        const auto same = std::find_if(list.begin(), end, [&](int other) {
+            return p.bodies_of_gap[gap] == p.bodies_of_gap[other] && coincide(p, w, gap, other);
+        });
         if (same == end) list[left++] = gap;
         else if (precedes(gap, *same)) *same = gap;
     }

@@ -18,7 +18,7 @@ void scale_rows(const Program& p, Workspace& w) {
 
 void choose_rows(const Program& p, Workspace& w, double tolerance, int max_rank) {
     decide_rows(p.mechanism, w.now.terms, p.blocks, w.now.values, w.now.B, w.now.rows, tolerance, max_rank);
-    factor_rows(p.layout, p.blocks, w.now.B, w.now.rows);
+    factor_rows(p.blocks, w.now.B, w.now.rows);
 }
 
 // Compute r := b - A x, or b - B x with the scaled rows, for the rows in use.

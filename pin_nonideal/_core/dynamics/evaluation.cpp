@@ -68,7 +68,7 @@ static void factor_placed_rows(const Program& p, Workspace& w, double t, const V
     place_rows(p, w, t, v);
     if (w.now.rows.blocks.empty()) return;
     scale_rows(p, w);
-    factor_rows(p.layout, p.blocks, w.now.B, w.now.rows);
+    factor_rows(p.blocks, w.now.B, w.now.rows);
     ++w.counters.factorizations;
     w.now.rows.refine = w.now.terms.D.maxCoeff() > evaluation_parameters.refined_pivot_ratio * w.now.terms.D.minCoeff();
 }

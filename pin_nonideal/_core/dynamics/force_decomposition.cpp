@@ -21,7 +21,7 @@ IdealMotion::IdealMotion(const Program& program, Workspace& workspace) : p(progr
         }
         if (!w.now.rows.blocks.empty()) {
             scale_rows(p, w);
-            if (w.state.has_ideal_row_choice) factor_rows(p.layout, p.blocks, w.now.B, w.now.rows);
+            if (w.state.has_ideal_row_choice) factor_rows(p.blocks, w.now.B, w.now.rows);
             else choose_rows(p, w);
         }
         w.state.has_ideal_row_choice = true;

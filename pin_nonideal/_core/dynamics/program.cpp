@@ -76,6 +76,15 @@ private:
     bool is_known_ = true;
 };
 
+static void number_bodies(Program& p) {
+    std::map<std::pair<int, int>, int> numbers;
+    p.bodies_of_gap.clear();
+    for (const Gap& gap : p.gaps) {
+        const std::pair<int, int> bodies = std::minmax({p.blocks[gap.block].joint1, p.blocks[gap.block].joint2});
+        p.bodies_of_gap.push_back(numbers.emplace(bodies, static_cast<int>(numbers.size())).first->second);
+    }
+}
+
 static void find_duplicates(Program& p) {
     std::map<std::vector<double>, int> first;
     for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
@@ -126,6 +135,7 @@ void Program::finish() {
         // Spinning and rolling resistance have their own row kind.
         if (!std::holds_alternative<SpinSlipRows>(blocks[f.block].kind)) gaps[f.gap].sliding = static_cast<int>(e);
     }
+    number_bodies(*this);
     find_duplicates(*this);
     for (Friction& f : frictions) {
         if (f.load != Friction::Load::multiplier) continue;

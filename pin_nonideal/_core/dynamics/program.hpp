@@ -39,6 +39,7 @@ struct Program {
     int constraints = 0;        // number of blocks of constraints and contacts, including gaps
     int first_gap = 0;          // block of the first gap
     std::vector<Gap> gaps;
+    std::vector<int> bodies_of_gap;  // number of the pair of bodies of each gap
     ImpactLaw impact_law = ImpactLaw::newton;
     std::vector<int> all_contacts;  // blocks of all contacts, in the order of their descriptions
     std::vector<int> contacts;  // blocks of kept contacts and of wheels, which need a compressive normal force

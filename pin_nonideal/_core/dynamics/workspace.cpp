@@ -87,21 +87,27 @@ Workspace::Workspace(const Program& p) {
     set_modes(p, *this, state.mode);
 }
 
-// Thousands of contacts may be open. Contacts that stay open cost one comparison each.
+static void set_active(const Program& p, Workspace& w, int gap, char closed) {
+    w.now.selected[gap] = closed;
+    w.now.is_inactive[p.gaps[gap].block] = !closed;
+    for (int e : p.gaps[gap].elements) w.now.is_inactive[p.frictions[e].block] = !closed;
+}
+
+// Thousands of contacts may be open. They cost a comparison of bytes each.
 static void select_contacts(const Program& p, Workspace& w) {
-    if (same_bytes(w.state.closed, w.now.selected)) return;
+    const std::vector<char>& closed = w.state.closed;
+    if (same_bytes(closed, w.now.selected)) return;
+    for (int i : w.now.closed_gaps)
+        if (!closed[i]) set_active(p, w, i, 0);
     w.now.closed_gaps.clear();
-    for (size_t i = 0; i < p.gaps.size(); ++i) {
-        const char closed = w.state.closed[i];
-        if (closed) w.now.closed_gaps.push_back(static_cast<int>(i));
-        if (closed == w.now.selected[i]) continue;
-        w.now.selected[i] = closed;
-        w.now.is_inactive[p.gaps[i].block] = !closed;
-        for (int e : p.gaps[i].elements) w.now.is_inactive[p.frictions[e].block] = !closed;
+    for (size_t i = next_other(closed, 0, char(0)); i < closed.size(); i = next_other(closed, i + 1, char(0))) {
+        w.now.closed_gaps.push_back(static_cast<int>(i));
+        if (!w.now.selected[i]) set_active(p, w, static_cast<int>(i), 1);
     }
+    const std::vector<char>& inactive = w.now.is_inactive;
     w.now.active_blocks.clear();
-    for (size_t i = 0; i < p.blocks.size(); ++i)
-        if (!w.now.is_inactive[i]) w.now.active_blocks.push_back(static_cast<int>(i));
+    for (size_t i = next_other(inactive, 0, char(1)); i < inactive.size(); i = next_other(inactive, i + 1, char(1)))
+        w.now.active_blocks.push_back(static_cast<int>(i));
 }
 
 void select_rows(const Program& p, Workspace& w) {
@@ -116,8 +122,8 @@ void select_rows(const Program& p, Workspace& w) {
     w.now.loaded_elements.clear();
     w.now.slipping.clear();
     std::fill(w.now.terms.locked.begin(), w.now.terms.locked.end(), char(0));
-    for (size_t e = 0; e < p.frictions.size(); ++e) {
-        if (w.state.mode[e] == unloaded) continue;
+    const std::vector<Mode>& modes = w.state.mode;
+    for (size_t e = next_other(modes, 0, unloaded); e < modes.size(); e = next_other(modes, e + 1, unloaded)) {
         const Block& block = p.blocks[p.frictions[e].block];
         w.now.loaded_elements.push_back(static_cast<int>(e));
         if (w.state.mode[e] != sticking) {
@@ -135,10 +141,14 @@ void select_rows(const Program& p, Workspace& w) {
 }
 
 void set_modes(const Program& p, Workspace& w, const std::vector<Mode>& modes) {
-    w.state.mode.values_ = modes;
-    for (size_t e = 0; e < modes.size(); ++e) {
-        if (modes[e] != unloaded && is_open(p, w, static_cast<int>(e))) w.state.mode.values_[e] = unloaded;
-        if (w.state.mode[e] == unloaded) w.now.slip_force[e] = Vec3::Zero();
+    std::vector<Mode>& own = w.state.mode.values_;
+    own = modes;
+    for (size_t e = next_other(own, 0, unloaded); e < own.size(); e = next_other(own, e + 1, unloaded))
+        if (is_open(p, w, static_cast<int>(e))) own[e] = unloaded;
+    for (size_t e = 0; e < own.size(); ++e) {
+        const size_t end = next_other(own, e, unloaded);
+        std::fill(w.now.slip_force.begin() + e, w.now.slip_force.begin() + end, Vec3::Zero());
+        e = end;
     }
     w.state.steps_since = undecided_steps;
     w.now.renew();

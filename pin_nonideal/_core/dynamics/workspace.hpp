@@ -12,6 +12,7 @@
 #include "dynamics/motion_forces.hpp"
 #include "dynamics/program.hpp"
 #include "complementarity/fixed_point/equation.hpp"
+#include "math/bytes.hpp"
 #include "math/tolerances.hpp"
 
 namespace pn {
@@ -170,12 +171,6 @@ void set_modes(const Program& p, Workspace& w, const std::vector<Mode>& modes);
 void set_closed(const Program& p, Workspace& w, const std::vector<char>& closed);
 // Change closed contacts and modes.
 void set_contacts(const Program& p, Workspace& w, const std::vector<char>& closed, const std::vector<Mode>& modes);
-// Compare modes or flags bytewise.
-template <class Byte>
-bool same_bytes(const std::vector<Byte>& a, const std::vector<Byte>& b) {
-    static_assert(sizeof(Byte) == 1);
-    return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size()) == 0);
-}
 // Check if any unilateral contact is closed.
 inline bool any_closed(const RunState& state) {
     return !state.closed.empty() && std::memchr(state.closed.data(), 1, state.closed.size());
