@@ -119,7 +119,10 @@ def scanned(rests, inside, side):
     return inside + side * 0.5 * (low + high), high - low
 
 
-@pytest.mark.parametrize("name", SCENES)
+MORE = [pytest.param(name, marks=pytest.mark.slow) for name in ("arm", "jack", "pressed")]
+
+
+@pytest.mark.parametrize("name", ["four-bar", "sled", *MORE])
 def test_bands_end_where_rest_ends(name):
     scene, tau = SCENES[name]()
     result = pn.rest(scene, None, tau)

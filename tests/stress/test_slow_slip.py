@@ -79,7 +79,7 @@ def test_stances_give_way_in_time_and_in_few_steps(seeds):
     at_most("part of the time before an error that is not shown", max(missing), SAME_TIME)
 
 
-@pytest.mark.parametrize("seed", [9, pytest.param(12, marks=pytest.mark.slow), 56])
+@pytest.mark.parametrize("seed", [9, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (12, 56))])
 def test_feet_that_cannot_pull_give_way_in_time(seed):
     """Once a foot is relieved, the least loads with which none pulls follow another law."""
     scene, oracle = stance(seed, unilateral=True)
@@ -91,7 +91,8 @@ def test_feet_that_cannot_pull_give_way_in_time(seed):
     at_most("energy balance", ledger(run), BALANCE)
 
 
-@pytest.mark.parametrize("seed", [463, pytest.param(484, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [463, 484])
 def test_feet_rest_as_long_as_any_forces_hold_them(seed):
     """Feet that are relieved while all rest: some could slip long before they must."""
     scene, oracle = stance(seed, unilateral=True)

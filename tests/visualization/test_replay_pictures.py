@@ -182,8 +182,8 @@ def test_a_surface_is_traced_beside_the_path_of_its_point() -> None:
     assert np.linalg.norm(surface.points[0] - surface.points[surface.columns - 1]) > 0.3
 
 
-MORE = ("belt_oscillator", "knife_edge_sleigh", "andrews_squeezer")
-IN_VIEW = ["four_bar", "rolling_disk", *(pytest.param(name, marks=pytest.mark.slow) for name in MORE)]
+MORE = ("rolling_disk", "belt_oscillator", "knife_edge_sleigh", "andrews_squeezer")
+IN_VIEW = ["four_bar", *(pytest.param(name, marks=pytest.mark.slow) for name in MORE)]
 
 
 def stays_in_view(page: Watched, name: str) -> None:
