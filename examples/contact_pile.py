@@ -9,7 +9,7 @@ import pin_nonideal as pn
 radius, wall, mu = 0.05, 0.13, 0.4
 walls = {"floor": "z", "west": (1, 0, 0), "east": (-1, 0, 0), "south": (0, 1, 0), "north": (0, -1, 0)}
 # Balls roll without resistance, so a ball of another pile may roll on.
-model, shapes, rng = pin.Model(), pin.GeometryModel(), np.random.default_rng(7)
+model, shapes, rng = pin.Model(), pin.GeometryModel(), np.random.default_rng(17)
 for name, normal in walls.items():
     height = 0.0 if name == "floor" else -wall
     shapes.addGeometryObject(pn.ground(name, normal=normal, height=height))

@@ -23,16 +23,17 @@ bool rest_on_trees(const Program& p, Workspace& w, const std::vector<int>& gaps,
     }
     BlockSolver solver;
     if (!blocks.fill(p, w, rows, cones, solver.problem)) return false;
-    solver.problem.free = w.now.a;
     solver.problem.offset = VecX::Zero(solver.problem.rows);
     if (!solver.pose()) return false;
-    VecX f = solver.problem.offset;
+    VecX f = solver.problem.offset, x = w.now.a;
+    solver.release(w.now.a, f);
     if (!(solver.solve(f) <= rest_of_trees_parameters.tolerance)) return false;
+    solver.motion(x);
     double rest = 0.0, moves = 0.0, weight = 0.0;
     for (const BlockNode& node : solver.problem.nodes) {
         const auto a = w.now.a.segment(node.first, node.size);
         rest = std::max(rest, a.cwiseAbs().maxCoeff());
-        moves = std::max(moves, solver.x().segment(node.first, node.size).cwiseAbs().maxCoeff());
+        moves = std::max(moves, x.segment(node.first, node.size).cwiseAbs().maxCoeff());
         const ConstBlockMap M(solver.problem.M.data() + node.M, node.size, node.size);
         for (int i = 0; i < node.size; ++i) {
             double sum = 0.0;

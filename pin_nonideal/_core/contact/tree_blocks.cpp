@@ -35,6 +35,15 @@ bool TreeBlocks::is_well_conditioned(const Program& p, const Workspace& w, int r
     return most <= max_pivot_ratio * least;
 }
 
+bool TreeBlocks::has_slow_tree(const VecX& v, double most) const {
+    for (size_t root = 0; root < size_.size(); ++root) {
+        if (size_[root] == 0) continue;
+        const double speed = v.segment(static_cast<Eigen::Index>(root), size_[root]).cwiseAbs().maxCoeff();
+        if (speed > 0.0 && speed <= most) return true;
+    }
+    return false;
+}
+
 int TreeBlocks::node_of(const Program& p, const Workspace& w, int root, BlockProblem& problem) {
     int& node = node_[root];
     if (node >= 0) return node;

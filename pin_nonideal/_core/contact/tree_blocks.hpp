@@ -21,6 +21,8 @@ public:
     // elements, in sequence. Return false if an element moves more than two trees, or if a tree is ill-conditioned.
     bool fill(const Program& p, const Workspace& w, const std::vector<StepRow>& rows,
               const std::vector<ConeElement>& cones, BlockProblem& problem);
+    // Check if the velocity of a tree is not zero and at most `most`.
+    bool has_slow_tree(const VecX& v, double most) const;
 
 private:
     bool is_well_conditioned(const Program& p, const Workspace& w, int root) const;

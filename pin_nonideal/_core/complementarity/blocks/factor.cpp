@@ -37,7 +37,16 @@ void Islands::find(const BlockProblem& p) {
 
 void BlockFactor::analyse(const BlockProblem& p, const Island& island) {
     const int n = static_cast<int>(island.nodes.size());
+    links_.assign(1, n);
+    for (int node : island.nodes) links_.insert(links_.end(), {node, p.nodes[node].first, p.nodes[node].size});
+    for (int i : island.elements)
+        if (p.elements[i].node[1] >= 0) links_.insert(links_.end(), {p.elements[i].node[0], p.elements[i].node[1]});
     place_.assign(p.nodes.size(), -1);
+    if (links_ == last_links_) {
+        for (int k = 0; k < n; ++k) place_[positions_[k].node] = k;
+        return;
+    }
+    last_links_ = links_;
     for (int k = 0; k < n; ++k) place_[island.nodes[k]] = k;
     connected_.assign(static_cast<size_t>(n) * n, 0);
     for (int i : island.elements) {
@@ -60,22 +69,21 @@ void BlockFactor::analyse(const BlockProblem& p, const Island& island) {
 // Eliminate the node with the fewest connected nodes next (minimum degree). Large nodes come last.
 void BlockFactor::order(const BlockProblem& p, const Island& island) {
     const int n = static_cast<int>(island.nodes.size());
-    std::vector<int> degree(n), rank(n, -1);
+    std::vector<int> rank(n, -1);
+    std::vector<long> cost(n);
+    const auto measure = [&](int i) {
+        const long own = p.nodes[island.nodes[i]].size;
+        long unknowns = own;
+        for (int j = 0; j < n; ++j)
+            if (connected_[i * n + j] && rank[j] < 0) unknowns += p.nodes[island.nodes[j]].size;
+        cost[i] = unknowns * own;
+    };
+    for (int i = 0; i < n; ++i) measure(i);
     positions_.assign(n, {});
     for (int k = 0; k < n; ++k) {
         int best = -1;
-        long least = 0;
-        for (int i = 0; i < n; ++i) {
-            if (rank[i] >= 0) continue;
-            long unknowns = 0;
-            for (int j = 0; j < n; ++j)
-                if (connected_[i * n + j] && rank[j] < 0) unknowns += p.nodes[island.nodes[j]].size;
-            const long cost = (unknowns + p.nodes[island.nodes[i]].size) * p.nodes[island.nodes[i]].size;
-            if (best < 0 || cost < least) {
-                best = i;
-                least = cost;
-            }
-        }
+        for (int i = 0; i < n; ++i)
+            if (rank[i] < 0 && (best < 0 || cost[i] < cost[best])) best = i;
         rank[best] = k;
         Position& position = positions_[k];
         position.node = island.nodes[best];
@@ -84,6 +92,7 @@ void BlockFactor::order(const BlockProblem& p, const Island& island) {
         for (int a : position.later)
             for (int b : position.later)
                 if (a != b) connected_[a * n + b] = 1;
+        for (int j : position.later) measure(j);
     }
     entries_.assign(static_cast<size_t>(n) * n, -1);
     size_t at = 0;
@@ -114,7 +123,7 @@ void BlockFactor::order(const BlockProblem& p, const Island& island) {
 
 // Add J_a^T K to a block, with K = G J_b.
 static PN_INLINE void add_block(double* H, const double* Ja, const double* K, int dim, int na, int nb) {
-    if (na == 6 && nb == 6 && dim == 3) add_transpose_product<6>(H, Ja, K, 3, 6, 6);
+    if (na == 6 && nb == 6 && dim == 3) add_three_by_six(H, Ja, K);
     else if (na == 6 && nb == 6) add_transpose_product<6>(H, Ja, K, dim, 6, 6);
     else add_transpose_product(H, Ja, K, dim, na, nb);
 }
@@ -123,8 +132,10 @@ PN_WIDE void BlockFactor::assemble(const BlockProblem& p, const Island& island, 
     H_.resize(std::max(H_.size(), size_));
     std::fill(H_.begin(), H_.begin() + size_, 0.0);
     for (const Position& position : positions_) {
-        const double* M = p.M.data() + p.nodes[position.node].M;
-        std::copy(M, M + position.size * position.size, H_.begin() + position.diagonal);
+        const BlockNode& node = p.nodes[position.node];
+        const double* M = p.M.data() + node.M;
+        if (!node.normalized) std::copy(M, M + position.size * position.size, H_.begin() + position.diagonal);
+        else for (int k = 0; k < node.size; ++k) H_[position.diagonal + k * (node.size + 1)] = 1.0;
     }
     for (int i : island.elements) {
         const BlockElement& e = p.elements[i];

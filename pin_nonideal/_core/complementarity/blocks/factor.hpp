@@ -50,6 +50,7 @@ private:
     bool eliminate_general();
 
     std::vector<char> connected_;  // of two nodes of the island
+    std::vector<int> links_, last_links_;  // nodes, and the two nodes of each element
     std::vector<int> pattern_, last_pattern_, place_, entries_, exchanges_;
     std::vector<Position> positions_;
     std::vector<double> H_, K_;

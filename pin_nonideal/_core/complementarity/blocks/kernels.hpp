@@ -115,6 +115,28 @@ PN_INLINE void add_transpose_product(double* C, const double* A, const double* B
         }
 }
 
+// C += A^T B, with A (3, 6) and B (3, 6).
+PN_INLINE void add_three_by_six(double* C, const double* A, const double* B) {
+    Lanes b[3];
+    TwoLanes tail[3];
+    for (int l = 0; l < 3; ++l) {
+        load(B + 6 * l, b[l]);
+        load(B + 6 * l + 4, tail[l]);
+    }
+    for (int i = 0; i < 6; ++i, C += 6) {
+        Lanes c;
+        TwoLanes end;
+        load(C, c);
+        load(C + 4, end);
+        for (int l = 0; l < 3; ++l) {
+            c += A[6 * l + i] * b[l];
+            end += A[6 * l + i] * tail[l];
+        }
+        store(c, C);
+        store(end, C + 4);
+    }
+}
+
 // Factor A = P L U in place with exchanges of rows. Returns false if a pivot is zero.
 PN_INLINE bool eliminate(double* A, int* exchanges, int n) {
     for (int c = 0; c < n; ++c) {

@@ -35,8 +35,6 @@ public:
     // Compute the move that reduces the residuals `r`, by unknown of the whole scene. Islands whose residuals are at
     // most `floor` do not move. Return false if no island moves.
     bool find(const VecX& r, double floor, VecX& move);
-    // Largest residual.
-    double largest(const VecX& r) const { return problem.rows > 0 ? r.head(problem.rows).cwiseAbs().maxCoeff() : 0.0; }
     // Check if the rows leave a node no freedom.
     bool is_immobile(int node);
 

@@ -8,11 +8,15 @@ namespace pn {
 void BlockNewton::pose(const BlockProblem& p) {
     rho_.assign(p.rows, 0.0);
     root_rho_.assign(p.rows, 0.0);
+    unit_force_.assign(p.rows, 0.0);
     G_.assign(9 * p.elements.size(), 0.0);
     piece_.assign(p.elements.size(), Piece::unknown);
     there_.resize(p.elements.size());
-    for (VecX* x : {&y_, &e_, &z_, &df_, &dw_, &f_try_, &w_try_, &f_best_}) x->resize(p.rows);
-    dx_.resize(p.free.size());
+    for (VecX* x : {&y_, &e_, &z_, &df_, &dw_, &f_full_, &w_full_, &f_part_, &w_part_, &f_best_}) x->resize(p.rows);
+    int unknowns = 0;
+    for (const BlockNode& node : p.nodes) unknowns = std::max(unknowns, node.first + node.size);
+    dx_.resize(unknowns);
+    x_full_.resize(unknowns);
     for (const BlockElement& e : p.elements) {
         const Mat3 W = p.own_response(e);
         const int head = e.head(), tail = e.dim() - head;
@@ -26,22 +30,21 @@ void BlockNewton::pose(const BlockProblem& p) {
         for (int k = 0; k < e.dim(); ++k) {
             rho_[e.row + k] = inverse(k < head ? normal : across);
             root_rho_[e.row + k] = std::sqrt(rho_[e.row + k]);
+            unit_force_[e.row + k] = 1.0 / root_rho_[e.row + k];
         }
     }
 }
 
 void BlockNewton::move(const BlockProblem& p, const Island& island, const VecX& f, VecX& x, VecX& w) const {
     for (int n : island.nodes) x.segment(p.nodes[n].first, p.nodes[n].size).setZero();
-    for (int i : island.elements) p.push(p.elements[i], f, x);
+    p.push(island.elements, f, x);
     for (int n : island.nodes) {
         p.solve_mass(n, x);
         x.segment(p.nodes[n].first, p.nodes[n].size) += p.free.segment(p.nodes[n].first, p.nodes[n].size);
     }
-    for (int i : island.elements) {
-        const BlockElement& e = p.elements[i];
-        p.respond(e, x, w);
-        for (int k = 0; k < e.dim(); ++k) w[e.row + k] += p.offset[e.row + k];
-    }
+    p.respond(island.elements, x, w);
+    for (int i : island.elements)
+        for (int k = p.elements[i].row; k < p.elements[i].row + p.elements[i].dim(); ++k) w[k] += p.offset[k];
 }
 
 BlockNewton::Projection BlockNewton::projection(const BlockElement& e, const double* y) const {
@@ -109,6 +112,7 @@ void BlockNewton::sweep(const BlockProblem& p, const Island& island, int sweeps,
                 x.segment(p.nodes[n].first, p.nodes[n].size) += dx_.segment(p.nodes[n].first, p.nodes[n].size);
             }
         }
+    move(p, island, f, x, w);
 }
 
 // Evaluate the errors e and their squared length in units of energy. Return the largest error of an element relative to
@@ -124,12 +128,13 @@ double BlockNewton::evaluate(const BlockProblem& p, const Island& island, const 
         for (int k = 0; k < e.dim(); ++k) {
             const int r = e.row + k;
             e_[r] = there.P[k] - f[r];
-            merit += e_[r] * e_[r] / rho_[r];
-            error = std::max(error, std::abs(e_[r]) / root_rho_[r]);
-            size = std::max(size, std::abs(f[r]) / root_rho_[r]);
+            const double scaled = e_[r] * unit_force_[r];
+            merit += scaled * scaled;
+            error = std::max(error, std::abs(scaled));
+            size = std::max(size, std::abs(f[r]) * unit_force_[r]);
         }
         if (!(error < HUGE_VAL)) worst = HUGE_VAL;
-        else if (error > 0.0) worst = std::max(worst, error / size);
+        else if (error > worst * size) worst = error / size;
     }
     return worst;
 }
@@ -145,8 +150,8 @@ void BlockNewton::worst(const BlockProblem& p, const Island& island, const VecX&
         for (int k = 0; k < e.dim(); ++k) {
             const int r = e.row + k;
             const double distance = std::abs(there.P[k] - f[r]);
-            error = std::max(error, distance / root_rho_[r]);
-            size = std::max(size, std::abs(f[r]) / root_rho_[r]);
+            error = std::max(error, distance * unit_force_[r]);
+            size = std::max(size, std::abs(f[r]) * unit_force_[r]);
             miss = std::max(miss, distance / rho_[r]);
         }
         if (!(error > largest * size)) continue;
@@ -216,13 +221,13 @@ void BlockNewton::local_step(const BlockProblem& p, const Island& island, double
     }
 }
 
-// Compute the step df of the forces, and the change dw that it causes.
+// Compute the step df of the forces.
 void BlockNewton::find_step(const BlockProblem& p, const Island& island, const BlockFactor& factor, double d) {
     local_step(p, island, d, dx_);
     factor.solve(dx_);
+    p.respond(island.elements, dx_, dw_);
     for (int i : island.elements) {
         const BlockElement& e = p.elements[i];
-        p.respond(e, dx_, dw_);
         const int n = e.dim();
         const double* G = &G_[9 * i];
         for (int k = 0; k < n; ++k) {
@@ -231,10 +236,14 @@ void BlockNewton::find_step(const BlockProblem& p, const Island& island, const B
             df_[e.row + k] = force;
         }
     }
-    for (int n : island.nodes) dx_.segment(p.nodes[n].first, p.nodes[n].size).setZero();
-    for (int i : island.elements) p.push(p.elements[i], df_, dx_);
-    for (int n : island.nodes) p.solve_mass(n, dx_);
-    for (int i : island.elements) p.respond(p.elements[i], dx_, dw_);
+}
+
+// Compute the forces and the motion of the full step. The motion follows from the forces alone, without the rounding of
+// the steps so far.
+void BlockNewton::try_step(const BlockProblem& p, const Island& island, const VecX& f) {
+    for (int i : island.elements)
+        for (int r = p.elements[i].row; r < p.elements[i].row + p.elements[i].dim(); ++r) f_full_[r] = f[r] + df_[r];
+    move(p, island, f_full_, x_full_, w_full_);
 }
 
 // Find the longest of some steps that reduces the squared error enough, with its error and their squared length. Return
@@ -242,37 +251,47 @@ void BlockNewton::find_step(const BlockProblem& p, const Island& island, const B
 bool BlockNewton::shorten(const BlockProblem& p, const Island& island, const VecX& f, const VecX& w, double bound,
                           int most_halvings, double& length, double& error, double& merit) {
     length = 1.0;
-    for (int halving = 0; halving <= most_halvings; ++halving, length *= 0.5) {
+    error = evaluate(p, island, f_full_, w_full_, merit);
+    for (int halving = 0;; ++halving) {
+        if (merit <= (1.0 - parameters.decrease * length) * bound) return true;
+        if (halving == most_halvings) break;
+        length *= 0.5;
         for (int i : island.elements) {
             const BlockElement& e = p.elements[i];
             for (int r = e.row; r < e.row + e.dim(); ++r) {
-                f_try_[r] = f[r] + length * df_[r];
-                w_try_[r] = w[r] + length * dw_[r];
+                f_part_[r] = f[r] + length * df_[r];
+                w_part_[r] = w[r] + length * (w_full_[r] - w[r]);
             }
         }
-        error = evaluate(p, island, f_try_, w_try_, merit);
-        if (merit <= (1.0 - parameters.decrease * length) * bound) return true;
+        error = evaluate(p, island, f_part_, w_part_, merit);
     }
     length = 1.0;
     return false;
 }
 
-// Compute the unit of an island, and evaluate the forces f.
-double BlockNewton::begin(const BlockProblem& p, const Island& island, const VecX& f, VecX& x, VecX& w, double& merit) {
-    unit_ = 0.0;
+// Take a step of a length, with its motion.
+void BlockNewton::take(const BlockProblem& p, const Island& island, double length, VecX& f, VecX& x, VecX& w) {
     for (int i : island.elements) {
-        const BlockElement& e = p.elements[i];
-        p.respond(e, p.free, w);
-        for (int r = e.row; r < e.row + e.dim(); ++r) unit_ = std::max(unit_, root_rho_[r] * std::abs(w[r] + p.offset[r]));
+        const int row = p.elements[i].row, n = p.elements[i].dim();
+        for (int r = row; r < row + n; ++r) f[r] = length == 1.0 ? f_full_[r] : f[r] + length * df_[r];
+        if (length == 1.0) w.segment(row, n) = w_full_.segment(row, n);
     }
-    move(p, island, f, x, w);
-    return evaluate(p, island, f, w, merit);
+    if (length != 1.0) return move(p, island, f, x, w);
+    for (int n : island.nodes)
+        x.segment(p.nodes[n].first, p.nodes[n].size) = x_full_.segment(p.nodes[n].first, p.nodes[n].size);
 }
 
-double BlockNewton::error(const BlockProblem& p, const Island& island, const VecX& f, VecX& x, VecX& w) {
+void BlockNewton::begin(const BlockProblem& p, const Island& island, const VecX& free_w) {
+    unit_ = 0.0;
+    for (int i : island.elements)
+        for (int r = p.elements[i].row; r < p.elements[i].row + p.elements[i].dim(); ++r)
+            unit_ = std::max(unit_, root_rho_[r] * std::abs(free_w[r]));
+}
+
+double BlockNewton::error(const BlockProblem& p, const Island& island, const VecX& f, const VecX& w) {
     double merit;
     compliance_ = 0.0;
-    return begin(p, island, f, x, w, merit);
+    return evaluate(p, island, f, w, merit);
 }
 
 // Check if an element left the linear piece of the last factor.
@@ -297,7 +316,7 @@ double BlockNewton::solve(const BlockProblem& p, const Island& island, BlockFact
             for (int r = p.elements[i].row; r < p.elements[i].row + p.elements[i].dim(); ++r) act(r);
     };
     if (!keeps_factor_) yielding_ = 0.0;
-    double merit, error = begin(p, island, f, x, w, merit), least = error;
+    double merit, error = evaluate(p, island, f, w, merit), least = error;
     if (error <= parameters.tolerance) return error;
     keeps_factor_ = keeps_factor_ && !has_changed_piece(island);
     if (!keeps_factor_) {
@@ -322,6 +341,7 @@ double BlockNewton::solve(const BlockProblem& p, const Island& island, BlockFact
             if (!factor.factor(p, island, G_, symmetric)) break;
         }
         find_step(p, island, factor, factored);
+        try_step(p, island, f);
         double length;
         const double before = error, merit_before = merit;
         const double bound = bold ? merit : std::max({recent[0], recent[1], recent[2], recent[3]});
@@ -341,15 +361,8 @@ double BlockNewton::solve(const BlockProblem& p, const Island& island, BlockFact
             }
             refusals = 0;
         }
-        // The sum of the steps' changes of w has rounding of its own, which is removed near the solution.
-        each_row([&](int r) {
-            f[r] += length * df_[r];
-            w[r] += length * dw_[r];
-        });
-        if (!accepted || error <= parameters.stall_tolerance) {
-            move(p, island, f, x, w);
-            error = evaluate(p, island, f, w, merit);
-        }
+        take(p, island, length, f, x, w);
+        if (!accepted || (length != 1.0 && error <= parameters.stall_tolerance)) error = evaluate(p, island, f, w, merit);
         recent[step % 4] = merit;
         if (!(merit < HUGE_VAL)) break;
         if (accepted && length == 1.0) {
@@ -365,8 +378,10 @@ double BlockNewton::solve(const BlockProblem& p, const Island& island, BlockFact
         }
         if (least < parameters.stall_tolerance && error > parameters.stall_ratio * before && ++stagnant_steps > 1) break;
     }
-    if (error > least || !(error < HUGE_VAL)) each_row([&](int r) { f[r] = f_best_[r]; });
-    move(p, island, f, x, w);
+    if (error > least || !(error < HUGE_VAL)) {
+        each_row([&](int r) { f[r] = f_best_[r]; });
+        move(p, island, f, x, w);
+    }
     return least;
 }
 

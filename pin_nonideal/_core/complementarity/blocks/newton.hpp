@@ -43,18 +43,20 @@ public:
     // patient: a proximal term as large as the error, and steps that may increase the error for a while.
     enum class Search { bold, patient };
 
-    // Solve the laws of an island from the forces f. Return the error of the best forces found. They are left in f,
-    // with their x, and w = J x + offset. All elements yield by the part `compliance` of their own response.
-    // `factor` keeps the order of elimination of the island.
+    // Begin an island: errors of elements without force are relative to its largest free velocity, w under no forces.
+    void begin(const BlockProblem& p, const Island& island, const VecX& free_w);
+    // Solve the laws of an island from the forces f with their motion x, w = J x + offset. Return the error of the best
+    // forces found. They are left in f, with their motion. All elements yield by the part `compliance` of their own
+    // response. `factor` keeps the order of elimination of the island.
     double solve(const BlockProblem& p, const Island& island, BlockFactor& factor, Search search, double compliance,
                  VecX& f, VecX& x, VecX& w);
     // Solve the laws without compliance from the forces of the last solution, which had a small one, with its factor.
     double solve_without_compliance(const BlockProblem& p, const Island& island, BlockFactor& factor, VecX& f, VecX& x,
                                     VecX& w);
-    // Return the error of the forces f, with their x and w.
-    double error(const BlockProblem& p, const Island& island, const VecX& f, VecX& x, VecX& w);
-    // Improve f and x by sweeps of the projected Gauss-Seidel method: each element in turn solves its own laws, with the
-    // forces of the others fixed. w is overwritten.
+    // Return the error of the forces f with the rows w of their motion.
+    double error(const BlockProblem& p, const Island& island, const VecX& f, const VecX& w);
+    // Improve f by sweeps of the projected Gauss-Seidel method: each element in turn solves its own laws, with the forces
+    // of the others fixed. Compute the motion x, w of f.
     void sweep(const BlockProblem& p, const Island& island, int sweeps, VecX& f, VecX& x, VecX& w);
     // Compute x and w of the island under the forces f.
     void move(const BlockProblem& p, const Island& island, const VecX& f, VecX& x, VecX& w) const;
@@ -66,7 +68,6 @@ public:
 
     double stiffness(int row) const { return rho_[row]; }
     const std::vector<double>& stiffnesses() const { return rho_; }
-    double unit() const { return unit_; }  // largest free velocity of the last island
     int steps() const { return steps_; }      // steps since construction
     int factors() const { return factors_; }  // factorizations since construction
 
@@ -82,19 +83,23 @@ private:
     };
 
     Projection projection(const BlockElement& e, const double* y) const;
-    double begin(const BlockProblem& p, const Island& island, const VecX& f, VecX& x, VecX& w, double& merit);
     double evaluate(const BlockProblem& p, const Island& island, const VecX& f, const VecX& w, double& merit);
     bool has_changed_piece(const Island& island) const;
     bool linearize(const BlockProblem& p, const Island& island, double d, bool anew, bool& symmetric);
     void local_step(const BlockProblem& p, const Island& island, double d, VecX& dx);
     void find_step(const BlockProblem& p, const Island& island, const BlockFactor& factor, double d);
+    void try_step(const BlockProblem& p, const Island& island, const VecX& f);
     bool shorten(const BlockProblem& p, const Island& island, const VecX& f, const VecX& w, double bound,
                  int most_halvings, double& length, double& error, double& merit);
+    void take(const BlockProblem& p, const Island& island, double length, VecX& f, VecX& x, VecX& w);
 
     std::vector<double> rho_, root_rho_, G_;
+    std::vector<double> unit_force_;  // inverse of root_rho_: forces in units of the root of an energy
     std::vector<Piece> piece_;
     std::vector<Projection> there_;  // at the last evaluation
-    VecX y_, e_, z_, df_, dx_, dw_, f_try_, w_try_, f_best_;
+    VecX y_, e_, z_, df_, dx_, dw_, f_best_;
+    VecX f_full_, x_full_, w_full_;  // forces and motion of the full step
+    VecX f_part_, w_part_;           // of a shorter one
     double compliance_ = 0.0;
     double yielding_ = 0.0;      // compliance and proximal weight of the last factor, 0 if the last solution needed none
     bool keeps_factor_ = false;  // the next step uses the last factor

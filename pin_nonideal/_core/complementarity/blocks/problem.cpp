@@ -42,8 +42,38 @@ bool BlockProblem::factor() {
     return true;
 }
 
+PN_WIDE void BlockProblem::normalize() {
+    for (BlockNode& node : nodes) node.normalized = node.size == 6;
+    for (const BlockElement& e : elements)
+        if (e.column >= 0) nodes[e.node[0]].normalized = false;
+    for (const BlockElement& e : elements)
+        for (int side = 0; side < 2 && e.node[side] >= 0; ++side) {
+            const BlockNode& node = nodes[e.node[side]];
+            if (!node.normalized) continue;
+            for (int k = 0; k < e.dim(); ++k) solve_lower<6>(L_.data() + node.M, 6, J.data() + e.J[side] + 6 * k);
+        }
+}
+
+void BlockProblem::to_unknowns(VecX& x) const {
+    for (const BlockNode& node : nodes) {
+        if (!node.normalized) continue;
+        const double* L = L_.data() + node.M;
+        double* at = x.data() + node.first;
+        for (int i = 0; i < node.size; ++i) {
+            at[i] /= L[i * (node.size + 1)];
+            for (int k = i + 1; k < node.size; ++k) at[i] += L[k * node.size + i] * at[k];
+        }
+    }
+}
+
+void BlockProblem::from_unknowns(VecX& x) const {
+    for (const BlockNode& node : nodes)
+        if (node.normalized) solve_lower_transpose(L_.data() + node.M, node.size, x.data() + node.first);
+}
+
 PN_WIDE void BlockProblem::solve_mass(int n, VecX& x) const {
     const BlockNode& node = nodes[n];
+    if (node.normalized) return;
     const double* L = L_.data() + node.M;
     double* at = x.data() + node.first;
     if (node.size == 6) {
@@ -55,7 +85,7 @@ PN_WIDE void BlockProblem::solve_mass(int n, VecX& x) const {
     }
 }
 
-PN_WIDE void BlockProblem::respond(const BlockElement& e, const VecX& x, VecX& w) const {
+PN_INLINE void BlockProblem::respond_inline(const BlockElement& e, const VecX& x, VecX& w) const {
     if (e.column >= 0) {
         w[e.row] = J[e.J[0] + e.column] * x[nodes[e.node[0]].first + e.column];
         return;
@@ -69,7 +99,13 @@ PN_WIDE void BlockProblem::respond(const BlockElement& e, const VecX& x, VecX& w
     }
 }
 
-PN_WIDE void BlockProblem::push(const BlockElement& e, const VecX& f, VecX& x) const {
+PN_WIDE void BlockProblem::respond(const BlockElement& e, const VecX& x, VecX& w) const { respond_inline(e, x, w); }
+
+PN_WIDE void BlockProblem::respond(const std::vector<int>& list, const VecX& x, VecX& w) const {
+    for (const int i : list) respond_inline(elements[i], x, w);
+}
+
+PN_INLINE void BlockProblem::push_inline(const BlockElement& e, const VecX& f, VecX& x) const {
     if (e.column >= 0) {
         x[nodes[e.node[0]].first + e.column] += J[e.J[0] + e.column] * f[e.row];
         return;
@@ -83,18 +119,28 @@ PN_WIDE void BlockProblem::push(const BlockElement& e, const VecX& f, VecX& x) c
     }
 }
 
+PN_WIDE void BlockProblem::push(const BlockElement& e, const VecX& f, VecX& x) const { push_inline(e, f, x); }
+
+PN_WIDE void BlockProblem::push(const std::vector<int>& list, const VecX& f, VecX& x) const {
+    for (const int i : list) push_inline(elements[i], f, x);
+}
+
 Mat3 BlockProblem::own_response(const BlockElement& e) const {
     Mat3 W;
     for (Vec3& column : W.c) column = Vec3::Zero();
     for (int side = 0; side < 2 && e.node[side] >= 0; ++side) {
         const BlockNode& node = nodes[e.node[side]];
         const int n = node.size, d = e.dim();
-        work_.assign(J.begin() + e.J[side], J.begin() + e.J[side] + d * n);
-        for (int k = 0; k < d; ++k) solve_lower(L_.data() + node.M, n, work_.data() + k * n);
+        const double* rows = J.data() + e.J[side];  // J L^-T
+        if (!node.normalized) {
+            work_.assign(rows, rows + d * n);
+            for (int k = 0; k < d; ++k) solve_lower(L_.data() + node.M, n, work_.data() + k * n);
+            rows = work_.data();
+        }
         for (int i = 0; i < d; ++i)
             for (int j = 0; j < d; ++j) {
                 double sum = 0.0;
-                for (int k = 0; k < n; ++k) sum += work_[i * n + k] * work_[j * n + k];
+                for (int k = 0; k < n; ++k) sum += rows[i * n + k] * rows[j * n + k];
                 W.c[j][i] += sum;
             }
     }

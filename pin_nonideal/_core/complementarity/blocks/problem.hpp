@@ -4,6 +4,7 @@
 //     M (x - free) = J^T f,   w = J x + offset,
 // with x the accelerations, or velocities at the end of a step over its length. cone/problem.hpp states the laws
 // between f and w. M has one block a node, and J one block for each node of an element. Matrices are stored by rows.
+// Free bodies may have mass-normalized unknowns L^T x, with M = L L^T: their inertia is then the identity.
 #pragma once
 
 #include <vector>
@@ -22,6 +23,7 @@ constexpr double min_block_response = 1e-13;
 struct BlockNode {
     int size = 0, first = 0;  // number of unknowns, and the first in x
     int M = 0;                // first entry of M and of its factor
+    bool normalized = false;  // has mass-normalized unknowns
 };
 
 struct BlockElement {
@@ -56,16 +58,27 @@ public:
     }
     // Factor the blocks of M. Returns false if one is not positive definite.
     bool factor();
+    // Change J to mass-normalized unknowns of the free bodies, once M is factored. Nodes with elements on single unknowns
+    // keep their unknowns.
+    void normalize();
+    // Change x on all nodes to the unknowns of the problem, and back.
+    void to_unknowns(VecX& x) const;
+    void from_unknowns(VecX& x) const;
     // x := M^-1 x on a node.
     void solve_mass(int node, VecX& x) const;
-    // w = J x of an element, at its rows.
+    // w = J x of an element or of several, at their rows.
     void respond(const BlockElement& e, const VecX& x, VecX& w) const;
-    // x += J^T f of an element.
+    void respond(const std::vector<int>& elements, const VecX& x, VecX& w) const;
+    // x += J^T f of an element or of several.
     void push(const BlockElement& e, const VecX& f, VecX& x) const;
+    void push(const std::vector<int>& elements, const VecX& f, VecX& x) const;
     // Response of an element's own rows to its own forces, J M^-1 J^T.
     Mat3 own_response(const BlockElement& e) const;
 
 private:
+    void respond_inline(const BlockElement& e, const VecX& x, VecX& w) const;
+    void push_inline(const BlockElement& e, const VecX& f, VecX& x) const;
+
     std::vector<double> L_;  // lower Cholesky factors of the blocks of M
     mutable std::vector<double> work_;
 };

@@ -6,18 +6,38 @@ namespace pn {
 
 bool BlockSolver::pose() {
     if (!problem.factor()) return false;
+    problem.normalize();
     newton_.pose(problem);
     islands_.find(problem);
     if (static_cast<int>(factors_.size()) < islands_.size()) factors_.resize(islands_.size());
-    x_ = problem.free;
     w_.setZero(problem.rows);
-    free_speed_ = 0.0;
-    for (const BlockElement& e : problem.elements) {
-        problem.respond(e, x_, w_);
-        for (int r = e.row; r < e.row + e.dim(); ++r)
-            free_speed_ = std::max(free_speed_, std::abs(w_[r] + problem.offset[r]));
-    }
     return true;
+}
+
+void BlockSolver::release(const VecX& free, const VecX& constant) {
+    problem.free = free;
+    problem.to_unknowns(problem.free);
+    if (constant.size() > 0 && (constant.array() != 0.0).any()) {
+        x_.setZero(free.size());
+        for (const BlockElement& e : problem.elements) problem.push(e, constant, x_);
+        for (size_t n = 0; n < problem.nodes.size(); ++n) problem.solve_mass(static_cast<int>(n), x_);
+        problem.free += x_;
+    }
+    x_ = problem.free;
+    free_rows_.resize(problem.rows);
+    free_speed_ = 0.0;
+    for (const BlockElement& e : problem.elements) problem.respond(e, x_, free_rows_);
+    for (int r = 0; r < problem.rows; ++r) {
+        free_rows_[r] += problem.offset[r];
+        free_speed_ = std::max(free_speed_, std::abs(free_rows_[r]));
+    }
+}
+
+void BlockSolver::motion(VecX& x) const {
+    on_nodes_ = x_;
+    problem.from_unknowns(on_nodes_);
+    for (const BlockNode& node : problem.nodes)
+        x.segment(node.first, node.size) = on_nodes_.segment(node.first, node.size);
 }
 
 double BlockSolver::newton(int island, BlockNewton::Search search, double compliance, VecX& f) {
@@ -37,11 +57,13 @@ bool BlockSolver::attempt(int island, VecX& f) {
 // Reduce a compliance of all elements to zero, from no forces. Each problem on the way has a solution close to that of
 // the last one, so the path ends at one solution of several.
 bool BlockSolver::compliance_continuation(int island, VecX& f) {
-    for (int i : islands_[island].elements) f.segment(problem.elements[i].row, problem.elements[i].dim()).setZero();
+    clear(island, f);
     on_path_ = f;
     double compliance = parameters.first_compliance, factor = parameters.first_compliance_ratio;
     for (int stage = 0; stage < parameters.max_compliances && compliance > parameters.min_compliance; ++stage) {
+        if (newton_.steps() > last_step_) return false;
         f = on_path_;
+        newton_.move(problem, islands_[island], f, x_, w_);
         const auto search = stage == 0 ? BlockNewton::Search::patient : BlockNewton::Search::bold;
         if (newton(island, search, compliance, f) <= parameters.path_tolerance) {
             on_path_ = f;
@@ -61,7 +83,7 @@ bool BlockSolver::compliance_continuation(int island, VecX& f) {
 // Alternate sweeps and Newton's method. Newton's method may cycle between sets of sliding elements, which sweeps leave.
 bool BlockSolver::settle(int island, VecX& f) {
     on_path_ = best_;
-    for (int round = 0; round < parameters.max_sweep_rounds; ++round) {
+    for (int round = 0; round < parameters.max_sweep_rounds && newton_.steps() <= last_step_; ++round) {
         newton_.sweep(problem, islands_[island], parameters.sweeps_per_round, on_path_, x_, w_);
         f = on_path_;
         if (attempt(island, f) || least_ <= parameters.path_free_tolerance) return true;
@@ -76,6 +98,10 @@ bool BlockSolver::share(int island, VecX& f) {
     if (error > parameters.path_tolerance) return false;
     least_ = newton_.solve_without_compliance(problem, islands_[island], factors_[island], f, x_, w_);
     return least_ <= parameters.tolerance;
+}
+
+void BlockSolver::clear(int island, VecX& f) const {
+    for (int i : islands_[island].elements) f.segment(problem.elements[i].row, problem.elements[i].dim()).setZero();
 }
 
 // Copy the forces of an island.
@@ -98,12 +124,9 @@ bool BlockSolver::unloads(int island, const VecX& f) const {
 // Check if the forces of an island add energy at its motion.
 bool BlockSolver::adds_energy(int island, const VecX& f) {
     double conveyed = 0.0, free = 0.0, own = 0.0;
-    free_rows_.resize(problem.rows);
     for (int i : islands_[island].elements) {
         const BlockElement& e = problem.elements[i];
-        problem.respond(e, problem.free, free_rows_);
         for (int r = e.row; r < e.row + e.dim(); ++r) {
-            free_rows_[r] += problem.offset[r];
             conveyed += f[r] * (w_[r] - free_rows_[r]);
             free -= f[r] * free_rows_[r];
             own += f[r] * f[r] / newton_.stiffness(r);
@@ -114,9 +137,9 @@ bool BlockSolver::adds_energy(int island, const VecX& f) {
 
 // Compute forces near a solution by sweeps from no forces, which bound the energy. Return their error.
 double BlockSolver::sweep(int island, VecX& f) {
-    for (int i : islands_[island].elements) f.segment(problem.elements[i].row, problem.elements[i].dim()).setZero();
+    clear(island, f);
     newton_.sweep(problem, islands_[island], parameters.last_sweeps, f, x_, w_);
-    return newton_.error(problem, islands_[island], f, x_, w_);
+    return newton_.error(problem, islands_[island], f, w_);
 }
 
 // Solve an island by Newton's method from the guess, else after sweeps, else along the path of compliances. Return the
@@ -125,15 +148,17 @@ double BlockSolver::solve(int island, VecX& f) {
     const Island& on = islands_[island];
     const bool many = static_cast<int>(on.elements.size()) >= parameters.min_sharing, alone = many && on.nodes.size() == 1;
     if (alone) {
-        least_ = newton_.error(problem, on, f, x_, w_);
+        least_ = newton_.error(problem, on, f, w_);
         if (least_ <= BlockNewton::parameters.tolerance || share(island, f)) return least_;
         copy(on, guess_, f);
+        newton_.move(problem, on, f, x_, w_);
     }
     least_ = newton(island, BlockNewton::Search::bold, 0.0, f);
     if (least_ <= parameters.tolerance && many && !alone && unloads(island, f)) {
         const double error = least_;
         best_ = f;
         copy(on, guess_, f);
+        newton_.move(problem, on, f, x_, w_);
         if (share(island, f)) return least_;
         f = best_;
         least_ = error;
@@ -148,10 +173,18 @@ double BlockSolver::solve(int island, VecX& f) {
     return least_;
 }
 
-// Solve an island. Forces that are far from a solution, or that add energy, are replaced by forces of sweeps.
+// Solve an island from the guess. If the forces are far from a solution or add energy, solve it from no forces, else by
+// sweeps.
 double BlockSolver::solve_within_energy(int island, VecX& f) {
-    const double error = solve(island, f);
-    if (error <= parameters.min_swept_error && !adds_energy(island, f)) return error;
+    newton_.begin(problem, islands_[island], free_rows_);
+    last_step_ = newton_.steps() + parameters.max_work / static_cast<int>(islands_[island].elements.size());
+    for (int attempts = 0; attempts < 2; ++attempts) {
+        newton_.move(problem, islands_[island], f, x_, w_);
+        const double error = solve(island, f);
+        if (error <= parameters.min_swept_error && !adds_energy(island, f)) return error;
+        clear(island, guess_);
+        clear(island, f);
+    }
     return std::max(sweep(island, f), parameters.min_swept_error);
 }
 

@@ -21,6 +21,9 @@ struct BlockSolverParameters {
     int max_sweep_rounds = 8, sweeps_per_round = 50;
     double min_swept_error = 1e-2;  // error from which sweeps from no forces replace the best forces found
     int last_sweeps = 400;          // number of these sweeps
+    // Newton steps of an island, times its elements, after which no other search begins: about 100 ms. It is a count and no
+    // time, so that runs stay the same.
+    int max_work = 100000;
 };
 
 class BlockSolver {
@@ -28,16 +31,18 @@ public:
     using Parameters = BlockSolverParameters;
     static constexpr Parameters parameters{};
 
-    BlockProblem problem;  // set by the caller: nodes, elements, free and offset
+    BlockProblem problem;  // nodes, elements and offset are set by the caller
 
-    // Prepare the problem once its nodes and elements are set. Returns false if an inertia is not positive definite.
+    // Prepare the problem once its nodes and elements are set. Return false if an inertia is not positive definite.
     bool pose();
+    // Set the motion without forces, by unknown of the whole scene, and add the motion due to constant forces.
+    void release(const VecX& free, const VecX& constant);
     // Solve for the forces f from a guess, usually those of the last step. Return the largest error of an element,
     // relative to its forces, and at least `min_swept_error` for forces of sweeps. The contacts of a single node share its
     // load as equally compliant contacts do, so that their forces depend on the problem alone. Between several nodes
     // shares stay close to the guess.
     double solve(VecX& f);
-    // Compute the motion under the forces f.
+    // Compute the motion under the forces f. `solve` ends with that of its forces.
     void move(const VecX& f);
     // Errors of the laws at the last motion. Velocities are relative to those without forces, or to an element's own
     // response to its forces if that is larger.
@@ -50,13 +55,15 @@ public:
     int newton_steps() const { return newton_.steps(); }
     // Response of a row to its own force.
     double own_response(int row, const VecX& f) const { return f[row] / newton_.stiffness(row); }
-    const VecX& x() const { return x_; }  // motion by unknown, of the nodes
-    const VecX& w() const { return w_; }  // rows of the motion
+    // Write the last motion into x, on the nodes.
+    void motion(VecX& x) const;
+    const VecX& w() const { return w_; }  // rows of the last motion
 
 private:
     double solve(int island, VecX& f);
     double solve_within_energy(int island, VecX& f);
     bool share(int island, VecX& f);
+    void clear(int island, VecX& f) const;
     void copy(const Island& island, const VecX& from, VecX& to) const;
     bool unloads(int island, const VecX& f) const;
     bool settle(int island, VecX& f);
@@ -67,14 +74,16 @@ private:
     double newton(int island, BlockNewton::Search search, double compliance, VecX& f);
 
     BlockNewton newton_;
-    VecX guess_, best_, on_path_, free_rows_;
+    mutable VecX on_nodes_;
+    VecX guess_, best_, on_path_, free_rows_;  // free_rows_: w under no forces
     double least_ = 0.0;  // error of best_
+    int last_step_ = 0;   // Newton step after which no other search begins
     Islands islands_;
     std::vector<BlockFactor> factors_;  // one for each island
-    VecX x_, w_;
+    VecX x_, w_;  // motion in the unknowns of the problem, and its rows
     double error_ = 0.0;
     Miss miss_;
-    double free_speed_ = 0.0;  // largest w without forces
+    double free_speed_ = 0.0;  // largest of free_rows_
 };
 
 }  // namespace pn

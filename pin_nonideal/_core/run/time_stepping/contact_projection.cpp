@@ -27,13 +27,15 @@ void ContactProjection::add(int block, int rows, bool joined) {
     if (joined) elements_.back().dim += rows;
     else elements_.push_back({ConeElement::Kind::equality, rows, 0.0});
     gap_.resize(rows_.size(), -1);
+    width_.resize(rows_.size(), 0.0);
 }
 
-// Collect the rows that hold, and set up the problem. `sticks`: sticking elements must not slide.
-bool ContactProjection::pose(const Program& p, Workspace& w, bool sticks) {
+// Collect the rows that hold. `sticks`: sticking elements must not slide.
+void ContactProjection::gather(const Program& p, const Workspace& w, bool sticks) {
     rows_.clear();
     elements_.clear();
     gap_.clear();
+    width_.clear();
     const auto kept = [&](int e) { return static_cast<int>(p.blocks[p.frictions[e].block].kept.size()); };
     for (int i : w.now.closed_gaps) {
         const Gap& gap = p.gaps[i];
@@ -43,12 +45,50 @@ bool ContactProjection::pose(const Program& p, Workspace& w, bool sticks) {
         if (sticks && gap.sliding >= 0 && w.state.mode[gap.sliding] == sticking)
             add(p.frictions[gap.sliding].block, kept(gap.sliding), true);
     }
+    for (const Open& open : penetrating_) {
+        add(p.gaps[open.gap].block, 1, false);
+        gap_.back() = open.gap;
+        width_.back() = open.width;
+    }
     for (int e : w.now.loaded_elements) {
         const int gap = p.frictions[e].gap;
         const bool slides = gap >= 0 && p.gaps[gap].sliding == e && !is_bare(p, gap);
         if (sticks && !slides && w.state.mode[e] == sticking && kept(e) > 0) add(p.frictions[e].block, kept(e), false);
     }
+}
+
+bool ContactProjection::pose(const Program& p, Workspace& w, bool sticks) {
+    gather(p, w, sticks);
     return blocks_.fill(p, w, rows_, elements_, least_.problem) && least_.pose();
+}
+
+double ContactProjection::measure_gaps(const Program& p, const Workspace& w) {
+    double largest = 0.0;
+    for (size_t r = 0; r < rows_.size(); ++r) {
+        r_[r] = gap_[r] < 0 ? 0.0 : gap_width(p, w, gap_[r]) - width_[r];
+        largest = std::max(largest, std::abs(r_[r]));
+    }
+    return largest;
+}
+
+double ContactProjection::measure_rates(const Program& p, Workspace& w, const VecX& v) {
+    double largest = 0.0;
+    for (size_t r = 0; r < rows_.size(); ++r) {
+        const StepRow& row = rows_[r];
+        const Block& block = p.blocks[row.block];
+        if (row.k == 0) multiply(block, w.now.A, v, w.scratch.r);
+        r_[r] = w.scratch.r[block.row + row.k] + w.now.values[row.block].phi_t[block.kept[row.k]];
+        largest = std::max(largest, std::abs(r_[r]));
+    }
+    return largest;
+}
+
+static double rate_floor(const VecX& v) { return projection_floor * std::max(1.0, v.cwiseAbs().maxCoeff()); }
+
+// Check if gaps and rates are zero up to rounding, and no tree is slow enough to come to rest.
+bool ContactProjection::is_projected(const Program& p, Workspace& w, const VecX& v) {
+    return measure_gaps(p, w) <= projection_floor * scene_size(p, w) && measure_rates(p, w, v) <= rate_floor(v) &&
+           !blocks_.has_slow_tree(v, immobile_speed);
 }
 
 // Move q until the gaps are closed. Bodies that turn keep their momentum. Return true if q moves.
@@ -57,8 +97,7 @@ bool ContactProjection::close_gaps(const Program& p, Workspace& w, double t, Vec
     double last = HUGE_VAL;
     bool moves = false;
     for (int k = 0; k < parameters.max_moves; ++k) {
-        for (size_t r = 0; r < rows_.size(); ++r) r_[r] = gap_[r] < 0 ? 0.0 : gap_width(p, w, gap_[r]);
-        const double largest = least_.largest(r_);
+        const double largest = measure_gaps(p, w);
         if (k > parameters.sure_moves && largest > parameters.stall_ratio * last) break;
         last = largest;
         if (!least_.find(r_, floor, move_)) break;
@@ -68,6 +107,7 @@ bool ContactProjection::close_gaps(const Program& p, Workspace& w, double t, Vec
         for (const auto& flyer : flyers_) flyer.turn_axes(v, move_.segment<3>(flyer.dof + 3));
         place_bodies(p.mechanism, w.now.terms, q);
         for (int i : w.now.closed_gaps) measure_gap(p, w, t, v, i);
+        for (const Open& open : penetrating_) measure_gap(p, w, t, v, open.gap);
         moves = true;
     }
     return moves;
@@ -92,17 +132,39 @@ bool ContactProjection::open_blocked_contacts(const Program& p, Workspace& w) {
     return true;
 }
 
+// Measure the open contacts of a list.
+void ContactProjection::measure_open(const Program& p, Workspace& w, double t, const std::vector<int>& near,
+                                     const VecX& v) {
+    open_.clear();
+    penetrating_.clear();
+    for (int i : near) {
+        if (w.state.closed[i] || is_bare(p, i)) continue;
+        measure_gap(p, w, t, v, i);
+        open_.push_back({i, std::min(0.0, gap_width(p, w, i))});
+    }
+}
+
+// Find open contacts that the moves so far let penetrate by more than `allowed`. Return true if there are any.
+bool ContactProjection::find_penetrating(const Program& p, Workspace& w, double t, const VecX& v, double allowed) {
+    const auto stays = [&](const Open& open) {
+        measure_gap(p, w, t, v, open.gap);
+        return gap_width(p, w, open.gap) >= open.width - allowed;
+    };
+    const auto first = std::stable_partition(open_.begin(), open_.end(), stays);
+    if (first == open_.end()) return false;
+    for (auto open = first; open != open_.end(); ++open) {
+        evaluate_block(p, w, t, v, p.gaps[open->gap].block);
+        penetrating_.push_back(*open);
+    }
+    open_.erase(first, open_.end());
+    return true;
+}
+
 void ContactProjection::meet_rates(const Program& p, Workspace& w, VecX& v) {
     double last = HUGE_VAL;
-    const double floor = projection_floor * std::max(1.0, v.cwiseAbs().maxCoeff());
+    const double floor = rate_floor(v);
     for (int k = 0; k < parameters.max_moves; ++k) {
-        for (size_t r = 0; r < rows_.size(); ++r) {
-            const StepRow& row = rows_[r];
-            const Block& block = p.blocks[row.block];
-            if (row.k == 0) multiply(block, w.now.A, v, w.scratch.r);
-            r_[r] = w.scratch.r[block.row + row.k] + w.now.values[row.block].phi_t[block.kept[row.k]];
-        }
-        const double largest = least_.largest(r_);
+        const double largest = measure_rates(p, w, v);
         if (k > parameters.sure_moves && largest > parameters.stall_ratio * last) return;
         last = largest;
         if (!least_.find(r_, floor, move_)) return;
@@ -121,34 +183,49 @@ void ContactProjection::rest(const Program& p, Workspace& w, VecX& v) {
     hold_locked(p, w, v);
 }
 
-bool ContactProjection::project(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
+bool ContactProjection::project(const Program& p, Workspace& w, double t, double h, const std::vector<int>& near, VecX& q,
+                                VecX& v) {
     moved_energy_ = 0.0;
+    penetrating_.clear();
     if (!blocks_.applies(p) || !p.affine_rates) return false;
     w.now.renew();
     place_bodies(p.mechanism, w.now.terms, q);
-    mass_matrix(p.mechanism, w.now.terms);
     place_rows(p, w, t, v);
+    gather(p, w, true);
+    if (is_projected(p, w, v)) hold_locked(p, w, v);
+    else if (!correct(p, w, t, h, near, q, v)) return false;
+    move_bodies(p.mechanism, w.now.terms, v);
+    for (int e : w.now.slipping) move_block(p, w, t, v, p.frictions[e].block);
+    ++w.counters.projections;
+    return true;
+}
+
+// Move q and v onto the rows. Return false if the trees cannot be projected one by one.
+bool ContactProjection::correct(const Program& p, Workspace& w, double t, double h, const std::vector<int>& near, VecX& q,
+                                VecX& v) {
+    mass_matrix(p.mechanism, w.now.terms);
     if (!pose(p, w, true)) return false;
     const auto total = [&] {
         return kinetic_energy(p.mechanism, w.now.terms, v) + potential_energy(p.mechanism, w.now.terms);
     };
     const double before = energy ? total() : 0.0;
+    measure_open(p, w, t, near, v);
+    const double allowed = std::max(measure_gaps(p, w), h * v.cwiseAbs().cwiseProduct(p.mechanism.lever).maxCoeff());
     bool moves = close_gaps(p, w, t, q, v), posed = true;
-    for (int k = 0; k < parameters.max_choices && is_open(p, w); ++k) {
-        if (k > 0 && !open_blocked_contacts(p, w)) break;
+    for (int k = 0; k < parameters.max_choices; ++k) {
+        const bool penetrates = moves && find_penetrating(p, w, t, v, allowed), opens = is_open(p, w);
+        if (!penetrates && (!opens || (k > 0 && !open_blocked_contacts(p, w)))) break;
         posed = false;
-        if (!pose(p, w, false)) break;  // sticking elements slide only as far as the gaps require
+        if (!pose(p, w, !opens)) break;  // sticking elements slide only as far as the gaps require
         moves |= close_gaps(p, w, t, q, v);
     }
+    penetrating_.clear();
     if (moves) place_rows(p, w, t, v);
     if (!posed) pose(p, w, true);
     else if (moves) blocks_.fill(p, w, rows_, elements_, least_.problem);
     meet_rates(p, w, v);
     rest(p, w, v);
-    move_bodies(p.mechanism, w.now.terms, v);
-    for (int e : w.now.slipping) move_block(p, w, t, v, p.frictions[e].block);
     if (energy) moved_energy_ = total() - before;
-    ++w.counters.projections;
     return true;
 }
 

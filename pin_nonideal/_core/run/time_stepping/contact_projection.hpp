@@ -23,16 +23,26 @@ public:
 
     explicit ContactProjection(const Program& p);
 
-    // Project q and v onto the closed contacts and sticking elements of the workspace: gaps close, and v satisfies
-    // their rows. Contacts open if other contacts hold their bodies apart. A tree that the rows hold, with a velocity
-    // of rounding, comes to rest. Return false, with q and v unchanged, if the trees cannot be projected one by one.
-    bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
+    // After a step of length h, project q and v onto the closed contacts and sticking elements of the workspace: gaps
+    // close, and v satisfies their rows. Contacts open if other contacts hold their bodies apart. Open contacts of the
+    // list `near` penetrate by the move at most as far as the travel of the step or the largest gap that closes. A tree
+    // that the rows hold, with a velocity of rounding, comes to rest. Return false, with q and v unchanged, if the trees
+    // cannot be projected one by one.
+    bool project(const Program& p, Workspace& w, double t, double h, const std::vector<int>& near, VecX& q, VecX& v);
     double numerical_energy() const { return moved_energy_; }  // energy that the last projection added, if `energy`
 
     bool energy = false;  // measure the energy
 
 private:
+    void gather(const Program& p, const Workspace& w, bool sticks);
     bool pose(const Program& p, Workspace& w, bool sticks);
+    // Fill r_ with the widths of the closed gaps, or with the rates of the rows. Return the largest.
+    double measure_gaps(const Program& p, const Workspace& w);
+    double measure_rates(const Program& p, Workspace& w, const VecX& v);
+    bool is_projected(const Program& p, Workspace& w, const VecX& v);
+    bool correct(const Program& p, Workspace& w, double t, double h, const std::vector<int>& near, VecX& q, VecX& v);
+    void measure_open(const Program& p, Workspace& w, double t, const std::vector<int>& near, const VecX& v);
+    bool find_penetrating(const Program& p, Workspace& w, double t, const VecX& v, double allowed);
     bool close_gaps(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
     bool is_open(const Program& p, const Workspace& w) const;
     bool open_blocked_contacts(const Program& p, Workspace& w);
@@ -48,6 +58,12 @@ private:
     std::vector<int> gap_;  // by row: gap whose residual it closes, -1 for sliding
     VecX r_, move_, q_from_;
     std::vector<char> closed_;
+    struct Open {
+        int gap;
+        double width;  // before the projection, at most 0
+    };
+    std::vector<Open> open_, penetrating_;  // open contacts, and those that the moves let penetrate
+    std::vector<double> width_;             // by row: width that its gap gets
     double moved_energy_ = 0.0;
 };
 

@@ -97,7 +97,7 @@ bool MoreauContacts::project(double t, VecX& y, double& numerical_energy) {
     const bool rests = (v0_.array() == 0.0).all() && (v1_.array() == 0.0).all() && same_bytes(closed_, was_closed_);
     if (rests || (w.now.closed_gaps.empty() && w.now.loaded_elements.empty())) return true;
     system_.read(y);
-    if (!projection_.project(p, w, t, system_.q, system_.v)) return false;
+    if (!projection_.project(p, w, t, h_, watch_.gaps.monitored_gaps, system_.q, system_.v)) return false;
     system_.write(y);
     numerical_energy += projection_.numerical_energy();
     return true;

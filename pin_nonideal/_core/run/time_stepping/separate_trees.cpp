@@ -19,46 +19,49 @@ bool SeparateTrees::pose(const Program& p, const Workspace& w, const std::vector
                          const std::vector<ConeElement>& cones, const VecX& a_free, const VecX& offset) {
     BlockProblem& problem = solver_.problem;
     if (!applies(p, w) || !blocks_.fill(p, w, rows, cones, problem)) return false;
-    problem.free = a_free;
     problem.offset = offset.head(problem.rows);
     f_.setZero(problem.rows);
     a_free_ = a_free;
+    is_moved_ = false;
     return solver_.pose();
 }
 
 void SeparateTrees::release(const VecX& a_free, const VecX& offset) {
     a_free_ = a_free;
     solver_.problem.offset = offset.head(solver_.problem.rows);
-}
-
-// Add forces to the motion without forces.
-void SeparateTrees::shift(const VecX& middle) {
-    BlockProblem& problem = solver_.problem;
-    problem.free.setZero();
-    for (const BlockElement& e : problem.elements) problem.push(e, middle, problem.free);
-    for (size_t n = 0; n < problem.nodes.size(); ++n) problem.solve_mass(static_cast<int>(n), problem.free);
-    problem.free += a_free_;
+    is_moved_ = false;
 }
 
 double SeparateTrees::solve(const std::vector<ConeElement>& cones, const VecX& middle, VecX& f) {
     const int n = solver_.problem.rows;
     for (size_t e = 0; e < cones.size(); ++e) solver_.problem.elements[e].cone.bound = cones[e].bound;
-    shift(middle);
-    f_ = f.head(n) - middle.head(n);
+    middle_ = middle.head(n);
+    solver_.release(a_free_, middle_);
+    f_ = f.head(n) - middle_;
     const double error = solver_.solve(f_);
-    f.head(n) = f_ + middle.head(n);
+    f.head(n) = f_ + middle_;
+    f_moved_ = f.head(n);
+    is_moved_ = true;
     return error;
 }
 
-void SeparateTrees::move(const VecX& f, VecX& a, VecX& w) {
+// Compute the motion under the forces f, of which `middle` are constant, unless it is known.
+void SeparateTrees::exert(const VecX& middle, const VecX& f) {
     const int n = solver_.problem.rows;
-    solver_.problem.free = a_free_;
-    f_ = f.head(n);
+    middle_ = middle.head(n);
+    f_ = f.head(n) - middle_;
+    if (is_moved_ && f_moved_ == f.head(n)) return;
+    solver_.release(a_free_, middle_);
     solver_.move(f_);
+    f_moved_ = f.head(n);
+    is_moved_ = true;
+}
+
+void SeparateTrees::move(const VecX& middle, const VecX& f, VecX& a, VecX& w) {
+    exert(middle, f);
     a = a_free_;
-    for (const BlockNode& node : solver_.problem.nodes)
-        a.segment(node.first, node.size) = solver_.x().segment(node.first, node.size);
-    w.head(n) = solver_.w();
+    solver_.motion(a);
+    w.head(solver_.problem.rows) = solver_.w();
 }
 
 // Compute the largest of the terms that cancel in the acceleration of each tree: the acceleration without forces, and
@@ -72,7 +75,7 @@ void SeparateTrees::measure_balance() {
         for (int row = e.row; row < e.row + e.dim(); ++row)
             for (int side = 0; side < 2 && e.node[side] >= 0; ++side) {
                 double& most = balanced_[e.node[side]];
-                most = std::max(most, std::abs(solver_.own_response(row, f_)));
+                most = std::max(most, std::abs(solver_.own_response(row, f_moved_)));
             }
 }
 
@@ -97,10 +100,7 @@ void SeparateTrees::keep_rest(double h, const VecX& v0, VecX& v1) {
 }
 
 ConeResiduals SeparateTrees::residuals(const VecX& middle, const VecX& f) {
-    const int n = solver_.problem.rows;
-    shift(middle);
-    f_ = f.head(n) - middle.head(n);
-    solver_.move(f_);
+    exert(middle, f);
     return solver_.residuals(f_);
 }
 

@@ -19,8 +19,8 @@ public:
     // Solve the laws for the forces f, from a guess. `middle` are forces around which the boxes are centered. Return the
     // largest error of an element, relative to its forces.
     double solve(const std::vector<ConeElement>& cones, const VecX& middle, VecX& f);
-    // Compute the acceleration a and the rows w under the forces f.
-    void move(const VecX& f, VecX& a, VecX& w);
+    // Compute the acceleration a and the rows w under the forces f. `middle` as in `solve`.
+    void move(const VecX& middle, const VecX& f, VecX& a, VecX& w);
     // Set the velocity v1 of trees to zero that were at rest, v0 = 0, and whose forces cancel over the step h.
     void keep_rest(double h, const VecX& v0, VecX& v1);
     // Check if the accelerations a of the trees under the forces of the last motion are rounding.
@@ -32,12 +32,14 @@ public:
 
 private:
     bool applies(const Program& p, const Workspace& w) const;
-    void shift(const VecX& middle);
+    void exert(const VecX& middle, const VecX& f);
     void measure_balance();
 
     TreeBlocks blocks_;
     BlockSolver solver_;
-    VecX a_free_, f_;
+    VecX a_free_, f_, middle_;
+    VecX f_moved_;           // forces of the last motion
+    bool is_moved_ = false;  // the motion of f_moved_ is known
     std::vector<double> balanced_;  // by node: largest acceleration that forces cancel
 };
 

@@ -27,7 +27,7 @@ void StepForces::pose(const MeanVelocity& mean, double h, const VecX& a_free, bo
 }
 
 void StepForces::add_motion(VecX& a) {
-    if (separate_) trees_.move(f, a, end_rows);
+    if (separate_) trees_.move(middle_, f, a, end_rows);
     else responses_.add_motion(p, w, f, static_cast<int>(elements_.rows.size()), a);
 }
 
@@ -102,40 +102,37 @@ bool StepForces::solve(double h, const VecX& q0, const VecX& v0) {
     const double error = separate_ ? trees_.solve(elements_.cones, middle_, f) : HUGE_VAL;
     bool solved = error <= parameters.max_residual;
     const bool starts = v0.cwiseAbs().maxCoeff() <= rest_speed && !(q_without_rest_.size() > 0 && q_without_rest_ == q0);
+    const bool searches = !solved && !(separate_ && n > parameters.max_rows_with_responses);
     if (solved && !(starts && moves())) return true;
+    if (!solved) best_f_ = f.head(n);
+    if (!solved && !searches && !starts) return accept_best_forces(h);
     responses_.find(p, w, elements_.rows);
-    if (!solved) {
-        best_f_ = f.head(n);
-        f.head(n) = guess_;
-    }
+    if (!solved) f.head(n) = guess_;
     const auto W = responses_.matrix(n);
     f.head(n) -= middle_.head(n);
     end_rows.head(n) = free_rows_.head(n);
     end_rows.head(n).noalias() += W * middle_.head(n);
     solver_.search_briefly(error < parameters.max_brief_error);
-    if (!solved)
+    if (searches)
         solved = solver_.solve(W, end_rows.head(n), elements_.cones, true, f.head(n), true) == ConeStatus::solved &&
                  !add_energy(W, end_rows.head(n), f.head(n));
     if (starts) solved = keep_rest(solved, q0) || solved;
     f.head(n) += middle_.head(n);
-    if (!solved && separate_ && trees_.miss().element >= 0) {
-        f.head(n) = best_f_;
-        accept_best_forces(h);
-        return true;
-    }
-    return solved;
+    return solved || (separate_ && trees_.miss().element >= 0 && accept_best_forces(h));
 }
 
 // Accept the best forces found, which violate the laws of contact by the error of one element.
-void StepForces::accept_best_forces(double h) {
+bool StepForces::accept_best_forces(double h) {
     const BlockSolver::Miss& miss = trees_.miss();
+    f.head(best_f_.size()) = best_f_;
     const StepElements::Part& part = elements_.parts[miss.element];
     law_miss_ = {part.gap >= 0 ? p.gaps[part.gap].block : p.frictions[part.element].block, h * miss.velocity};
+    return true;
 }
 
 void StepForces::measure_end() {
     const int n = static_cast<int>(elements_.rows.size());
-    if (separate_) return trees_.move(f, a_, end_rows);
+    if (separate_) return trees_.move(middle_, f, a_, end_rows);
     end_rows.head(n) = free_rows_.head(n);
     end_rows.head(n).noalias() += responses_.matrix(n) * f.head(n);
 }

@@ -14,6 +14,9 @@ namespace pn {
 struct StepForcesParameters {
     // Error of the forces found tree by tree, relative to them, up to which the search with all responses is brief.
     double max_brief_error = 1e-2;
+    // Largest number of rows of separate trees that are solved with all responses if the search tree by tree fails. The
+    // cost grows by the cube of the number, to a tenth of a second here.
+    int max_rows_with_responses = 200;
     // Largest turn of a direction in a step whose change of a rate is taken into account [half rad].
     double max_turn = 0.25;
     // Distance of a force at its limit, relative to the largest force.
@@ -70,7 +73,7 @@ private:
     void measure_free(const MeanVelocity& mean, double h, const VecX& a_free);
     double turning_rate(const StepRow& row, double h) const;
     void recall_forces();
-    void accept_best_forces(double h);
+    bool accept_best_forces(double h);
     bool moves();
     bool keep_rest(bool solved, const VecX& q0);
 

@@ -97,16 +97,12 @@ def test_many_random_solids():
     assert failed == []
 
 
-DIPS = pytest.mark.xfail(
-    strict=True, reason="the move out of an overlap pushes an open corner into the floor"
-)
-
-
 @pytest.mark.parametrize(
     ("seed", "ratio"),
     [
-        *((seed, ratio) for seed in (2, 3, 5) for ratio in (1.0, 1e2, 1e4, 1e6) if (seed, ratio) != (2, 1e6)),
-        pytest.param(2, 1e6, marks=DIPS),
+        *((seed, ratio) for seed in (2, 3, 5) for ratio in (1.0, 1e2, 1e4, 1e6)),
+        (20, 1e4),
+        (26, 1e6),
     ],
 )
 def test_a_heavy_box_falls_on_a_light_one(seed, ratio):
