@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 import pin_nonideal as pn
+from pin_nonideal.scene.scene import compiled_scene
 
 from . import timing
 from .contact_scenes import (
@@ -45,7 +46,7 @@ def measure(given: ContactScene, rounds: int, with_mujoco: bool) -> dict[str, An
     row: dict[str, Any] = {
         "case": given.title,
         "made": timing.clock() - begin,
-        "contacts": len(scene.contacts),
+        "contacts": len(compiled_scene(scene).point_names),
     }
     steps = round(given.duration / STEP)
     run = None

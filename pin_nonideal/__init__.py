@@ -51,7 +51,15 @@ from .scene.scene import Scene
 from .scene.stepping import Stepper
 from .simulation.simulate import simulate
 from .states.report import ProjectionReport
-from .trajectory.records import ContactRecord, Event, FrameRecord, JointRecord, LawRecord, Stats
+from .trajectory.records import (
+    ContactPoints,
+    ContactRecord,
+    Event,
+    FrameRecord,
+    JointRecord,
+    LawRecord,
+    Stats,
+)
 from .trajectory.trajectory import Trajectory
 from .version import __version__ as __version__
 
@@ -118,6 +126,7 @@ def __dir__() -> list[str]:
 __all__ = [
     "ConeResiduals",
     "ConeSolution",
+    "ContactPoints",
     "ContactRecord",
     "DivergenceError",
     "Equilibrium",

@@ -56,10 +56,11 @@ class Solution:
         a: acceleration, (n,).
         F_ideal: ideal part of the force of constraint, (n,), Eq. (39).
         F_nonideal: nonideal part of the force of constraint, (n,), Eq. (39).
-        lam: multipliers of the rows of A, (m,).
+        lam: multipliers of the rows of A, (m,); a pair of shapes in a scene has one, the sum of the normal
+            forces at its points.
         rank: number of independent rows of A, the paper's k.
         modes: mode of each friction element of a scene, +1 or -1 for slip, 0 for stick, 2 for an open
-            contact; empty without friction elements.
+            contact; empty without friction elements. A pair of shapes slips if one of its points slips.
         closed: whether each contact of a scene is closed, in the order of its `contact_names`; empty without
             contacts.
         unique: whether this is the only motion that constraints and laws admit. True: uniqueness is proven.

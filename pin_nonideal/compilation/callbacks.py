@@ -16,6 +16,8 @@ from pin_nonideal.errors import InputError, RunError, UnknownNameError, UserFunc
 from pin_nonideal.types import Array
 from pin_nonideal.validation import array, floats
 
+from .contact_groups import RowGroups
+
 # Times at which a user's function of time is compared with its central differences [s]. Round times are
 # avoided, since functions often have corners there. Several times are used, since one may fall on a corner.
 PROBES = (0.01371, 0.21317, 0.71753)
@@ -209,12 +211,12 @@ class ReactionNames:
     """Names by which a user law may access reactions.
 
     Attributes:
-        slices: rows of each constraint and contact.
+        multipliers: rows of the user.
         blocks: index of each constraint and contact in the core's list of blocks.
         joints: index of each joint.
     """
 
-    slices: dict[str, slice]
+    multipliers: RowGroups
     blocks: dict[str, int]
     joints: dict[str, int]
 
@@ -231,8 +233,8 @@ class Reactions:
 
     @property
     def lam(self) -> Array:
-        """Multipliers of all rows, (m,)."""
-        return self._view.lam
+        """Multipliers of all rows, (m,); a pair of shapes has one, the sum over its points."""
+        return self._names.multipliers.groups.sum(self._view.lam)
 
     def __getitem__(self, name: str) -> Array:
         """Multipliers of one constraint or contact.
@@ -243,7 +245,7 @@ class Reactions:
         Raises:
             UnknownNameError: no constraint has that name.
         """
-        slices = self._names.slices
+        slices = self._names.multipliers.slices
         if name not in slices:
             raise UnknownNameError(f'no constraint "{name}" in this scene{nearest(name, slices)}')
         return self.lam[slices[name]]

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.actuation import SampledControl
 from pin_nonideal.description.constraints import UserConstraint
+from pin_nonideal.description.contacts.pair_of_shapes import PairOfShapes, point_contacts
 from pin_nonideal.description.drive_kinds import delayed_control, switching_drives
 from pin_nonideal.description.scene_spec import SceneSpec
 from pin_nonideal.errors import InputError, RunError
@@ -21,6 +22,7 @@ from pin_nonideal.types import Array, Model
 from .actuation import delayed_torque
 from .analysis import check_user_functions, has_rates, without_functions, zero_rows
 from .constraints import anchor_frames
+from .contact_groups import Groups, contacts_of_points, grouped_rows, points_by_pair
 from .delay import DelayedTorque
 from .error_context import Circumstances, named_failure
 from .lowering import lower
@@ -48,15 +50,23 @@ class CompiledScene:
         q0: see above.
         spec: see above.
         program: the core's program, without the rows that can never act.
-        slices: rows of `lam` of each constraint and contact, by name.
-        rows: (first row, end, whether it is a contact) of each constraint and contact, by name.
-        described: description of each constraint and contact, by name; both stops of a joint share one.
+        slices: rows of the core of each constraint and contact point, by name.
+        described: description of each constraint and contact point, by name; both stops of a joint share one.
         joints: layout of the values of each joint in q and v.
-        contact_names: names of the contacts in the order of their descriptions; each stop is one contact.
+        shapes: names of the two shapes of each pair of shapes, by name of the pair.
+        points: names of the contact points of each pair of shapes with several points.
+        contact_of: contact of each of these points.
+        point_names: names of all contacts of the core, in the order of their descriptions.
+        contacts: contacts of the user, as groups of `point_names`; each stop is one contact.
+        multipliers: rows of `lam`, as groups of the rows of the core.
+        elements: friction elements of the user, as groups of those of the core.
+        laws: laws of the user and of contacts with friction, as groups of those of the core.
+        works: columns of powers and works, as groups of those of the core.
+        rows: (first row in `lam`, end, whether it is a contact) of each constraint and contact, by name.
         opening_names: names of the unilateral contacts.
         block_names: names of all constraints and contacts, by block of the core.
         anchors: (name, frame id, frame id or None for the world) of constraints between two frames.
-        dropped: (name, row, reason) of rows that can never act.
+        dropped: (name, row, reason) of rows that can never act; the rows of a pair of shapes are its points.
         projection: projection onto the constraints.
         unprojected: names of user constraints without residual and rate.
         unchecked: whether derivatives of user functions are still unchecked.
@@ -73,15 +83,25 @@ class CompiledScene:
         self.program = builder.finish()
         self.slices = row_slices(self.program)
         constraints = len(spec.constraints)  # contacts follow
+        pairs = [c for c in spec.contacts if isinstance(c, PairOfShapes)]
+        self.shapes = {pair.name: pair.shapes for pair in pairs}
+        self.points = points_by_pair(spec.contacts)
+        self.contact_of = contacts_of_points(self.points)
+        self.multipliers = grouped_rows(self.slices, self.contact_of)
         self.rows = {
-            name: (s.start, s.stop, k >= constraints) for k, (name, s) in enumerate(self.slices.items())
+            name: (s.start, s.stop, k >= constraints)
+            for k, (name, s) in enumerate(self.multipliers.slices.items())
         }
         self.described = {
             name: described[name if name in described else name.rpartition(" ")[0]] for name in self.slices
         }
         self.joints = joint_places(model)
         self.block_names = block_names(self.program)
-        self.contact_names = [self.block_names[block] for block in self.program.contacts]
+        self.point_names = [self.block_names[block] for block in self.program.contacts]
+        self.contacts = Groups(self.point_names, self.contact_of)
+        self.elements = Groups(self.program.element_names, self.contact_of)
+        self.laws = Groups(self.program.law_names, self.contact_of)
+        self.works = Groups(self.program.power_names, self.contact_of)
         self.opening_names = self.block_names[self.program.first_gap :]
         named = list(zip(self.slices, spec.constraints, strict=False))  # contacts follow
         self.anchors = anchor_frames(named, resolver)
@@ -106,7 +126,10 @@ class CompiledScene:
                 builder.add_copy(row, first, factor)
             self.program = builder.finish()
         idle_names = {name for name, _, _ in self.dropped}
-        self.projection = Projection(model, self.program, q0, idle_names, is_start or plain is None)
+        self.dropped = [(self.contact(n), row + self._number(n), reason) for n, row, reason in self.dropped]
+        self.projection = Projection(
+            model, self.program, q0, idle_names, is_start or plain is None, self.contact_of
+        )
         control = delayed_control(spec.actuation)
         self._delayed: tuple[SampledControl, Resolver, core.Builder] | None = None
         if control is not None:
@@ -172,10 +195,23 @@ class CompiledScene:
     def explicit_only(self) -> str:
         """Message on a part of the scene that no implicit method supports, or empty."""
         if self.opening_names:
-            return f'no implicit method here opens and closes contacts such as "{self.opening_names[0]}" yet'
+            name = self.contact(self.opening_names[0])
+            return f'no implicit method here opens and closes contacts such as "{name}" yet'
         if switching := switching_drives(self.spec.actuation):
             return f"no implicit method here holds the torques of a {type(switching[0]).__name__} yet"
         return ""
+
+    def contact(self, name: str) -> str:
+        """Return the name of the contact of a contact point; other names stay.
+
+        Args:
+            name: name of a point, contact, constraint or law.
+        """
+        return self.contact_of.get(name, name)
+
+    def _number(self, name: str) -> int:
+        """Return the number of a point among the points of its contact."""
+        return self.points[self.contact_of[name]].index(name) if name in self.contact_of else 0
 
     def _circumstances(self) -> Circumstances:
         """Return the names of the parts of the scene that error messages of its runs need."""
@@ -187,11 +223,12 @@ class CompiledScene:
         pairs = {
             name: _frames_of(c) for name, c in zip(names, spec.contacts, strict=True) if any(_frames_of(c))
         }
-        return Circumstances(self.explicit_only, sources, pairs)
+        return Circumstances(self.explicit_only, sources, pairs, self.contact_of)
 
 
 def _frames_of(contact: object) -> tuple[str, str]:
     """Return the frames of a contact, empty for the world or if it has none."""
+    contact = point_contacts([contact])[0]
     first = getattr(contact, "frame", None) or getattr(contact, "frame1", None)
     second = getattr(contact, "plane", None) or getattr(contact, "frame2", None)
     return (str(first or ""), str(second or ""))

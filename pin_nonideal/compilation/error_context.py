@@ -23,8 +23,9 @@ from pin_nonideal.errors import (
     StiffnessError,
     WallTimeError,
 )
-from pin_nonideal.states.rows import block_names
 from pin_nonideal.types import Model
+
+from .contact_groups import contact_names
 
 MAX_NAMED = 4  # names in a message
 LAWS = ("the equation of motion", "Signorini's conditions", "the limit of friction", "maximum dissipation")
@@ -73,11 +74,13 @@ class Circumstances(NamedTuple):
         explicit_only: message on a part of the scene that no implicit method supports, or empty.
         sources: names of the actuation, the applied forces and the laws.
         pairs: frames of each contact by its name, the second one empty for the world.
+        contact_of: contact of each point of a pair of shapes.
     """
 
     explicit_only: str
     sources: tuple[str, str, str]
     pairs: dict[str, tuple[str, str]]
+    contact_of: dict[str, str]
 
 
 def named_failure(
@@ -92,33 +95,35 @@ def named_failure(
         around: parts of the scene that the message may name.
     """
     kinds, kind, t, value = core.FailureKind, failure.kind, failure.time, failure.value
+
+    def named(names: Sequence[str], chosen: Sequence[int]) -> list[str]:
+        return contact_names((names[i] for i in chosen), around.contact_of)
+
     if kind is kinds.singular_mass:
         return _singular(model, failure.elements[0], t)
     if kind is kinds.inconsistent:
-        names = [*program.block_names, *program.element_names]
-        return _inconsistent([names[i] for i in failure.elements], value, t, model, around.pairs)
+        names = named([*program.block_names, *program.element_names], failure.elements)
+        return _inconsistent(names, value, t, model, around.pairs)
     if kind is kinds.not_finite:
         return NonFiniteError(f"acceleration is not finite at t = {t:.4g} s", time=t)
     if kind is kinds.paradox:
-        elements = [program.element_names[i] for i in failure.elements]
-        return _paradox(elements or program.law_names, failure)
+        elements = named(program.element_names, failure.elements)
+        return _paradox(elements or contact_names(program.law_names, around.contact_of), failure)
     if kind is kinds.not_converged:
-        names = [program.element_names[i] for i in failure.elements]
-        blocks = block_names(program)
-        return _modes_error(names or [blocks[i] for i in program.contacts], t)
+        names = named(program.element_names, failure.elements)
+        return _modes_error(names or named(program.block_names, program.contacts), t)
     if kind is kinds.unmet_law:
         law, index = failure.elements
         dof_names = [str(model.names[joint_of(model, i)]) for i in range(model.nv)]
-        names = [dof_names, block_names(program), program.element_names, program.element_names][law]
-        return _law_error(LAWS[law], names[index], value, t)
+        names = [dof_names, program.block_names, program.element_names, program.element_names][law]
+        return _law_error(LAWS[law], named(names, [index])[0], value, t)
     if kind is kinds.closure:
-        name = program.block_names[failure.elements[0]]
+        name = named(program.block_names, failure.elements[:1])[0]
         return open_loop_error(name, {name: value}, t)
     if kind is kinds.interrupted:
         return RunInterrupted(f"the run was interrupted at t = {t:.4g} s", time=t)
     if kind is kinds.impact_energy:
-        blocks = block_names(program)
-        names = [blocks[i] for i in failure.elements]
+        names = named(program.block_names, failure.elements)
         return _impact_energy_error(names, value, t, _contact_bodies(model, names, around.pairs))
     if kind is kinds.stiff:
         return _stiffness_error(model, failure.elements[0], value, t, around.explicit_only)

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.constraints import Constraint, Rolling
 from pin_nonideal.description.contacts import Contact, JointLimit
+from pin_nonideal.description.contacts.pair_of_shapes import point_contacts
 from pin_nonideal.description.scene_spec import SceneSpec
 from pin_nonideal.states.rows import row_slices
 
@@ -16,6 +17,7 @@ from .actuation import lower_actuation
 from .callbacks import ReactionNames
 from .constraints import lower_constraint
 from .contact_friction import lower_contact_friction
+from .contact_groups import contacts_of_points, grouped_rows, points_by_pair
 from .contacts import lower_contacts, lower_gaps
 from .forces import lower_force
 from .friction import LoweringContext
@@ -81,18 +83,19 @@ def lower_stepwise(spec: SceneSpec, builder: core.Builder, resolver: Resolver) -
     """
     used_names: set[str] = set()
     constraint_names = unique_names(spec.constraints, used_names)
-    contact_names = unique_names(spec.contacts, used_names)
+    unique_names(spec.contacts, set(used_names))  # contacts, before their points
+    contacts: list[Any] = point_contacts(spec.contacts)
+    contact_names = unique_names(contacts, used_names)
     law_names = unique_names(spec.laws, set())
     for c, name in zip(spec.constraints, constraint_names, strict=True):
         lower_constraint(c, name, builder, resolver)
         yield LoweredItem("constraint", name, c, partial(_relower, lower_constraint, name, resolver))
-    for name, contact in lower_contacts(
-        list(zip(contact_names, spec.contacts, strict=True)), builder, resolver
-    ):
+    for name, contact in lower_contacts(list(zip(contact_names, contacts, strict=True)), builder, resolver):
         yield LoweredItem("contact", name, contact, partial(_relower, lower_gaps, name, resolver))
     joints = {name: i for i, name in enumerate(resolver.model.names) if i}
     blocks = {name: block for block, name in enumerate(builder.block_names)}
-    names = ReactionNames(row_slices(builder), blocks, joints)
+    multipliers = grouped_rows(row_slices(builder), contacts_of_points(points_by_pair(spec.contacts)))
+    names = ReactionNames(multipliers, blocks, joints)
     context = LoweringContext(resolver, dict(zip(constraint_names, spec.constraints, strict=True)), names)
     for law, name in zip(spec.laws, law_names, strict=True):
         lower_law(law, name, builder, context)
@@ -102,8 +105,8 @@ def lower_stepwise(spec: SceneSpec, builder: core.Builder, resolver: Resolver) -
         for c, name in zip(spec.constraints, constraint_names, strict=True)
         if isinstance(c, Rolling)
     ]
-    contacts = zip(spec.contacts, contact_names, strict=True)
-    for touching, name in [*rolling, *(pair for pair in contacts if not isinstance(pair[0], JointLimit))]:
+    rubbing = [(c, n) for c, n in zip(contacts, contact_names, strict=True) if not isinstance(c, JointLimit)]
+    for touching, name in [*rolling, *rubbing]:
         lower_contact_friction(touching, name, builder, context)
         yield LoweredItem("contact", name, touching, partial(_relower, lower_contact_friction, name, context))
     for name, f in zip(unique_names(spec.forces, set()), spec.forces, strict=True):

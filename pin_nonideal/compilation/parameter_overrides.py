@@ -10,7 +10,10 @@ import numpy as np
 import pinocchio as pin
 
 from pin_nonideal.core_loader import core
+from pin_nonideal.description.contacts.base import similar
+from pin_nonideal.description.contacts.pair_of_shapes import PairOfShapes
 from pin_nonideal.errors import InputError, UnknownNameError, nearest, short_repr
+from pin_nonideal.geometry.from_model import GeometryContact
 from pin_nonideal.types import Array, Table
 from pin_nonideal.validation import array, label
 
@@ -19,6 +22,7 @@ from .lowering import LoweredItem, lower_stepwise
 from .resolver import Resolver
 
 NUMBERS = (float, list, np.ndarray)  # types of keyword arguments that may differ between runs
+OF_PAIRS = ("mu", "static_ratio", "restitution")  # numbers of a pair of shapes that may differ between runs
 WRITER_PREFIXES = ("add_", "set_", "let_")  # prefixes of builder methods that modify the program
 # Negative principal moments down to this value times the largest are accepted: rounding of a thin rod.
 ROUNDING = 1e-9
@@ -119,12 +123,24 @@ def _parts(compiled: CompiledScene) -> dict[str, list[tuple[LoweredItem, _Relowe
     parts: dict[str, list[tuple[LoweredItem, _Relower]]] = {}
     kinds: dict[str, str] = {}
     begin = 0
+    pairs = {c.name: c.given for c in spec.contacts if isinstance(c, PairOfShapes)}
     for item in lower_stepwise(spec, builder, Resolver(compiled.model, compiled.q0)):
+        if item.kind == "contact" and (contact := compiled.contact(item.name)) in pairs:
+            item = _of_pair(item, contact, pairs[contact])
         kind = kinds.setdefault(item.name, item.kind)
         name = item.name if kind == item.kind else f"{item.kind} {item.name}"
         parts.setdefault(name, []).append((item, _Relower(builder, builder.calls[begin:])))
         begin = len(builder.calls)
     return parts
+
+
+def _of_pair(item: LoweredItem, name: str, given: object) -> LoweredItem:
+    """Return a point of a pair of shapes that takes its coefficients from the description of the pair."""
+
+    def relower(pair: object, out: object) -> object:
+        return item.relower(similar(item.description, **{key: getattr(pair, key) for key in OF_PAIRS}), out)
+
+    return item._replace(name=name, description=given, relower=relower)
 
 
 def _body(compiled: CompiledScene, name: str, entries: Mapping[str, object], n: int) -> dict[Any, Array]:
@@ -201,6 +217,10 @@ def _descriptions(name: str, described: object, entries: object, n: int) -> Iter
             raise UnknownNameError(f'{who}: no field "{key}"{nearest(str(key), known)}')
         if not isinstance(values, (list, tuple, np.ndarray)) or np.shape(values)[:1] != (n,):
             raise InputError(f"{who}: {key} must be {n} values, one a run; got {short_repr(values)}")
+        if isinstance(described, GeometryContact) and key not in OF_PAIRS:
+            raise InputError(
+                f"{who}: {key} shapes the scene and cannot differ between runs; sweep makes a scene for each"
+            )
         own = _functions_of(getattr(described, key))
         if any(functions and functions != own for functions in map(_functions_of, values)):
             raise InputError(

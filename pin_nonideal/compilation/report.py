@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from pin_nonideal.description.contacts import JointLimit
+from pin_nonideal.description.contacts.pair_of_shapes import given_contacts
 from pin_nonideal.description.drive_lists import drives_of
 from pin_nonideal.description.laws import JointFriction
 from pin_nonideal.types import Model
 
 from .compiled_scene import CompiledScene
+from .contact_groups import contact_names
 
 MAX_POSITION_LIMIT = 1e3  # position limits from here on are never reached [rad or m]
 
@@ -25,14 +27,17 @@ def report(scene: CompiledScene, name: str, rank: int, notes: Sequence[str]) -> 
     """
     model, opening = scene.model, set(scene.opening_names)
     rows = scene.program.rows - len(opening)
+    contacts = contact_names(scene.opening_names, scene.contact_of)
     lines = [f"{name}: {model.njoints - 1} joints, nq {model.nq}, nv {model.nv}"]
     for i in range(1, model.njoints):
         kind = model.joints[i].shortname().removeprefix("JointModel")
         lines.append(f"  joint {model.names[i]}: {kind}, on {model.names[model.parents[i]]}")
     for name, (first, end, is_contact) in scene.rows.items():
         what = "contact" if is_contact else "constraint"
-        lines.append(f"  {what} {name}: {end - first} rows{', may open' if name in opening else ''}")
-    for name in scene.program.law_names:
+        points = f" of {len(scene.points[name])} points" if name in scene.points else ""
+        opens = ", may open" if name in contacts else ""
+        lines.append(f"  {what} {name}: {end - first} rows{points}{opens}")
+    for name in scene.laws.names:
         lines.append(f"  law {name}")
     lines += [f"  force {_label(force)}" for force in scene.spec.forces]
     lines += [f"  actuation {_label(drive)}" for drive in drives_of(scene.spec.actuation)]
@@ -41,10 +46,13 @@ def report(scene: CompiledScene, name: str, rank: int, notes: Sequence[str]) -> 
         lines.append(f"  limits, which the motion may pass: {', '.join(limited)}")
     lines.append(f"rows {rows}, rank {rank}, mobility {model.nv - rank}")
     if opening:
-        lines.append(f"  contacts that may open: {len(opening)}, a row and its friction each while closed")
+        points = f" of {len(opening)} points" if scene.points else ""
+        lines.append(
+            f"  contacts that may open: {len(contacts)}{points}, a row and its friction each while closed"
+        )
     for name, row, reason in scene.dropped:
         lines.append(f"  left out: row {row} of {name}: {reason}")
-    redundant = rows - sum(name not in opening for name, _, _ in scene.dropped) - rank
+    redundant = rows - sum(name not in contacts for name, _, _ in scene.dropped) - rank
     if redundant > 0:
         lines.append(f"  redundant: {redundant} further rows, decided at every step")
     lines.append("skipped: " + (", ".join(_skipped_parts(scene)) or "nothing"))
@@ -70,7 +78,7 @@ def _skipped_parts(scene: CompiledScene) -> list[str]:
     spec = scene.spec
     depends = any(isinstance(law, JointFriction) and law.mu for law in spec.laws)
     depends |= any(getattr(law, "reaction", None) for law in spec.laws if not isinstance(law, JointFriction))
-    if not depends and not any(getattr(c, "mu", 0.0) for c in spec.contacts):
+    if not depends and not any(getattr(c, "mu", 0.0) for c in given_contacts(spec.contacts)):
         skipped.append("reactions (no law reads them)")
     if not spec.forces and spec.actuation is None:
         skipped.append("given forces (none)")

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pin_nonideal.description.contacts.pair_of_shapes import PairOfShapes
 from pin_nonideal.description.drive_lists import drives_of
 from pin_nonideal.states.joint_order import file_order
 from pin_nonideal.types import Model, Table
@@ -119,18 +120,18 @@ def describe(scene: CompiledScene, name: str) -> Description:
         name: name of the scene.
     """
     spec = scene.spec
-    rows = [
+    given = {c.name: c.given for c in spec.contacts if isinstance(c, PairOfShapes)}
+    tables = [
         {
             "name": key,
-            "first": s.start,
-            "rows": s.stop - s.start,
+            "first": first,
+            "rows": end - first,
             "dropped": [r for n, r, _ in scene.dropped if n == key],
+            **_kind_and_arguments(given.get(key) or scene.described[key]),
         }
-        for key, s in scene.slices.items()
+        for key, (first, end, _) in scene.rows.items()
     ]
     held = len(spec.constraints)
-    kinds = [_kind_and_arguments(each) for each in (*spec.constraints, *spec.contacts)]
-    tables = [{**row, **kind} for row, kind in zip(rows, kinds, strict=True)]
     names = unique_names(spec.laws, set())
     return Description(
         name=name,

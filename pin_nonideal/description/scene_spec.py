@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from .constraints import Constraint
 from .contacts import Contact
+from .contacts.pair_of_shapes import PairOfShapes
 from .forces import Force
 from .laws import Law
 
@@ -15,7 +16,7 @@ class SceneSpec(NamedTuple):
 
     Attributes:
         constraints: descriptions, or constraint models of Pinocchio.
-        contacts: descriptions.
+        contacts: descriptions, with a `PairOfShapes` in place of each `GeometryContact`.
         laws: descriptions.
         forces: descriptions.
         actuation: None, an array (nv,), a table by joint name, a function, a description, or a tuple of
@@ -26,7 +27,7 @@ class SceneSpec(NamedTuple):
     """
 
     constraints: tuple[Constraint, ...]
-    contacts: tuple[Contact, ...]
+    contacts: tuple[Contact | PairOfShapes, ...]
     laws: tuple[Law, ...]
     forces: tuple[Force, ...]
     actuation: object

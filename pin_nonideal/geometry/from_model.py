@@ -1,4 +1,4 @@
-"""Contacts of collision geometry: each pair of shapes is replaced by the contacts of its analytic manifold.
+"""Contacts of collision geometry: pairs of shapes, and the contacts of their analytic manifolds.
 
 A half-space touches a sphere or an ellipsoid at one point, a capsule at its two ends, a box or a convex mesh
 at its corners, and a cylinder or a cone at its rims, faces and tip. Spheres and capsules touch each other at
@@ -18,6 +18,7 @@ from typing import Any
 import pinocchio as pin
 
 from pin_nonideal.atomic_files import file_path
+from pin_nonideal.description.contacts.pair_of_shapes import PairOfShapes
 from pin_nonideal.description.joint_friction import static_ratio as ratio_of_static
 from pin_nonideal.errors import InputError, LoadingError, UnknownNameError, nearest, short_repr
 from pin_nonideal.types import GeometryModel, GeometryObject, Model
@@ -33,7 +34,7 @@ from pin_nonideal.validation import (
 )
 
 from .ground import ground as plain_ground
-from .manifold import ManifoldContact, manifold
+from .manifold import manifold
 from .shapes import Shape, geometry_object, shape_of
 
 __all__ = ["GeometryContact", "geometry_contacts", "ground_contacts"]
@@ -43,13 +44,13 @@ __all__ = ["GeometryContact", "geometry_contacts", "ground_contacts"]
 class GeometryContact:
     """Contact of two shapes of a scene's collision model, with Coulomb friction.
 
-    Gap: least distance of the shapes [m]. When a scene is compiled, the pair is replaced by the contacts of
-    its analytic manifold. A half-space touches spheres, ellipsoids, capsules (both ends), boxes and convex
-    meshes (corners), cylinders and cones (rims, eight points of a face, tip). Spheres and capsules touch each
-    other at one point. Boxes and convex meshes touch spheres, capsules and each other (corners on faces,
-    edges on edges). Cylinders and cones touch all of these and each other (sides, rims, eight points of a
-    face and the chords between them, tip). Edges that touch edges are rounded. The faces keep their
-    positions.
+    Gap: least distance of the shapes [m]. The pair is one contact of the scene and of its runs. In the core
+    it has a contact for each point of its analytic manifold. A half-space touches spheres, ellipsoids,
+    capsules (both ends), boxes and convex meshes (corners), cylinders and cones (rims, eight points of a
+    face, tip). Spheres and capsules touch each other at one point. Boxes and convex meshes touch spheres,
+    capsules and each other (corners on faces, edges on edges). Cylinders and cones touch all of these and
+    each other (sides, rims, eight points of a face and the chords between them, tip). Edges that touch edges
+    are rounded. The faces keep their positions.
     Rows: 1 for each closed contact point. lam: normal force at that point [N].
 
     Args:
@@ -59,7 +60,7 @@ class GeometryContact:
         mu: kinetic coefficient of friction.
         static_ratio: static over kinetic friction, at least 1.
         restitution: opening rate of the gap after an impact over its closing rate before, 0 to 1.
-        name: name in messages and results; if there are several contact points, their names are numbered.
+        name: name in messages and results, by default "SHAPE on OTHER".
         rounding: radius of rounded edges [m], for boxes and convex meshes against each other and against
             cylinders or cones. The same length rounds the rims of two cylinders or cones, and is the inset of
             a cylinder's or cone's rim behind its face, except against spheres. None selects a thousandth of
@@ -278,8 +279,8 @@ def _share_a_joint(model: Model, first: int, second: int) -> bool:
     return bool(first and second and (model.parents[first] == second or model.parents[second] == first))
 
 
-def expand_geometry_contacts(contacts: Iterable[object], model: Model, geometry: object) -> tuple[Any, ...]:
-    """Return contacts in which each `GeometryContact` is replaced by the contacts of its manifold.
+def with_manifolds(contacts: Iterable[object], model: Model, geometry: object) -> tuple[Any, ...]:
+    """Return contacts in which each `GeometryContact` is replaced by a `PairOfShapes` with its manifold.
 
     Args:
         contacts: descriptions of contacts.
@@ -295,12 +296,11 @@ def expand_geometry_contacts(contacts: Iterable[object], model: Model, geometry:
     shapes = geometry() if callable(geometry) else geometry
     if shapes is None:
         raise InputError("a GeometryContact needs the scene's collision_model; pass one, or use PointContact")
-    nested = [_manifold(c, model, shapes) if isinstance(c, GeometryContact) else [c] for c in items]
-    return tuple(c for several in nested for c in several)
+    return tuple(_manifold(c, model, shapes) if isinstance(c, GeometryContact) else c for c in items)
 
 
-def _manifold(c: GeometryContact, model: Model, geometry: GeometryModel) -> list[ManifoldContact]:
-    """Return the contacts of one pair of shapes."""
+def _manifold(c: GeometryContact, model: Model, geometry: GeometryModel) -> PairOfShapes:
+    """Return a pair of shapes with the contacts of its manifold."""
     who = label(c)
     first, second = (_shape(who, item, model, geometry) for item in (c.geometry1, c.geometry2))
     if first.frame == second.frame:
@@ -308,7 +308,8 @@ def _manifold(c: GeometryContact, model: Model, geometry: GeometryModel) -> list
     ground, thing = (first, second) if first.normal is not None else (second, first)
     base = c.name or f"{thing.name} on {ground.name}"
     options = {"mu": c.mu, "static_ratio": c.static_ratio, "restitution": c.restitution}
-    return manifold(who, first, second, c.rounding, base, options)
+    points = manifold(who, first, second, c.rounding, base, options)
+    return PairOfShapes(c, base, (first.name, second.name), tuple(points))
 
 
 def _shape(who: str, item: str | GeometryObject, model: Model, geometry: GeometryModel) -> Shape:

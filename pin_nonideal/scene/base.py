@@ -14,12 +14,13 @@ from pin_nonideal.core_loader import core
 from pin_nonideal.description.actuation import Actuation
 from pin_nonideal.description.constraints import Constraint
 from pin_nonideal.description.contacts import Contact
+from pin_nonideal.description.contacts.pair_of_shapes import given_contacts
 from pin_nonideal.description.drive_lists import given_actuation
 from pin_nonideal.description.forces import Force
 from pin_nonideal.description.laws import Law
 from pin_nonideal.description.scene_spec import SceneSpec
 from pin_nonideal.errors import InputError
-from pin_nonideal.geometry.from_model import GeometryContact, expand_geometry_contacts
+from pin_nonideal.geometry.from_model import GeometryContact, with_manifolds
 from pin_nonideal.states.held import Held
 from pin_nonideal.states.loop_closure import CLOSURE_TOLERANCE
 from pin_nonideal.types import GeometryModel, Model, State, Table
@@ -99,7 +100,8 @@ class SceneBase:
         self.model = model
         self.name = optional_text("Scene: name", name) or model.name or "scene"
         self.constraints, self.laws = sequence("constraints", constraints), sequence("laws", laws)
-        self.contacts = expand_geometry_contacts(sequence("contacts", contacts), model, collision_model)
+        compiled_contacts = with_manifolds(sequence("contacts", contacts), model, collision_model)
+        self.contacts = given_contacts(compiled_contacts)
         self.forces = sequence("forces", forces)
         self.actuation, self.terms = given_actuation(actuation), choice("Scene: terms", terms, TERMS)
         self.impact = choice("Scene: impact", impact, IMPACTS)
@@ -112,15 +114,14 @@ class SceneBase:
         initial = InitialState(model, q0, v0)
         self.q0, self.v0 = initial.q, initial.v
         tolerance = nonnegative("Scene: assembly_tolerance", assembly_tolerance)
-        lists = self.constraints, self.contacts, self.laws, self.forces
+        lists = self.constraints, compiled_contacts, self.laws, self.forces
         spec = SceneSpec(*lists, self.actuation, terms, self.impact, tolerance)
         compiled = CompiledScene(model, initial.q, spec, initial.is_given)
         if initial.is_given:
             compiled.check_functions(initial.q, initial.v, 0.0)
-        self.constraint_slices, self.anchor_frames = compiled.slices, compiled.anchors
-        self.contact_names = compiled.contact_names
-        self.element_names = compiled.program.element_names
-        self.law_names = compiled.program.law_names
+        self.constraint_slices, self.anchor_frames = compiled.multipliers.slices, compiled.anchors
+        self.contact_names = compiled.contacts.names
+        self.element_names, self.law_names = compiled.elements.names, compiled.laws.names
         self.dropped = compiled.dropped
         if compiled.unprojected:
             names = ", ".join(f'"{n}"' for n in compiled.unprojected)
@@ -149,7 +150,8 @@ class SceneBase:
         return copy_scene(self, self._parts(), memo)  # type: ignore[no-any-return]
 
     def _parts(self) -> Table:
-        return parts_of(self, self._origin, self._origin.shapes or self._shapes.sources, self._states.held)
+        shapes = self._origin.shapes or self._shapes.sources
+        return parts_of(self, self._compiled.spec.contacts, self._origin, shapes, self._states.held)
 
     def __setstate__(self, later: Table) -> None:
         self._origin = Origin(later["table"], later["shapes"], self._origin.assembly_tolerance)

@@ -26,11 +26,14 @@ class PickledObject:
         self.content = content
 
 
-def parts_of(scene: Any, source: Any, shapes: tuple[Any, object], held: Held) -> Table:
+def parts_of(
+    scene: Any, contacts: tuple[object, ...], source: Any, shapes: tuple[Any, object], held: Held
+) -> Table:
     """Return the constructor arguments and the later state of a scene.
 
     Args:
         scene: the Scene.
+        contacts: its contacts, with the manifolds of pairs of shapes, so that no shape is read again.
         source: its Origin.
         shapes: for display and for collisions, or the functions that read them.
         held: entries of the initial state that were named.
@@ -39,7 +42,8 @@ def parts_of(scene: Any, source: Any, shapes: tuple[Any, object], held: Held) ->
         key: getattr(scene, key)
         for key in (*LISTS, "actuation", "name", "source", "licence", "terms", "impact")
     }
-    arguments |= {"q0": scene.q0, "v0": scene.v0, "assembly_tolerance": source.assembly_tolerance}
+    arguments |= {"contacts": contacts, "q0": scene.q0, "v0": scene.v0}
+    arguments["assembly_tolerance"] = source.assembly_tolerance
     arguments |= {"visual_model": shapes[0], "collision_model": shapes[1]}
     later = {"table": source.table, "shapes": source.shapes, "friction": scene.contact_friction, "held": held}
     return {

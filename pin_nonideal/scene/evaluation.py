@@ -70,19 +70,21 @@ class Evaluator:
         self.runner.continues = choice("solve: several", several, SEVERAL_CHOICES) == "continue"
         prescribed = None if modes is None else self._modes(modes, unilateral)
         now = self.call(self.runner.solve, q, v, t, tau, prescribed)
-        used = np.array(now.modes, dtype=np.int8)
-        closed = np.array(now.closed, dtype=bool)
-        return Solution(now.a, now.F_ideal, now.F_nonideal, now.lam, now.rank, used, now.unique, closed)
+        compiled = self._compiled
+        used = compiled.elements.modes(np.array(now.modes, dtype=np.int8))
+        closed = compiled.contacts.any(np.array(now.closed, dtype=bool))
+        lam = compiled.multipliers.groups.sum(now.lam)
+        return Solution(now.a, now.F_ideal, now.F_nonideal, lam, now.rank, used, now.unique, closed)
 
     def _modes(self, modes: Sequence[int], unilateral: bool) -> list[core.Mode]:
-        names = self._compiled.program.element_names
+        names = self._compiled.elements.names
         values = np.asarray(modes, dtype=object)
         known = [int(mode) for mode in core.Mode if unilateral or mode is not core.Mode.unloaded]
         if values.shape != (len(names),) or not np.isin(values, known).all():
             raise InputError(
                 f"modes must hold {len(names)} numbers out of {', '.join(map(str, known))}; got {modes}"
             )
-        return [core.Mode(int(mode)) for mode in values]
+        return [core.Mode(int(mode)) for mode in values[self._compiled.elements.index]]
 
     def acceleration(self, q: State, v: State, tau: ArrayLike | None, t: float, several: str) -> Array:
         """Acceleration at one state, (nv,), see `Scene.acceleration`.

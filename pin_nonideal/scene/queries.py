@@ -39,12 +39,14 @@ class Queries:
 
     def jacobian(self, name: str, q: State | None, t: float) -> Array:
         """Rows of one constraint or contact, (rows, nv)."""
-        slices = self._compiled.slices
-        if text("jacobian: name", name) not in slices:
+        known, slices = self._compiled.rows, self._compiled.slices
+        if text("jacobian: name", name) not in known:
             raise UnknownNameError(
-                f'no constraint or contact "{name}" in scene "{self._name}"{nearest(name, slices)}'
+                f'no constraint or contact "{name}" in scene "{self._name}"{nearest(name, known)}'
             )
-        return rows_at(self._runner, self._at(q), np.zeros(self._nv), number("t", t))[0][slices[name]]
+        points = self._compiled.points.get(name, [name])
+        rows = slice(slices[points[0]].start, slices[points[-1]].stop)
+        return rows_at(self._runner, self._at(q), np.zeros(self._nv), number("t", t))[0][rows]
 
     def energies(self, q: State | None, v: State | None) -> dict[str, float]:
         """Kinetic, potential and total energy [J], by name."""

@@ -34,7 +34,7 @@ class Scene(EditableScene):
         constraints: descriptions of `description.constraints`, or Pinocchio's RigidConstraintModel,
             PointAnchorConstraintModel and FrameAnchorConstraintModel.
         laws: descriptions of `description.laws`.
-        contacts: descriptions of `description.contacts`.
+        contacts: descriptions of `description.contacts`, and `GeometryContact`s.
         forces: descriptions of `description.forces`.
         actuation: None, constant torques, (nv,) or by joint name, a function (t, q, v) -> tau, a description
             of `pin_nonideal.description.actuation`, or a list of such drives. The torques of a list add, and
@@ -169,7 +169,8 @@ class Scene(EditableScene):
             t: time [s].
             tau: joint torques instead of the scene's actuation, (nv,) or by joint name.
             modes: mode of each friction element: +1 or -1 slips, 0 sticks, 2 is without friction, as in an
-                open contact. None determines the modes by velocity and complementarity.
+                open contact. The mode of a pair of shapes holds at all of its points. None determines the
+                modes by velocity and complementarity.
             several: behavior if the laws admit several motions: "error", or "continue" with the motion of
                 least friction. An element at rest that may stick or slip sticks in either case.
 
@@ -240,7 +241,7 @@ class Scene(EditableScene):
     def jacobian(self, name: str, q: State | None = None, t: float = 0.0) -> Array:
         """Return rows A of one constraint or contact, A a = b, in the order and scale of `lam`, (rows, nv).
 
-        Rows that can never act are included.
+        Rows that can never act are included. A pair of shapes has a row for each contact point.
 
         Args:
             name: name of the constraint or contact.

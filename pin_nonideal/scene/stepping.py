@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.compilation.delay import DelayedTorque
@@ -68,9 +68,10 @@ class Stepper:
         return self._run.state()[1]
 
     @property
-    def modes(self) -> Array:
+    def modes(self) -> NDArray[np.int8]:
         """Current mode of each friction element: +1 or -1 slips, 0 sticks, 2 if its contact is open."""
-        return np.array([int(mode) for mode in self._run.modes], dtype=np.int8)
+        modes = np.array([int(mode) for mode in self._run.modes], dtype=np.int8)
+        return np.asarray(self._compiled.elements.modes(modes))
 
     def step(self, tau: ArrayLike | None = None) -> tuple[Array, Array]:
         """Advance the run by one period.

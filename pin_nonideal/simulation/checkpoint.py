@@ -35,7 +35,7 @@ from pin_nonideal.version import __version__
 
 from .options import RunOptions
 
-FORMAT = 2
+FORMAT = 3
 # Largest interval, longer than any run [s].
 MAX_INTERVAL = 1e8
 

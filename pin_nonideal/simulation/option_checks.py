@@ -14,7 +14,7 @@ from pin_nonideal.validation import choice, count, label, positive, relative_tol
 
 from .methods import METHODS, SCIPY
 
-RECORDS = ("a", "forces", "energy", "power", "laws", "reactions", "tau", "dense")
+RECORDS = ("a", "forces", "contact_points", "energy", "power", "laws", "reactions", "tau", "dense")
 FIELDS = {"F_ideal": "forces", "F_nonideal": "forces", "lam": "forces", "lam_ideal": "forces"}
 # Minimum length of a step in spacings of floating-point times. A shorter step has an error above one percent.
 MIN_SPACINGS = 100.0

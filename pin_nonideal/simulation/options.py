@@ -46,6 +46,7 @@ class RunOptions:
         max_steps: maximum number of accepted steps, or 0 for no limit except in a stiff scene.
         a: whether accelerations are recorded.
         forces: whether forces and multipliers are recorded.
+        contact_points: whether all contact points are recorded.
         energy: whether the energy ledger is recorded.
         power: whether powers are recorded.
         laws: whether the forces of each law and the friction limits are recorded.
@@ -69,6 +70,7 @@ class RunOptions:
     max_steps: int
     a: bool
     forces: bool
+    contact_points: bool
     energy: bool
     power: bool
     laws: bool
@@ -123,7 +125,7 @@ def run_options(
     """
     check_method(method, rtol, atol, dt)
     if opening := compiled_scene(scene).opening_names:
-        check_opening(method, record, opening[0])
+        check_opening(method, record, compiled_scene(scene).contact(opening[0]))
     nv = scene.model.nv
     if nv == 0:
         raise InputError(f'simulate: "{scene.name}" has no joint that moves; there is nothing to simulate')
@@ -147,6 +149,7 @@ def run_options(
         )
     check_clock(scene, begin, length, lengths)
     groups = record_groups(record)
+    forces = bool(groups & {"forces", "contact_points"})
     return RunOptions(
         method=method,
         duration=length,
@@ -157,12 +160,13 @@ def run_options(
         output_dt=lengths.get("output_dt", 0.0),
         max_steps=step_limit(max_steps),
         a="a" in groups or "reactions" in groups,  # wrenches of fixed joints need accelerations
-        forces="forces" in groups,
+        forces=forces,
+        contact_points="contact_points" in groups,
         energy="energy" in groups,
         power="power" in groups,
-        laws="laws" in groups or "forces" in groups,
+        laws="laws" in groups or forces,
         reactions="reactions" in groups,
-        tau="tau" in groups or "forces" in groups,
+        tau="tau" in groups or forces,
         several=choice("simulate: several", several, SEVERAL_CHOICES),
         dense="dense" in groups,
         max_wall=wall_limit(max_wall),

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from pin_nonideal.compilation.contact_groups import contact_names
 from pin_nonideal.compilation.error_context import open_loop_error, singular_position
 from pin_nonideal.core_loader import core
 from pin_nonideal.errors import (
@@ -21,6 +22,7 @@ from pin_nonideal.errors import (
     UserFunctionError,
 )
 from pin_nonideal.scene.scene import Scene, compiled_scene
+from pin_nonideal.states.errors import largest_by_contact
 from pin_nonideal.states.rows import (
     MIN_SINGULAR_VALUE,
     gap_rows,
@@ -120,7 +122,8 @@ def _fields(scene: Scene, outcome: core.Outcome, options: RunOptions, notes: lis
         at = np.searchsorted(t, times) if times else np.zeros(0, dtype=int)
         fields.setdefault("user_events", []).append(UserEventRecord(name, np.array(times), q[at], v[at]))
     if options.dense:
-        fields["dense"] = dense_output(outcome, options, scene.model.nv, len(scene.element_names))
+        elements = compiled_scene(scene).elements.count
+        fields["dense"] = dense_output(outcome, options, scene.model.nv, elements)
     trajectory_fields = with_defaults({**fields, "grid": grid, "notes": notes})
     if not options.separate:
         return trajectory_fields
@@ -136,7 +139,7 @@ def _open_loop_failure(scene: Scene, trajectory: Trajectory) -> LoopClosureError
     runner = compiled_scene(scene).program.runner()
     residual = residuals_at(runner, trajectory.q[k], trajectory.v[k], t)
     left = np.where(gap_rows(compiled_scene(scene).program), np.maximum(-residual, 0.0), np.abs(residual))
-    gaps = {key: float(left[rows].max()) for key, rows in scene.constraint_slices.items()}
+    gaps = largest_by_contact(left, compiled_scene(scene).slices, compiled_scene(scene).contact_of)
     stopped = open_loop_error(max(gaps, key=lambda key: gaps[key]), gaps, t, f"; {TRAJECTORY_HINT}")
     stopped.trajectory = _stopped_trajectory(trajectory.first(k), stopped)
     return stopped
@@ -158,7 +161,7 @@ def _singular(scene: Scene, trajectory: Trajectory, stopped: BaseException) -> R
     weights = np.zeros(len(rows))
     weights[rows] = np.abs(shares[:, rank - 1])
     names = [n for n, part in row_slices(compiled.program).items() if weights[part].max() > DEPENDENT_SHARE]
-    return singular_position(names, float(trajectory.t[-1]))
+    return singular_position(contact_names(names, compiled.contact_of), float(trajectory.t[-1]))
 
 
 def _independence(

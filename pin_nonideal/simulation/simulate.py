@@ -74,9 +74,10 @@ def simulate(
         max_steps: maximum number of steps. None sets no limit, except that a stiff scene stops as soon as an
             explicit method would need 100,000 more steps.
         max_wall: maximum wall time [s]; no limit when None.
-        record: any of "a", "tau", "forces" (which include "laws" and "tau"), "laws", "reactions" (which
-            include "a"), "energy", "power", "dense" (interpolants of the steps, for `run.at`), or names of
-            fields that they fill.
+        record: any of "a", "tau", "forces" (which include "laws" and "tau"), "contact_points" (points of
+            contacts with gap and force, which include "forces"), "laws", "reactions" (which include "a"),
+            "energy", "power", "dense" (interpolants of the steps, for `run.at`), or names of fields that they
+            fill.
         events: functions (t, q, v) -> number whose zeros are events, as in SciPy's solve_ivp. A function may
             have the attributes `terminal` (True, or the number of events that ends the run) and `direction`
             (positive for rising zeros only, negative for falling ones). A step ends at each event, with the

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from contextlib import suppress
 from copy import copy
+from types import MappingProxyType
 
 import numpy as np
 import pinocchio as pin
@@ -52,6 +53,7 @@ MAX_PENETRATION = 1e-2
 # Maximum number of degrees of freedom for a search, which takes minutes above it. Newton's method is then
 # tried from any residual.
 MANY_FREEDOMS = 300
+NO_PAIRS: Mapping[str, str] = MappingProxyType({})
 
 
 class Projection:
@@ -64,6 +66,7 @@ class Projection:
         immovable_contacts: names of contacts that no joint moves.
         is_start: whether a run may start at q0. If not, user functions are not called at q0, and the first
             start defines the length.
+        contact_of: contact of the user that errors name in place of a contact point.
 
     Attributes:
         unit: unit displacement of each coordinate, (nv,): a radian, or the length of the mechanism.
@@ -77,7 +80,9 @@ class Projection:
         q0: Array,
         immovable_contacts: Collection[str] = (),
         is_start: bool = True,
+        contact_of: Mapping[str, str] = NO_PAIRS,
     ) -> None:
+        self._contact_of = contact_of
         self.model, self.program = model, program
         self._slides = slides(model)
         self._chain = chain(model)
@@ -140,7 +145,8 @@ class Projection:
         self.measure_at(q)
         runner = self.program.runner()
         phi = residuals_at(runner, q, v, t)
-        refuse_deep_starts(phi, self.program, MAX_PENETRATION * min(1.0, self.length), t)
+        allowed = MAX_PENETRATION * min(1.0, self.length)
+        refuse_deep_starts(phi, self.program, allowed, t, self._contact_of)
         on, v_on, before, after, rate = runner.project(q, v, t, self._reached())
         iterations, nearest, is_closed = 0, True, after <= self._closed
         if not (is_closed and self._is_nearby(q, on) and self._stays_outside(runner, q, on, t)):
@@ -157,7 +163,7 @@ class Projection:
         if not np.isfinite(v_on).all():
             raise NonFiniteError("v: the velocity on the constraints overflows; give a slower one")
         if not rate <= RATE_TOLERANCE * min(1.0, self.length) * (1.0 + _largest(v_on)):
-            raise velocity_error(rows_at(runner, on, v_on, t)[3], self.program, t)
+            raise velocity_error(rows_at(runner, on, v_on, t)[3], self.program, t, self._contact_of)
         mass = mass_function(self.model, runner)
         if held.v is not None and changes(v, v_on, held.v):
             with suppress(*(() if held.firm_v else (InputError,))):
@@ -231,9 +237,9 @@ class Projection:
         inside = not self._is_outside(q, phi) and widest_loop(phi, self.program)[1] <= self._closed
         far = (np.abs(pin.difference(self.model, q, projected)) > FAR_MOVE * self.unit).any()
         if inside and (not is_closed or (far and not nearest)):
-            raise penetration_error(phi, self.program, t)
+            raise penetration_error(phi, self.program, t, self._contact_of)
         if not is_closed:
-            raise open_loops(now, self.program, t)
+            raise open_loops(now, self.program, t, self._contact_of)
 
     def _polished(
         self, runner: core.Runner, q: Array, v: Array, t: float

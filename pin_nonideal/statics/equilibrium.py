@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pin_nonideal.errors import EquilibriumError, InputError, LoopClosureError
 from pin_nonideal.html_tables import numbers, table
-from pin_nonideal.scene.scene import Scene, require_scene
+from pin_nonideal.scene.scene import Scene, compiled_scene, require_scene
 from pin_nonideal.states.parsing import named_velocity
 from pin_nonideal.types import Array, Model, State
 from pin_nonideal.validation import choice, count, number
@@ -298,4 +298,5 @@ class _Search:
         grows = ~neutral & ((rates.real < 0.0) | (np.abs(rates.imag) > 1e-3 * np.abs(rates)))
         verdict = False if grows.any() else None if neutral.any() else True
         left = float(np.abs(now.left).max(initial=0.0))
-        return Equilibrium(q, now.lam, left, now.free, stiffness, rates, verdict, start)
+        lam = compiled_scene(self.rest.scene).multipliers.groups.sum(now.lam)
+        return Equilibrium(q, lam, left, now.free, stiffness, rates, verdict, start)

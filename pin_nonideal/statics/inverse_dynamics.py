@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pin_nonideal.core_loader import core
 from pin_nonideal.errors import FrictionConvergenceError, InputError, short_repr
-from pin_nonideal.scene.scene import Scene, require_scene
+from pin_nonideal.scene.scene import Scene, compiled_scene, require_scene
 from pin_nonideal.states.parsing import (
     find_joint,
     named_configuration,
@@ -186,7 +186,9 @@ def _check_follows(
     missed = np.where(open_rows, 0.0, np.abs(A @ a - b))
     if (missed > allowed).any():
         worst = int(np.argmax(missed / allowed))
-        name = next(n for n, s in scene.constraint_slices.items() if s.start <= worst < s.stop)
+        compiled = compiled_scene(scene)
+        point = next(n for n, s in compiled.slices.items() if s.start <= worst < s.stop)
+        name = compiled.contact(point)
         raise InputError(
             f'inverse_dynamics: a must follow the constraints, A a = b; "{name}" misses it by '
             f"{missed[worst]:.2g} (m/s^2 or rad/s^2); take one that scene.acceleration gives, or solve for "
@@ -261,7 +263,8 @@ class _Torques:
             )
         lam = self.rest.runner.solve(self.q, self.slipping, self.rest.t, tau, self.modes).lam
         left = float(np.abs(self.free @ (G @ u - needed)).max(initial=0.0))
-        return InverseDynamics(tau, np.asarray(lam), left)
+        rows = compiled_scene(self.rest.scene).multipliers.groups
+        return InverseDynamics(tau, rows.sum(np.asarray(lam)), left)
 
 
 def _bounded_least_squares(

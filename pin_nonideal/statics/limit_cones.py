@@ -74,7 +74,8 @@ class LimitCones:
         self.count = m + int(ends[-1]) + len(drive)
         self.lengths = np.concatenate([reach, lengths, np.linalg.norm(drive, axis=1)])
         self.lengths[self.lengths == 0.0] = 1.0
-        self.contacts = [first for first, _, contact in compiled_scene(scene).rows.values() if contact]
+        slices = list(compiled_scene(scene).slices.values())
+        self.contacts = [rows.start for rows in slices[len(scene.constraints) :]]
         limits = known * np.array([self.lengths[part.start] for part in self.parts])
         scaled, acting = (
             np.vstack([rows, np.vstack([D, drive]) / self.lengths[m:, None]]),
@@ -99,9 +100,8 @@ class LimitCones:
         """Return known limits [N or N m], and (row, coefficient) of limits that depend on a contact force."""
         elements = len(self.sizes)
         following: list[tuple[int, float] | None] = [None] * elements
-        rows = scene.constraint_slices
-        descriptions = dict(zip(rows, (*scene.constraints, *scene.contacts), strict=True))
-        for e, name in enumerate(scene.element_names):
+        rows, descriptions = compiled_scene(scene).slices, compiled_scene(scene).described
+        for e, name in enumerate(compiled_scene(scene).program.element_names):
             for part in PARTS:
                 about = descriptions.get(name.removesuffix(f" {part}") if part else name)
                 if not hasattr(about, "torsional") or (part and not name.endswith(f" {part}")):

@@ -69,7 +69,7 @@ class AtRest:
         self.runner = self.program.runner()
         self.still = np.zeros(scene.model.nv)
         self._slides = slides(scene.model)
-        self._smooth = [core.Mode.unloaded] * len(scene.element_names)
+        self._smooth = [core.Mode.unloaded] * len(self.program.element_sizes)
         self.gaps = gap_rows(self.program)
         self.touching = TOUCHING_GAP * max(1.0, compiled_scene(scene).projection.length)
         self.begin(q)

@@ -8,6 +8,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
+from pin_nonideal.compilation.contact_groups import contact_names
 from pin_nonideal.html_tables import NAMES_MAX, numbers, table
 from pin_nonideal.scene.scene import Scene, compiled_scene, require_scene
 from pin_nonideal.states.parsing import named_velocity
@@ -31,7 +32,7 @@ class Rest:
             no friction is needed, 0 if friction just suffices, negative if larger limits are needed, and -inf
             if no friction suffices.
         friction: force of each friction element by name, along its slip directions, for the smallest factor
-            [N or N m]; empty if no friction suffices.
+            [N or N m], a sum over the points of a pair of shapes; empty if no friction suffices.
         lam: multipliers of all rows with this friction; contacts press, (m,).
         reason: reason why the scene does not rest, with the names of joints, friction elements or contacts
             that cannot hold; empty if it rests.
@@ -100,18 +101,26 @@ def rest(scene: Scene, q: State | None = None, tau: State | None = None, *, t: f
     holding = partial(holding_torques, scene, at, drives, time, at_rest.open)
     if factor > MAX_FACTOR:
         reason = _unheld(scene, at_rest, at, cones)
-        return Rest(False, -np.inf, {}, np.zeros(len(cones.A)), reason, holding)
+        rows = len(compiled_scene(scene).multipliers.groups.names)
+        return Rest(False, -np.inf, {}, np.zeros(rows), reason, holding)
     forces = cones.solve(factor)[1]
-    friction = {name: forces[s] for name, s in zip(scene.element_names, cones.parts, strict=True)}
+    compiled = compiled_scene(scene)
+    friction = {
+        name: np.sum([forces[part] for part in cones.parts[own]], axis=0)
+        for name, own in compiled.elements.slices().items()
+    }
     margin = 1.0 - factor
     rests = margin >= -10.0 * FOUND
     reason = "" if rests else _elements_at_limit(scene, cones, factor)
-    return Rest(rests, margin, friction, forces[: len(cones.A)], reason, holding)
+    lam = compiled.multipliers.groups.sum(forces[: len(cones.A)])
+    return Rest(rests, margin, friction, lam, reason, holding)
 
 
 def _elements_at_limit(scene: Scene, cones: LimitCones, factor: float) -> str:
     """Return the elements at their limits where friction needs larger limits."""
-    names = [scene.element_names[e] for e in cones.at_limits(factor)]
+    compiled = compiled_scene(scene)
+    elements = compiled.program.element_names
+    names = contact_names((elements[e] for e in cones.at_limits(factor)), compiled.contact_of)
     where = f"; at their limits: {_quote(names)}" if names else ""
     return f"dry friction needs {factor:.4g} times its limits{where}"
 
@@ -128,15 +137,18 @@ def _unheld(scene: Scene, at_rest: AtRest, q: Array, cones: LimitCones) -> str:
             "is left on it, and no constraint, contact or friction acts along this motion"
         )
     pulls, missing_friction = cones.missing()
-    rows = {first: name for name, (first, _, contact) in compiled_scene(scene).rows.items() if contact}
+    compiled = compiled_scene(scene)
+    points = {rows.start: name for name, rows in compiled.slices.items()}
     parts = []
     if pulls:
         largest = max(pulls.values())
         parts.append(
-            f"contacts would have to pull, with up to {largest:.4g} N: {_quote([rows[k] for k in pulls])}"
+            f"contacts would have to pull, with up to {largest:.4g} N: "
+            + _quote(contact_names((points[k] for k in pulls), compiled.contact_of))
         )
     if missing_friction:
-        names = _quote([scene.element_names[e] for e in missing_friction])
+        elements = compiled.program.element_names
+        names = _quote(contact_names((elements[e] for e in missing_friction), compiled.contact_of))
         largest = max(missing_friction.values())
         parts.append(f"friction without a load would have to hold up to {largest:.4g} (N or N m): {names}")
     return "; ".join(parts) or "no forces balance the scene"

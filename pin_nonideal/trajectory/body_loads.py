@@ -18,6 +18,7 @@ from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.states.kinematics import BodyMotions
 from pin_nonideal.types import Array
 
+from .contact_points import contact_bodies
 from .fields import RunFields, reactions_of
 
 # Wrench on a body in world axes about the origin of the world, from the index of a sample and its motions.
@@ -53,6 +54,9 @@ def loads_on_bodies(run: RunFields) -> Iterator[Load]:
     for name, c in compiled_scene(scene).described.items():
         if name in reactions_of(run) and (frames := _frames(c, name, resolver)):
             yield from _pair(run, name, c, *frames)
+    for name in compiled_scene(scene).points:
+        if name in reactions_of(run):
+            yield from _pair_of_shapes(run, name)
     for f in scene.forces:
         if isinstance(f, Wrench):
             yield _wrench_loads(run, f, resolver.frame(f.frame, "reaction"))
@@ -104,6 +108,18 @@ def _pair(run: RunFields, name: str, c: Any, first: Frame, second: Frame) -> Ite
             return sign * about_world(reactions_of(run)[name][k, 6:], motions.point(first))
 
         yield Load(f'"{name}"', frame[0], place, at, name if run.rows[name][2] else None)
+
+
+def _pair_of_shapes(run: RunFields, name: str) -> Iterator[Load]:
+    """Yield the wrench of a pair of shapes with several points on both of its bodies."""
+    bodies = contact_bodies(run.scene, name)
+    for joint, sign in ((bodies.joint, 1.0), (bodies.other, -1.0)):
+
+        def at(k: int, motions: BodyMotions, sign: float = sign) -> pin.Force:
+            origin = motions.placement(bodies.joint).translation
+            return sign * about_world(reactions_of(run)[name][k, 6:], origin)
+
+        yield Load(f'"{name}"', joint, str(run.scene.model.names[joint]), at, name)
 
 
 def _wrench_loads(run: RunFields, f: Wrench, frame: Frame) -> Load:

@@ -14,7 +14,6 @@ from pin_nonideal.states.kinematics import frame_motion
 from pin_nonideal.types import Array
 from pin_nonideal.validation import choice, text
 
-from .contact_points import is_point_of
 from .fields import RunFields, reactions_of
 from .frame_reaction import carrier_of, frame_reaction
 from .missing_array import NOT_RECORDED, REASONS, missing_array
@@ -58,10 +57,7 @@ def force_of(run: RunFields, name: str) -> Array:
     """Return the force of one constraint or contact; see `Trajectory.force`."""
     name = text("force: name", name)
     if name not in run.rows:
-        hint = nearest(name, run.rows)
-        if any(is_point_of(name, key) for key in run.rows):
-            hint = f'; run.contact("{name}").force is the sum of its points'
-        raise UnknownNameError(f'no constraint or contact "{name}" in this run{hint}')
+        raise UnknownNameError(f'no constraint or contact "{name}" in this run{nearest(name, run.rows)}')
     first, end, contact = run.rows[name]
     if contact:
         force: Array = reaction_of(run, name, "world")[:, :3]
@@ -99,7 +95,9 @@ def _slip_velocity(run: RunFields, elements: list[int]) -> Array | None:
     """Return the slip velocities of some friction elements, (nt,) or (nt, n), or None without any."""
     if run.scene is None or not elements:
         return None
-    program = compiled_scene(run.scene).program
+    compiled = compiled_scene(run.scene)
+    program, points = compiled.program, compiled.elements.index
+    elements = [e for e in range(len(points)) if points[e] in elements]
     runner, ends = program.runner(), np.cumsum(program.element_sizes)
     chosen = [row for e in elements for row in range(ends[e] - program.element_sizes[e], ends[e])]
     states = zip(run.q, run.v, run.t, strict=True)

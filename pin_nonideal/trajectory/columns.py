@@ -52,7 +52,7 @@ def acting_columns(run: RunFields) -> dict[str, Array]:
     """Return the columns of a run that may change, (nt,) each.
 
     Forces of laws in joints on which the laws do not act are left out, and the columns of contacts that are
-    open at all samples: two boxes have 160 contacts.
+    open at all samples.
 
     Args:
         run: trajectory of the run.

@@ -18,7 +18,8 @@ from .dense_output import DenseOutput
 from .groups import RECORD_OF, Group, GroupField
 from .lazy_fields import LazyFields
 from .missing_array import REASONS, ArrayField
-from .records import Event, Stats, UserEventRecord
+from .point_samples import PointSamples
+from .records import ContactPoints, Event, Stats, UserEventRecord
 
 _MISSING: Any = None  # the attribute returns a MissingArray instead
 
@@ -47,6 +48,9 @@ class RunFields(LazyFields):
     law_forces: dict[str, Array] | None = None
     reactions: dict[str, Array] | None = None
     contact_forces: dict[str, Array] | None = None
+    contact_torques: dict[str, Array] | None = None
+    contact_points: dict[str, ContactPoints] | None = None
+    points: PointSamples | None = None
     grid: NDArray[np.bool_] | None = None
     dense: DenseOutput | None = None
     user_events: list[UserEventRecord] = field(default_factory=list)
@@ -104,7 +108,7 @@ def with_defaults(fields: Table) -> Table:
     return {**_DEFAULTS, **missing, **fields}
 
 
-def reactions_of(run: RunFields) -> Group:
+def reactions_of(run: RunFields) -> Group[Array]:
     """Return the wrenches of a run by name, in a table whose errors name the missing record.
 
     Args:

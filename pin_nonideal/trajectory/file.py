@@ -25,6 +25,7 @@ from .dense_output import DenseOutput
 from .fields import RunFields
 from .missing_array import REASONS
 from .npz import npz_bytes
+from .point_samples import PointSamples
 from .records import LEDGER, Event, Stats, UserEventRecord
 
 FORMAT = 1
@@ -37,7 +38,8 @@ READ_ERRORS += (EOFError, RuntimeError, tokenize.TokenError, zipfile.BadZipFile,
 REQUIRED_FIELDS = ("t", "q", "v", "violation", "violation_rate")
 OPTIONAL_FIELDS = (*REASONS, "z", "modes", "closed")
 # Fields by name, with one row or number for each sample; a file has a table for each, or None.
-GROUPS = ("energy", "power", "law_forces", "reactions", "contact_forces")
+GROUPS = ("energy", "power", "law_forces", "reactions", "contact_forces", "contact_torques")
+TABLES = ("law_forces/", "reactions/", "contact_forces/", "contact_torques/", "points/")
 DENSE_FIELDS = ("times", "states", "modes", "directions", "sought", "torque", "moved")
 LISTS = ("element_names", "element_laws", "law_names", "law_dofs")
 
@@ -87,6 +89,9 @@ def _arrays(run: RunFields) -> Table:
     tables = {group: vars(run)[group] for group in GROUPS}
     for group, table in tables.items():
         arrays |= {f"{group}/{i}": x for i, x in enumerate((table or {}).values())}
+    if run.points is not None:
+        for key, x in run.points.arrays().items():
+            arrays[f"points/{key}"] = x.astype(np.int8) if x.dtype == bool else x
     header = {
         "format": FORMAT,
         "name": run.name,
@@ -98,6 +103,8 @@ def _arrays(run: RunFields) -> Table:
     }
     header |= {key: getattr(run, key) for key in (*LISTS, "joints", "rows")}
     header |= {group: None if table is None else list(table) for group, table in tables.items()}
+    if run.points is not None:
+        header["points"] = [run.points.names, run.points.contacts]
     arrays |= {f"loose/{key}": x for key, x in _extra_arrays(run).items()}
     header["user_events"] = [record.name for record in run.user_events]
     if run.dense is not None:
@@ -148,6 +155,9 @@ def read_from(stream: Any, source: Path) -> tuple[Table, Table | None]:
                 if group == "energy":
                     _check_ledger(header[group], source)
                 fields[group] = {name: arrays[f"{group}/{i}"] for i, name in enumerate(header[group])}
+        if header.get("points") is not None:
+            fields["points"] = points = _points(arrays, *header["points"])
+            fields["contact_points"] = points.by_contact()
         fields |= {key: list(header.get(key, ())) for key in LISTS}
         events = [_event(*each) for each in header["events"]]
         if fields["closed"] is not None:
@@ -175,6 +185,15 @@ def read_from(stream: Any, source: Path) -> tuple[Table, Table | None]:
             f'cannot read a trajectory from "{source}": {reason_of(error)}; '
             "it must be an .npz file written by Trajectory.save"
         ) from error
+
+
+def _points(arrays: Table, names: list[str], contacts: list[str]) -> PointSamples:
+    """Return the samples of contact points in a file; invalid arrays raise one of `READ_ERRORS`."""
+    own = {key.removeprefix("points/"): x for key, x in arrays.items() if key.startswith("points/")}
+    own["closed"] = own["closed"].astype(bool)
+    if any(x.shape[1] not in (0, len(names)) for x in own.values()) or len(names) != len(contacts):
+        raise ValueError("contact points do not fit together")
+    return PointSamples([str(n) for n in names], [str(n) for n in contacts], **own)
 
 
 def reason_of(error: Exception) -> str:
@@ -331,10 +350,11 @@ def _check_arrays(arrays: Table, source: Path) -> None:
             raise LoadingError(
                 f'"{source}" is no trajectory: {key} must be finite; it holds {x[~np.isfinite(x)][0]}'
             )
-        is_table = key.startswith(("law_forces/", "reactions/", "contact_forces/"))
+        is_table = key.startswith(TABLES)
         columns = 2 if is_table or key in ("q", "v", *OPTIONAL_FIELDS) else 1
+        columns = 3 if key in ("points/forces", "points/places") else columns
         if x.ndim != columns:
-            shape = "a table" if columns == 2 else "one column"
+            shape = {1: "one column", 2: "a table", 3: "a table of vectors"}[columns]
             raise LoadingError(f'"{source}" is no trajectory: {key} must be {shape}; got shape {x.shape}')
         if x.shape[:1] != rows:
             raise LoadingError(

@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from pin_nonideal.errors import InputError
-from pin_nonideal.scene.scene import Scene
+from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.states.kinematics import BodyMotions, frame_index
 from pin_nonideal.types import Array, Model
 
@@ -259,10 +259,9 @@ def _load_beyond(scene: Scene, load: Load, index: int, who: str) -> bool:
         is_beyond = False
     if is_beyond is None:
         place = "it has no frame name" if load.frame is None else f'it is attached to "{load.frame}"'
-        other = "" if load.contact is None else ", or leave out the name of a GeometryContact"
         raise InputError(
             f"{who}: the scene must tell on which side of the frame {load.who} acts; {place}, which belongs "
-            f"to no link of this body; attach it to the frame of a link{other}"
+            "to no link of this body; attach it to the frame of a link"
         )
     return is_beyond
 
@@ -270,12 +269,12 @@ def _load_beyond(scene: Scene, load: Load, index: int, who: str) -> bool:
 def _shape_beyond(scene: Scene, joint: int, contact: str, index: int) -> bool | None:
     """Check if a contact that names only the moving joint, as those of collision shapes, lies beyond a frame.
 
-    The name of such a contact contains the names of its shapes, and each shape belongs to a link. A contact
-    with another name lies on the link of the joint itself, unless shapes on that body lie beyond the frame.
+    Each shape of a `GeometryContact` belongs to a link. Another contact lies on the link of the joint itself,
+    unless shapes on that body lie beyond the frame.
     """
     shapes = scene.collision_model
     own = [] if shapes is None else [g for g in shapes.geometryObjects if g.parentJoint == joint]
-    named = [g for g in own if g.name in contact]
+    named = [g for g in own if g.name in compiled_scene(scene).shapes.get(contact, ())]
     sides = {_is_beyond(scene.model, int(g.parentFrame), index) for g in named or own}
     if named:
         return sides.pop() if len(sides) == 1 else None

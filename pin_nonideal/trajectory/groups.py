@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TypeVar
 
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
-from pin_nonideal.types import Array, Table
+from pin_nonideal.types import Table
 
 from .missing_array import RunField
 
@@ -16,11 +17,14 @@ RECORD_OF = {
     "law_forces": "laws",
     "reactions": "reactions",
     "contact_forces": "forces",
+    "contact_torques": "forces",
+    "contact_points": "contact_points",
 }
+Value = TypeVar("Value")
 
 
-class Group(dict[str, Array]):
-    """Arrays by name; empty, and false in a condition, if they were not recorded.
+class Group(dict[str, Value]):
+    """Arrays or records by name; empty, and false in a condition, if they were not recorded.
 
     Args:
         field: field of the Trajectory.
@@ -31,11 +35,11 @@ class Group(dict[str, Array]):
         recorded: whether the run recorded them.
     """
 
-    def __init__(self, field: str, arrays: Mapping[str, Array] | None) -> None:
+    def __init__(self, field: str, arrays: Mapping[str, Value] | None) -> None:
         super().__init__(arrays or {})
         self.field, self.recorded = field, arrays is not None
 
-    def __missing__(self, name: object) -> Array:
+    def __missing__(self, name: object) -> Value:
         if not self.recorded:
             raise InputError(
                 f'run.{self.field} was not recorded; pass record="{RECORD_OF[self.field]}" to simulate'
@@ -46,16 +50,16 @@ class Group(dict[str, Array]):
 class GroupField(RunField):
     """Attribute of a Trajectory that returns its `Group`."""
 
-    def value(self, fields: Table) -> Group:
+    def value(self, fields: Table) -> Group[object]:
         """Return the group, and store it if its arrays were recorded."""
         arrays = fields[self._field]
         if isinstance(arrays, Group):
             return arrays
-        group = Group(self._field, arrays)
+        group: Group[object] = Group(self._field, arrays)
         if group.recorded:
             fields[self._field] = group
         return group
 
-    def __set__(self, run: object, arrays: Mapping[str, Array] | None) -> None:
+    def __set__(self, run: object, arrays: Mapping[str, object] | None) -> None:
         empty = isinstance(arrays, Group) and not arrays.recorded
         vars(run)[self._field] = None if empty else arrays

@@ -6,12 +6,18 @@ import itertools
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
+from pin_nonideal.compilation.contact_groups import Groups
 from pin_nonideal.compilation.error_context import joint_of
 from pin_nonideal.core_loader import core
 from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.types import Array, Table
 
+from .pair_events import ContactStates, contact_events
+from .point_samples import recorded_points
 from .records import LEDGER, Event, Stats
+from .resultants import contact_forces, reactions
 
 
 def outcome_stats(outcome: core.Outcome, wall: float) -> Stats:
@@ -44,9 +50,11 @@ def outcome_fields(scene: Scene, outcome: core.Outcome, options: Any) -> Table:
         outcome: result of the core.
         options: options of the run, a RunOptions.
     """
-    t, nq, nv, program = outcome.t, scene.q0.size, scene.v0.size, compiled_scene(scene).program
-    nt = len(t)
-    fields: Table = {}
+    t, nq, nv, compiled = outcome.t, scene.q0.size, scene.v0.size, compiled_scene(scene)
+    nt, program = len(t), compiled.program
+    every = getattr(options, "contact_points", False)  # dense output of earlier versions has no such option
+    points = recorded_points(scene, outcome, every=every, forces=options.forces, reactions=options.reactions)
+    fields: Table = {"points": points}
     if options.a:
         fields["a"] = outcome.a.reshape(nt, nv)
     if options.tau:
@@ -54,77 +62,99 @@ def outcome_fields(scene: Scene, outcome: core.Outcome, options: Any) -> Table:
     if options.forces:
         fields["F_ideal"] = outcome.F_ideal.reshape(nt, nv)
         fields["F_nonideal"] = outcome.F_nonideal.reshape(nt, nv)
-        fields["lam"] = outcome.lam.reshape(nt, program.rows)
-        fields["lam_ideal"] = outcome.lam_ideal.reshape(nt, program.rows)
-        fields["contact_forces"] = _contact_forces(scene, outcome)
+        rows = compiled.multipliers.groups
+        fields["lam"] = rows.sum(outcome.lam.reshape(nt, program.rows))
+        fields["lam_ideal"] = rows.sum(outcome.lam_ideal.reshape(nt, program.rows))
+        fields |= contact_forces(scene, outcome, points)
     if options.laws:
         fields |= _of_laws(scene, outcome)
+    if every:
+        fields["contact_points"] = {} if points is None else points.by_contact()
     if options.reactions:
-        fields["reactions"] = _reactions(scene, outcome)
-    if options.power or options.energy:
-        columns = _columns(program)
+        fields["reactions"] = reactions(scene, outcome, points)
+    works = compiled.works
     if options.power:
-        power = outcome.power.reshape(nt, len(columns))
-        fields["power"] = dict(zip(columns, power.T, strict=True))
+        power = works.sum(outcome.power.reshape(nt, works.count))
+        fields["power"] = dict(zip(_columns(works, scene), power.T, strict=True))
     if options.energy:
-        jumps = ["impacts"] if compiled_scene(scene).opening_names else []
-        fields["energy"] = _ledger([*columns, *jumps], outcome.energy)
+        jumps = ["impacts"] if compiled.opening_names else []
+        fields["energy"] = _ledger(works, [*_columns(works, scene), *jumps], outcome.energy)
     if scene.contact_names:
-        fields["closed"] = outcome.closed.reshape(nt, len(scene.contact_names)).astype(bool)
+        closed = outcome.closed.reshape(nt, compiled.contacts.count).astype(bool)
+        fields["closed"] = compiled.contacts.any(closed)
     if program.states:
         fields["z"] = outcome.z.reshape(nt, program.states)
-    elements = scene.element_names
-    if elements:
-        fields["modes"] = outcome.modes.reshape(nt, len(elements))
+    elements = compiled.elements
+    if elements.names:
+        fields["modes"] = elements.modes(outcome.modes.reshape(nt, elements.count))
+
+    def states() -> ContactStates:
+        modes = fields.get("modes", np.zeros((nt, 0), dtype=np.int8))
+        return ContactStates(t, fields["closed"], scene.contact_names, modes, scene.element_names)
+
+    events = [_event(scene, event, options.event_names) for event in outcome.events]
+    fields |= {
+        "t": t,
+        "q": outcome.q.reshape(nt, nq),
+        "v": outcome.v.reshape(nt, nv),
+        "violation": outcome.violation,
+        "violation_rate": outcome.violation_rate,
+    }
+    if compiled.points:
+        fields = {key: _copied(value) for key, value in fields.items()}
     return dict(
-        t=t,
-        q=outcome.q.reshape(nt, nq),
-        v=outcome.v.reshape(nt, nv),
-        violation=outcome.violation,
-        violation_rate=outcome.violation_rate,
-        events=[_event(scene, event, options.event_names) for event in outcome.events],
+        events=contact_events(events, compiled.contact, states),
         scene=scene,
-        element_names=list(elements),
-        element_laws=list(program.element_laws),
-        law_names=list(program.law_names),
-        joints=compiled_scene(scene).joints,
-        rows=compiled_scene(scene).rows,
+        element_names=list(elements.names),
+        element_laws=compiled.laws.index[np.array(program.element_laws, dtype=int)[elements.starts]].tolist(),
+        law_names=list(compiled.laws.names),
+        joints=compiled.joints,
+        rows=compiled.rows,
         name=scene.name,
         **fields,
     )
 
 
+def _copied(value: object) -> object:
+    """Return arrays that do not keep the recording of the core alive, which has a column for each point."""
+    if isinstance(value, dict):
+        return {name: _copied(x) for name, x in value.items()}
+    return np.array(value) if isinstance(value, np.ndarray) else value
+
+
 def _of_laws(scene: Scene, outcome: core.Outcome) -> Table:
     """Return the forces of the laws on the degrees of freedom of each law, and the limits of the elements."""
-    program, nt = compiled_scene(scene).program, len(outcome.t)
-    flat, last = (numbers.astype(int).tolist() for numbers in program.law_supports())
+    compiled, nt = compiled_scene(scene), len(outcome.t)
+    flat, last = (numbers.astype(int).tolist() for numbers in compiled.program.law_supports())
     ends = [0, *last]
     supports = [flat[start:end] for start, end in itertools.pairwise(ends)]
     forces = outcome.law_forces.reshape(nt, ends[-1])
-    parts = [forces[:, start:end] for start, end in itertools.pairwise(ends)]
-    elements = len(scene.element_names)
-    return {
-        "law_forces": dict(zip(program.law_names, parts, strict=False)),
-        "law_dofs": supports,
-        "limits": outcome.limits.reshape(nt, elements),
-    }
+    limits = outcome.limits.reshape(nt, compiled.elements.count)
+    dofs, laws = [], {}
+    for name, own in compiled.laws.slices().items():
+        support, laws[name] = _sum_of_laws(supports[own], forces[:, ends[own.start] : ends[own.stop]])
+        dofs.append(support)
+    return {"law_forces": laws, "law_dofs": dofs, "limits": compiled.elements.sum(limits)}
 
 
-def _contact_forces(scene: Scene, outcome: core.Outcome) -> dict[str, Array]:
-    """Return the force of each contact between two frames, in world axes."""
-    compiled = compiled_scene(scene)
-    names = [compiled.block_names[block] for block in compiled.program.framed_contacts]
-    forces = outcome.contact_forces.reshape(len(outcome.t), len(names), 3)
-    return {name: forces[:, k] for k, name in enumerate(names)}
+def _sum_of_laws(supports: Sequence[list[int]], forces: Array) -> tuple[list[int], Array]:
+    """Return the degrees of freedom on which some laws act, and the sum of their forces on them, (nt, n).
 
-
-def _reactions(scene: Scene, outcome: core.Outcome) -> dict[str, Array]:
-    """Return the wrenches of joints, then of anchors and contacts, in their own axes and in world axes."""
-    compiled = compiled_scene(scene)
-    joints = [str(name) for name in scene.model.names][1:]
-    names = [*joints, *(compiled.block_names[block] for block in compiled.program.reaction_blocks)]
-    wrenches = outcome.reactions.reshape(len(outcome.t), len(names), 12)
-    return {name: wrenches[:, k] for k, name in enumerate(names)}
+    Args:
+        supports: degrees of freedom of each law.
+        forces: forces of the laws side by side, (nt, number of degrees of freedom of all laws).
+    """
+    if len(supports) == 1:
+        return supports[0], forces
+    if all(support == supports[0] for support in supports):
+        by_law = forces.reshape(len(forces), len(supports), len(supports[0]))
+        return supports[0], np.einsum("tkn->tn", by_law)
+    together, first = sorted(set().union(*supports)), 0
+    total = np.zeros((len(forces), len(together)))
+    for support in supports:
+        total[:, [together.index(dof) for dof in support]] += forces[:, first : first + len(support)]
+        first += len(support)
+    return together, total
 
 
 def _event(scene: Scene, event: core.Event, functions: Sequence[str]) -> Event:
@@ -136,7 +166,8 @@ def _event(scene: Scene, event: core.Event, functions: Sequence[str]) -> Event:
         return Event(event.time, event.kind.name, str(joint))
     if not event.of_contact and event.kind is not core.EventKind.jump:
         # Without friction, a cluster of events consists of contact events.
-        names = scene.element_names or compiled_scene(scene).opening_names
+        compiled = compiled_scene(scene)
+        names = compiled.program.element_names or compiled.opening_names
         return Event(event.time, event.kind.name, names[event.element])
     name = compiled_scene(scene).block_names[event.element]
     if event.kind not in (core.EventKind.impact, core.EventKind.jump):
@@ -145,21 +176,24 @@ def _event(scene: Scene, event: core.Event, functions: Sequence[str]) -> Event:
     return Event(event.time, event.kind.name, name, event.impulse, change, event.v_minus, event.v_plus)
 
 
-def _ledger(columns: Sequence[str], energy: Array) -> dict[str, Array]:
+def _ledger(works: Groups, columns: Sequence[str], energy: Array) -> dict[str, Array]:
     """Return the stored energies, the work since the start, and their sums, from the core's columns."""
-    stored, works = ("kinetic", "potential"), (*columns, "projection")
+    stored, names = ("kinetic", "potential"), (*columns, "projection")
     split = len(stored)
-    numbers = energy.reshape(-1, split + len(works))
+    more = len(names) - len(works.names)
+    numbers, last = energy.reshape(-1, split + works.count + more), split + works.count
+    if not works.single:
+        numbers = np.hstack([numbers[:, :split], works.sum(numbers[:, split:last]), numbers[:, last:]])
     ledger = dict(zip(stored, numbers.T[:split], strict=True))
     ledger["total"] = ledger["kinetic"] + ledger["potential"]
-    ledger |= dict(zip(works, numbers.T[split:], strict=True))
+    ledger |= dict(zip(names, numbers.T[split:], strict=True))
     ledger["balance"] = ledger["total"] - ledger["total"][:1] - numbers[:, split:].sum(axis=1)
     return ledger
 
 
-def _columns(program: core.Program) -> list[str]:
+def _columns(works: Groups, scene: Scene) -> list[str]:
     """Return the names of the power columns; laws are renamed if another ledger column has their name."""
-    names = program.power_names
-    first_law = len(names) - len(program.law_names)
+    names = works.names
+    first_law = len(names) - len(scene.law_names)
     used_names = {*LEDGER, *names[:first_law], "projection"}
     return names[:first_law] + [f"law {name}" if name in used_names else name for name in names[first_law:]]

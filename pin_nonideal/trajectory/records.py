@@ -31,8 +31,9 @@ class Event:
             Prescribed motions and lengths: "jump" if the prescribed rate is discontinuous.
             Time stepping: "relaxed" of a contact if steps of "moreau" violate its laws from this time on.
         element: name of the law, contact, joint or constraint.
-        impulse: impulse of an impact [N s], (3,), along the contact's normal, then along its slip directions;
-            for a jump (impulse, 0, 0) of the motion's row [N s or N m s].
+        impulse: impulse of an impact [N s], (3,), along the contact's normal, then along its slip directions,
+            a sum over the points of a pair of shapes; for a jump (impulse, 0, 0) of the motion's row [N s or
+            N m s].
         energy_change: change of the kinetic energy by an impact at this contact [J], negative for a loss; for
             a jump, the work of the motion's impulse.
         v_minus: velocity before an impact or jump, (nv,).
@@ -175,11 +176,33 @@ class JointRecord:
 
 
 @dataclass(frozen=True, eq=False)
-class ContactRecord:
-    """Resultant of one contact over a run, or of all contact points of two shapes.
+class ContactPoints:
+    """Points of one contact over a run.
 
     Attributes:
-        name: name of the contact or of the `GeometryContact`.
+        name: name of the contact.
+        points: names of the k points; those of a pair of shapes are numbered.
+        closed: whether each point is closed, (nt, k).
+        gaps: gap of each point [m], (nt, k).
+        places: position of each point in the world [m], (nt, k, 3).
+        forces: normal force and friction at each point, in world axes, on the body on which the force of the
+            contact acts [N], (nt, k, 3).
+    """
+
+    name: str
+    points: list[str]
+    closed: NDArray[np.bool_]
+    gaps: Array
+    places: Array
+    forces: Array
+
+
+@dataclass(frozen=True, eq=False)
+class ContactRecord:
+    """Resultant of one contact over a run, of all of its contact points.
+
+    Attributes:
+        name: name of the contact.
         points: names of its contact points.
         bodies: names of the joints of the two bodies; "universe" is the world. The force acts on the first:
             the body of the contact's first frame, or for several points the later joint of the model.

@@ -22,7 +22,7 @@ from pin_nonideal.validation import count as whole_number
 
 from .by_name import force_of, frame_record, joint_record, law_record, reaction_of
 from .columns import columns, units
-from .contact_points import contact_record
+from .contact_record import contact_record
 from .fields import RunFields
 from .records import ContactRecord, FrameRecord, JointRecord, LawRecord, Sample
 from .summary import summary
@@ -49,7 +49,8 @@ class Trajectory(RunFields):
         F_ideal: ideal part of the force of constraint, (nt, nv), Eq. (39); record "forces".
         F_nonideal: nonideal part of the force of constraint, including the forces of sticking elements, (nt,
             nv), Eq. (39); record "forces".
-        lam: multipliers of all rows in M a = F + C + A^T lam, (nt, m); record "forces".
+        lam: multipliers of all rows in M a = F + C + A^T lam, (nt, m); record "forces". A pair of shapes has
+            one column, the sum of the normal forces at its points.
         lam_ideal: multipliers of the ideal part, (nt, m); record "forces".
         energy: energy ledger by column [J]: "kinetic", "potential", "total", then the work since the start by
             "actuation", "forces", "constraints", each law, and "projection". "balance" is the difference of
@@ -57,7 +58,7 @@ class Trajectory(RunFields):
         power: power by column [W]: "actuation", "forces", "constraints", each law.  Record "power".
         z: states of laws, (nt, nz), or None if no law has states.
         modes: mode of each friction element, +1 or -1 for slip, 0 for stick, 2 for an open contact, (nt,
-            ne), or None without friction elements.
+            ne), or None without friction elements. A pair of shapes slips if one of its points slips.
         closed: whether each contact is closed, in the order of the scene's `contact_names`, (nt, n),
             or None without unilateral contacts.
         limits: limit of each friction element in its mode [N or N m], (nt, ne); record "laws" or "forces".
@@ -66,7 +67,13 @@ class Trajectory(RunFields):
         reactions: wrench by name of joint, anchor and contact [N; N m], (nt, 12): [force; moment] in its own
             axes, then in world axes; record "reactions". See `reaction`.
         contact_forces: force of each contact by name, on the body of the contact's frame, normal and
-            friction, in world axes [N], (nt, 3); record "forces".
+            friction, in world axes [N], (nt, 3); record "forces". The force of a pair of shapes with several
+            points is the resultant on the later joint of the model; `contact` returns both bodies.
+        contact_torques: moment of these forces about the center of pressure by name of the contact, in world
+            axes [N m], (nt, 3); record "forces". It does not include torsional and rolling resistance.
+        contact_points: points of each contact by name, with gap and force, see `ContactPoints`; record
+            "contact_points".
+        points: points of pairs of shapes that touch, for replays and `contact`.
         grid: whether each sample lies on the grid of `output_dt`, which includes both ends, (nt,); all True
             if every step is a sample.
         dense: interpolants of the steps, see `at`; record "dense".
@@ -160,8 +167,8 @@ class Trajectory(RunFields):
         Returns:
             For a constraint, the multipliers of its rows in M a = F + C + A^T lam, (nt, rows); those of an
             anchor are the force on the body of frame1 in the axes of frame2 [N; N m]; record "forces". For a
-            contact, the force on the body of its frame in world axes, with friction [N], (nt, 3); record
-            "reactions".
+            contact, the force on the body of its frame in world axes, with friction [N], (nt, 3), as in
+            `contact_forces`; record "reactions".
 
         Raises:
             InputError: the force was not recorded.
@@ -170,20 +177,19 @@ class Trajectory(RunFields):
         return force_of(self, name)
 
     def contact(self, name: str) -> ContactRecord:
-        """Return the resultant force, the center of pressure and the gap of one contact or pair of shapes.
+        """Return the resultant force, the center of pressure and the gap of one contact.
 
-        A pair of shapes is named as its `GeometryContact`, by default "SHAPE on OTHER", and comprises all
-        contact points of that name with a number. The run must have recorded "forces".
+        A pair of shapes is named as its `GeometryContact`, by default "SHAPE on OTHER". The run must have
+        recorded "forces".
 
         Args:
-            name: name of a contact of the scene, or of a pair of shapes.
+            name: name of a contact of the scene.
 
         Returns:
             Record of the contact.
 
         Raises:
-            InputError: the run did not record "forces" or has no scene, the contact has no contact point, or
-                contacts of this name with numbers are on several bodies.
+            InputError: the run did not record "forces" or has no scene, or the contact has no contact point.
             UnknownNameError: there is no such contact.
         """
         return contact_record(self, name)
@@ -207,7 +213,9 @@ class Trajectory(RunFields):
 
         The wrench of a joint acts on the body that the joint moves, about the joint's origin, and includes
         the drive and the friction of the joint. The wrench of an anchor or contact acts on the body of
-        frame1, about the origin of frame1, and includes the friction of its laws.
+        frame1, about the origin of frame1, and includes the friction of its laws. The wrench of a pair of
+        shapes with several points acts on the later joint of the model, about the origin of this joint; its
+        own axes are those of the other joint.
 
         The wrench through a fixed joint, or through a link, is exerted on the part beyond it, about its
         origin: the rate of momentum of that part minus its weight and minus all other forces on it.  It is
@@ -280,11 +288,15 @@ class Trajectory(RunFields):
             ) from None
 
         def cut(value: Any, key: str) -> Any:
-            if isinstance(value, dict) and key != "rows":
+            if isinstance(value, dict) and key not in ("rows", "contact_points"):
                 return {name: x[chosen] for name, x in value.items()}
             return value[chosen] if isinstance(value, np.ndarray) else value
 
-        return Trajectory(**{key: cut(value, key) for key, value in self.__dict__.items()})
+        fields = {key: cut(value, key) for key, value in self.__dict__.items()}
+        if self.points is not None:
+            points = self.points.samples(chosen)
+            fields |= {"points": points, "contact_points": points.by_contact()}
+        return Trajectory(**fields)
 
     def at(self, t: ArrayLike) -> Any:
         """Return the run at any times, from the interpolants of its steps, with all recorded fields.

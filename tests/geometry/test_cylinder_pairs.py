@@ -13,6 +13,7 @@ import pin_nonideal as pn
 from pin_nonideal.description.contacts.convex_hull import shrunk
 from pin_nonideal.geometry.cylinder import DEFAULT_ROUNDING, FACE_CIRCLE_RATIO, FACE_POINTS, SIDE_INSET
 
+from ..support.contact_points import point_loads, points_of
 from ..support.mechanisms import GRAVITY, body, empty
 from ..support.same_run import assert_same_run
 from .test_geometry_pairs import EXACT, HALF, RADIUS, SIZE, by_coal, cloud, convex, modelled, pair, placements
@@ -164,7 +165,7 @@ class Modelled:
 
 def modelled_as(scene, other, kind, rounding=None):
     """Return the modeled shapes of the contacts of a scene."""
-    edge = max((c.radius2 for c in scene.contacts if isinstance(c, pn.RimContact)), default=0.0)
+    edge = max((c.radius2 for c in points_of(scene) if isinstance(c, pn.RimContact)), default=0.0)
     return Modelled(other, kind, edge, DEFAULT_ROUNDING * RADIUS if rounding is None else rounding)
 
 
@@ -238,8 +239,8 @@ def test_what_rests(what):
     run = pn.simulate(free(thing, fixed, mu=0.5), 1.0, q=[0.04, 0.02, height, *turn], record="forces")
     assert np.abs(run.v).max() == 0.0
     assert run.lam[-1].sum() == pytest.approx(GRAVITY, abs=1e-9)
-    assert run.lam[-1].min() >= 0.0
-    assert (run.lam[-1] > 0.0).sum() >= 2
+    assert point_loads(run)[-1].min() >= 0.0
+    assert (point_loads(run)[-1] > 0.0).sum() >= 2
 
 
 @pytest.mark.parametrize("fixed", TABLES, ids=["box", "mesh"])
@@ -320,8 +321,8 @@ def test_a_can_falls_on_two_rails(mu, turn):
     edge = DEFAULT_ROUNDING * 0.2
     height = np.sqrt((0.1 + edge) ** 2 - (0.06 + edge) ** 2) - edge
     assert run.q[-1, [0, 2]] == pytest.approx([0.0, height], abs=1e-9)
-    assert run.lam[-1].min() >= 0.0
-    assert (run.lam[-1] > 0.0).sum() == 4
+    assert point_loads(run)[-1].min() >= 0.0
+    assert (point_loads(run)[-1] > 0.0).sum() == 4
     assert np.abs(run.energy["balance"]).max() < 1e-9
 
 
@@ -339,7 +340,7 @@ def test_a_capsule_falls_on_a_lying_can(length, turn):
     q = [0.0, 0.01, 0.151, *pin.Quaternion(pin.rpy.rpyToMatrix(0.0, 0.0, turn)).coeffs()]
     run = pn.simulate(scene, 0.3, q=q, record=("energy", "forces"))
     assert run.q[-1, :3] == pytest.approx([0.0, 0.01, 0.15], abs=1e-5)
-    assert (run.lam[-1] > 0.0).sum() == 2
+    assert (point_loads(run)[-1] > 0.0).sum() == 2
     assert np.abs(run.energy["balance"]).max() < 1e-9
 
 
@@ -351,7 +352,7 @@ def test_cones_of_any_size_are_made():
         length = radius * 10.0 ** rng.uniform(-2.0, 2.0)
         for rounding in (None, 0.01 * min(radius, length)):
             scene = free(coal.Capsule(0.1, 0.2), coal.Cone(radius, length), rounding=rounding)
-            assert min(c.above for c in scene.contacts if isinstance(c, pn.CylinderContact)) >= 0.0
+            assert min(c.above for c in points_of(scene) if isinstance(c, pn.CylinderContact)) >= 0.0
 
 
 TUBE = """<robot name="r">

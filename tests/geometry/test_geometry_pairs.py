@@ -13,6 +13,7 @@ import pin_nonideal as pn
 from pin_nonideal.description.contacts.convex_hull import shrunk
 from pin_nonideal.geometry.manifold import DEFAULT_ROUNDING
 
+from ..support.contact_points import points_of
 from ..support.mechanisms import body, empty, frame
 
 # Difference from Coal's gaps if both are exact [m].
@@ -128,7 +129,7 @@ def modelled(scene, q):
 def test_gaps_and_normals_beside_coal(one, other, count):
     """At random placements; only those that do not touch can be compared."""
     scene, places = pair(one, other)
-    edge = max((getattr(c, "radius2", 0.0) for c in scene.contacts), default=0.0)
+    edge = max((getattr(c, "radius2", 0.0) for c in points_of(scene)), default=0.0)
     (first, up1, r1), (second, up2, r2) = as_modelled(one, other, edge), as_modelled(other, one, edge)
     shift1, shift2 = (pin.SE3(np.eye(3), np.array([0.0, 0.0, up])) for up in (up1, up2))
     rng, compared, worst = np.random.default_rng(1), 0, np.zeros(2)

@@ -75,8 +75,8 @@ RUNS = {
     ),
     "record": (
         {"record": "energi"},
-        "simulate: record must be one of 'a', 'forces', 'energy', 'power', 'laws', 'reactions', "
-        "'tau', 'dense'; "
+        "simulate: record must be one of 'a', 'forces', 'contact_points', 'energy', 'power', 'laws', "
+        "'reactions', 'tau', 'dense'; "
         "got 'energi'; nearest: \"energy\"",
     ),
     "record list": ({"record": 3}, "simulate: record must be a list; got 3"),

@@ -438,6 +438,7 @@ def test_the_public_names_are_all_drawn():
         "FrameRecord",
         "HoldingTorque",
         "InverseDynamics",
+        "ContactPoints",
         "ContactRecord",
         "JointRecord",
     }

@@ -59,7 +59,13 @@ def run_of(model: pin.Model, t: Any, q: Callable[[float], Any], **fields: Any) -
         constraint_slices=fields.pop("constraint_slices", dict.fromkeys(names, slice(0, 0))),
     )
     scene._compiled = SimpleNamespace(
-        program=_program(scene, names), described=dict(zip(names, held, strict=True))
+        program=_program(scene, names),
+        described=dict(zip(names, held, strict=True)),
+        slices=scene.constraint_slices,
+        spec=SimpleNamespace(contacts=scene.contacts),
+        points={},
+        contact_of={},
+        contact=str,
     )
     values: dict[str, Any] = {
         "t": t,

@@ -36,7 +36,7 @@ def test_columns_that_are_left_out_are_constant(pile):
     for name, values in acting.items():
         np.testing.assert_array_equal(values, every[name])
     rest = [name for name in every if name not in acting]
-    assert len(rest) > 1000
+    assert len(rest) > 50
     assert all((every[name] == every[name][0]).all() for name in rest)
     assert sum(".C." in name and values.any() for name, values in every.items()) > 10
 
@@ -61,7 +61,8 @@ def test_contacts_that_close_keep_their_columns(pile):
     names = [column_name(name) for name in pile.scene.contact_names]
     kept = {name for name in names if f"{name}.lam.0" in acting or f"{name}.lam" in acting}
     assert kept == {name for name, meets in zip(names, closed, strict=True) if meets}
-    assert 0 < len(kept) < len(names) / 4
+    assert kept == {"left_on_ground", "right_on_ground", "left_on_top", "right_on_top"}
+    assert len(names) == 6
 
 
 def test_gaps_are_the_residuals_of_rows(pile):
@@ -72,7 +73,9 @@ def test_gaps_are_the_residuals_of_rows(pile):
         at = int(np.searchsorted(pile.t, t[k]))
         residuals = rows_at(runner, pile.q[at], pile.v[at], float(t[k]))[2]
         for name, values in gaps.items():
-            assert values[k] == residuals[pile.scene.constraint_slices[name].stop - 1]
+            points = compiled_scene(pile.scene).points[name]
+            assert len(points) in (8, 160)
+            assert values[k] == min(residuals[compiled_scene(pile.scene).slices[one].start] for one in points)
 
 
 def test_gaps_of_many_contacts_have_fewer_samples(pile, monkeypatch):

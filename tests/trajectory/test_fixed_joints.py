@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -89,13 +91,18 @@ def forces(model):
     }
 
 
-def height_of(model, name):
-    """Height of a frame at the start."""
+def place_of(model, name):
+    """Placement of a frame at the start."""
     data, q = model.createData(), np.zeros(model.nq)
     for key, value in START.items():
         q[model.idx_qs[model.getJointId(key)]] = value
     pin.framesForwardKinematics(model, data, q)
-    return float(data.oMf[model.getFrameId(name)].translation[2])
+    return data.oMf[model.getFrameId(name)].copy()
+
+
+def height_of(model, name):
+    """Height of a frame at the start."""
+    return float(place_of(model, name).translation[2])
 
 
 def groove(model):
@@ -443,9 +450,32 @@ def test_shapes_know_their_links():
             return pn.simulate(made, 0.01, record="reactions").reaction("flange", "world")[0]
 
         by_frame = wrench(pn.PointContact(name, radius=radius))
-        by_shape = wrench(pn.GeometryContact("ball", "ground"))
-        np.testing.assert_allclose(by_shape, by_frame, rtol=0.0, atol=1e-9 * np.abs(by_frame).max())
+        for own_name in (None, "touch"):
+            by_shape = wrench(pn.GeometryContact("ball", "ground", name=own_name))
+            np.testing.assert_allclose(by_shape, by_frame, rtol=0.0, atol=1e-9 * np.abs(by_frame).max())
         assert np.abs(by_frame - wrench()).max() > 1.0
-        if name == "tip":
-            with refuses("or leave out the name of a GeometryContact", InputError):
-                wrench(pn.GeometryContact("ball", "ground", name="touch"))
+
+
+def test_the_wrench_of_a_pair_of_shapes_is_that_of_its_points():
+    """A box that touches with corners, beside a contact at each of its corners."""
+    import coal
+
+    model = robot()
+    index = model.getFrameId("tip", pin.FrameType.BODY)
+    at, sizes = model.frames[index], np.array([0.05, 0.04, 0.06])
+    corners = [tuple(0.5 * sizes * signs) for signs in itertools.product((-1.0, 1.0), repeat=3)]
+    height = min(place_of(model, "tip").act(np.array(corner))[2] for corner in corners)
+    shapes = pin.GeometryModel()
+    shapes.addGeometryObject(
+        pin.GeometryObject("block", at.parentJoint, index, at.placement, coal.Box(*sizes))
+    )
+
+    def wrench(*contacts):
+        made = pn.Scene(model, contacts=contacts, collision_model=shapes, q0=START)
+        run = pn.simulate(made, 0.01, record="reactions")
+        return run.reaction("flange", "world")[0]
+
+    by_points = wrench(*(pn.PointContact("tip", offset=c, height=height, mu=0.5) for c in corners))
+    by_shape = wrench(pn.GeometryContact("block", pn.ground(height=height), mu=0.5))
+    np.testing.assert_allclose(by_shape, by_points, rtol=0.0, atol=1e-9 * np.abs(by_points).max())
+    assert np.abs(by_points - wrench()).max() > 1.0

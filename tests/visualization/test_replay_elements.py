@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -17,6 +18,7 @@ from pin_nonideal.visualization.page.force_arrows import arrows_of
 from pin_nonideal.visualization.page.frames import sample
 from pin_nonideal.visualization.page.friction_glyphs import elements_of
 from pin_nonideal.visualization.page.markers import marks_of
+from pin_nonideal.visualization.page.mode_timeline import bands_of
 from pin_nonideal.visualization.page.payload import packed_runs
 from pin_nonideal.visualization.page.style import MODES
 
@@ -54,6 +56,40 @@ def test_the_force_of_a_contact_lies_on_its_cone_while_it_slides(sliding: Any) -
     np.testing.assert_allclose(element.share[slides], 1.0, atol=1e-6)
     np.testing.assert_allclose(element.share[rests], 0.0, atol=1e-6)
     np.testing.assert_allclose(element.normal, G, atol=1e-6)
+
+
+def test_a_pair_of_shapes_has_one_arrow_and_one_band() -> None:
+    """A box slides to rest: its force acts at the center of pressure, and each corner has its own cone."""
+    model, shapes, edge, mass, speed = pin.Model(), pin.GeometryModel(), 0.2, 4.0, 1.0
+    place = (0.0, 0.0, 0.5 * edge)
+    pn.free_body(model, "box", coal.Box(edge, edge, edge), mass=mass, collision_model=shapes, place=place)
+    scene = pn.Scene(model, contacts=pn.ground_contacts(model, shapes, mu=MU), collision_model=shapes)
+    v = [speed, 0.0, 0.0, 0.0, 0.0, 0.0]
+    run = pn.simulate(scene, 0.5, v=v, record=("forces", "energy"), output_dt=0.01)
+    rest = speed / (MU * G)
+    assert [(event.kind, event.element) for event in run.events] == [("stick", "box on ground")]
+    assert run.events[0].time == pytest.approx(rest, abs=1e-9)
+    ((name, band),) = bands_of(run)
+    assert (name, [mode for _, _, mode in band]) == ("box on ground", [1, 0])
+    motion, elements, (arrow,) = parts(run)
+    slides = motion.times < rest - 0.02
+    along = np.tile([-MU, 0.0, 1.0], (slides.sum(), 1))
+    np.testing.assert_allclose(arrow.values[slides], mass * G * along, atol=1e-9)
+    assert arrow.name == "box on ground"
+    ahead = arrow.origin - motion.q[:, :3] - [0.0, 0.0, 0.5 * edge]
+    before = np.tile([0.5 * MU * edge, 0.0, -0.5 * edge], (slides.sum(), 1))
+    np.testing.assert_allclose(ahead[slides], before, atol=1e-9)
+    np.testing.assert_allclose(ahead[motion.times > rest + 0.02, :2], 0.0, atol=1e-7)
+    assert [element.contact for element in elements] == ["box on ground"] * 4
+    np.testing.assert_allclose(sum(element.normal for element in elements), mass * G, rtol=1e-9)
+    for element in elements:
+        np.testing.assert_allclose(element.share[slides], 1.0, atol=1e-6)
+    content = packed_runs([run], ["run"], None, "title", None, True)
+    header = json.loads(content[4 : 4 + int.from_bytes(content[:4], "little")])
+    assert [(mode["name"], mode["point"]) for mode in header["modes"][:1]] == [("box on ground", False)]
+    assert [mode["point"] for mode in header["modes"][1:]] == [True] * 4
+    assert {mark["contact"] for mark in header["marks"]} == {"box on ground"}
+    assert header["events"]["elements"] == ["box on ground"]
 
 
 def test_friction_in_a_joint_has_its_share_of_the_limit() -> None:

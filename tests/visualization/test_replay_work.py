@@ -15,6 +15,8 @@ import pytest
 
 import pin_nonideal as pn
 from pin_nonideal.core_loader import core
+from pin_nonideal.scene.scene import compiled_scene
+from pin_nonideal.trajectory import contact_points
 from pin_nonideal.visualization.page import (
     between_samples,
     camera,
@@ -102,7 +104,7 @@ def test_displacements_between_samples_are_computed_once(monkeypatch):
 
 
 def test_forces_of_contacts_that_stay_open_are_not_resampled(monkeypatch):
-    """Two boxes have 160 gaps, which the page shows if they close."""
+    """The page shows the gaps of two boxes if they close."""
     run, asked, read = boxes(beside=True, count=2), set(), resampling._ResampledFields.__getitem__
 
     def recorded(self, name):
@@ -113,7 +115,7 @@ def test_forces_of_contacts_that_stay_open_are_not_resampled(monkeypatch):
     monkeypatch.setattr(resampling._ResampledFields, "__getitem__", recorded)
     packed(run)
     between = {name for name in run.scene.contact_names if "ground" not in name}
-    assert len(between) == 160
+    assert between == {"box 0 on box 1"}
     assert asked == set(run.scene.contact_names) - between
 
 
@@ -140,24 +142,29 @@ def test_constraints_and_planes_of_contacts_are_collected_once():
 
 
 def test_no_function_is_called_for_each_contact_that_stays_open():
-    """Two boxes side by side have 160 contacts with each other, which all stay open."""
+    """Two boxes side by side have 160 contact points with each other, which all stay open."""
     alone, beside = calls(boxes(count=2)), calls(boxes(beside=True, count=2))
     assert {name: number for name, number in (beside - alone).items() if number >= 80} == {}
 
 
 def test_gaps_of_many_contacts_are_computed_at_few_samples_and_drawn_at_all(monkeypatch):
     """The few samples choose the curves of the plot."""
-    run, sizes, values = boxes(beside=True, count=2), [], core.gap_values
+    run, sizes, values = boxes(beside=True, count=5), [], core.gap_values
+    assert len(run.t) > mode_timeline.MIN_GAP_SAMPLES
 
     def counted(program, q, t, blocks):
         sizes.append((len(t), len(blocks)))
         return values(program, q, t, blocks)
 
-    monkeypatch.setattr(mode_timeline, "MAX_GAP_VALUES", 2000.0)
-    monkeypatch.setattr(mode_timeline, "core", SimpleNamespace(gap_values=counted))
+    monkeypatch.setattr(mode_timeline, "MAX_GAP_VALUES", 33_800.0)
+    monkeypatch.setattr(contact_points, "core", SimpleNamespace(gap_values=counted))
     (plot,) = signals.plots_of(run, ["gaps"])
     every, few = len(run.scene.contact_names), mode_timeline.MIN_GAP_SAMPLES
-    assert sizes == [(few, every), (len(run.t), signals.MAX_CURVES)]
+    points = compiled_scene(run.scene).points
+    drawn = sum(len(points[name]) for name in plot.curves)
+    assert every == 15
+    assert len(plot.curves) == signals.MAX_CURVES
+    assert sizes == [(few, 5 * 8 + 10 * 160), (len(run.t), drawn)]
     np.testing.assert_array_equal(plot.t, run.t)
     assert plot.note == f"{signals.MAX_CURVES} of {every}, those that move most"
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,11 +22,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ContactPoint:
-    """Contact between two frames at the frames of a replay.
+    """Contact point between two frames at the frames of a replay.
 
     Attributes:
-        name: unique name of the contact.
-        item: description of the contact.
+        name: unique name of the point.
+        contact: name of its contact.
+        item: description of the contact at the point.
         joint: index of the joint of the body on which the contact force acts, 0 for the world.
         other: index of the joint of the other body.
         place: contact point on that body in the world [m], (n, 3).
@@ -35,6 +36,7 @@ class ContactPoint:
     """
 
     name: str
+    contact: str
     item: Any
     joint: int
     other: int
@@ -49,7 +51,7 @@ class ContactPoint:
 
 
 def contact_points(run: Trajectory, motion: Motion) -> list[ContactPoint]:
-    """Return the contacts between two frames: all contacts with planes, and others that were closed.
+    """Return the contact points between two frames: all points on planes, and others that were closed.
 
     The state of a contact holds from a sample to the next. Impacts between two samples are found from their
     events.
@@ -60,12 +62,11 @@ def contact_points(run: Trajectory, motion: Motion) -> list[ContactPoint]:
     """
     compiled = compiled_scene(run.scene)
     names = [compiled.block_names[block] for block in compiled.program.framed_contacts]
-    struck = {str(event.element) for event in run.events}
-    left_out = open_contacts(run)
+    struck, points = {str(event.element) for event in run.events}, getattr(run, "points", None)
+    touched = set() if points is None else set(points.names)
+    touched |= set(names) - set(compiled.contact_of) - (open_contacts(run) - struck)
     chosen = [
-        k
-        for k, name in enumerate(names)
-        if hasattr(compiled.described[name], "plane") or name in struck or name not in left_out
+        k for k, name in enumerate(names) if hasattr(compiled.described[name], "plane") or name in touched
     ]
     chosen_names = [names[k] for k in chosen]
     places, normals = contact_lines(run.scene, motion.q, motion.times, chosen_names)
@@ -73,6 +74,7 @@ def contact_points(run: Trajectory, motion: Motion) -> list[ContactPoint]:
     return [
         ContactPoint(
             name,
+            compiled.contact(name),
             compiled.described[name],
             *contact_bodies(run.scene, name)[:2],
             places[:, column],
@@ -84,16 +86,20 @@ def contact_points(run: Trajectory, motion: Motion) -> list[ContactPoint]:
 
 
 def _closed_mask(run: Trajectory, names: list[str]) -> NDArray[np.bool_]:
-    """Check if contacts are closed at each sample, (nt, n)."""
-    closed = getattr(run, "closed", None)
+    """Check if contact points are closed at each sample, (nt, n)."""
+    closed, points = getattr(run, "closed", None), getattr(run, "points", None)
     if closed is None:
         return np.ones((len(run.t), len(names)), dtype=bool)
-    column = {name: k for k, name in enumerate(run.scene.contact_names)}
-    return np.asarray(closed)[:, [column[name] for name in names]]
+    column = {name: np.asarray(closed)[:, k] for k, name in enumerate(run.scene.contact_names)}
+    if points is not None:
+        column |= {name: points.closed[:, k] for k, name in enumerate(points.names)}
+    still_open = np.zeros(len(run.t), dtype=bool)
+    columns = [column.get(name, still_open) for name in names]
+    return np.asarray(np.array(columns, dtype=bool).reshape(len(names), len(run.t)).T)
 
 
 def contact_point_marks(touches: list[ContactPoint], motion: Motion, marks: list[Mark]) -> list[Mark]:
-    """Return marks of contacts without a mark, because their points move over their bodies.
+    """Return marks of contact points without a mark, because they move over their bodies.
 
     Args:
         touches: contacts of the run.
@@ -106,7 +112,6 @@ def contact_point_marks(touches: list[ContactPoint], motion: Motion, marks: list
             path = motion.local(touch.joint, touch.place)
             closed = None if touch.on_plane or touch.closed.all() else touch.closed
             start = path[int(np.argmax(touch.closed))]
-            points.append(
-                Mark(touch.name, "contact", touch.joint, start, touch.joint, start, path=path, closed=closed)
-            )
+            mark = Mark(touch.name, "contact", touch.joint, start, touch.joint, start, path=path)
+            points.append(replace(mark, closed=closed, contact=touch.contact))
     return points

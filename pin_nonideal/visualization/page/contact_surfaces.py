@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from pin_nonideal.description.contacts import JointLimit
+from pin_nonideal.description.contacts.pair_of_shapes import point_contacts
 from pin_nonideal.description.contacts.round import CapsuleContact, SphereContact
 from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.states.kinematics import frame_on_joint
@@ -56,7 +57,7 @@ class Plane:
 def planes_of(scene: Scene) -> list[Plane]:
     """Return the planes of all contacts and rolling bodies, without duplicates."""
     planes: list[Plane] = []
-    for item in [*scene.contacts, *scene.constraints]:
+    for item in [*point_contacts(compiled_scene(scene).spec.contacts), *scene.constraints]:
         name = getattr(item, "plane", "")
         if not hasattr(item, "normal") or (name is not None and not (name and scene.model.existFrame(name))):
             continue
@@ -111,7 +112,7 @@ def _round_bodies(scene: Scene) -> list[Visual]:
     if scene.visual_model is not None and len(scene.visual_model.geometryObjects):
         return []
     sides: dict[tuple[Any, ...], None] = {}  # of many contacts each, in their order
-    for item in scene.contacts:
+    for item in point_contacts(compiled_scene(scene).spec.contacts):
         if isinstance(item, SphereContact):
             sides[item.frame1, CENTER, item.radius1] = sides[item.frame2, CENTER, item.radius2] = None
         elif isinstance(item, CapsuleContact):

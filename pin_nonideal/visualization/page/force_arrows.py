@@ -4,12 +4,13 @@ The arrow at an anchor is the reaction on the body of frame1, from the rows of t
 `lam_ideal` it is split into its ideal and its nonideal part. Its moment is an arc. `F_nonideal` and the
 actuation torques `tau` are drawn at the joints. `F_ideal` is drawn at the joints if no constraint has a
 position; user constraints have none. The arrow of a contact is its total force, normal and friction, on the
-first body at the contact point. The force of a user-defined gap is drawn at the joints.
+first body at the contact point, or at the center of pressure of several points. The force of a user-defined
+gap is drawn at the joints.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,8 @@ from pin_nonideal.core_loader import core
 from pin_nonideal.description.contacts import UserContact
 from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.states.rows import rows_at
+from pin_nonideal.trajectory.contact_points import contact_bodies
+from pin_nonideal.trajectory.resultants import centers
 from pin_nonideal.types import Array
 from pin_nonideal.validation import axis_triad, unit_axis
 
@@ -84,11 +87,7 @@ def arrows_of(
         held: constraints of the scene, if they are known.
     """
     forces = getattr(run, "contact_forces", None) or {}
-    arrows = [
-        Arrow(touch.name, "total", "N", motion.of(forces[touch.name]), touch.joint, touch.place)
-        for touch in touches
-        if touch.name in forces
-    ]
+    arrows = list(_contact_arrows(run, motion, touches))
     if run.recorded("lam"):
         for name, item, shown in constraints_of(run.scene) if held is None else held:
             rows = run.scene.constraint_slices[name]
@@ -113,6 +112,28 @@ def arrows_of(
         if run.recorded(field):
             arrows += _at_joints(run.scene.model, motion, kind, motion.of(getattr(run, field)))
     return _above_rounding([*arrows, *more], run.scene.model, motion.size)
+
+
+def _contact_arrows(run: Trajectory, motion: Motion, touches: Sequence[ContactPoint]) -> Iterator[Arrow]:
+    """Yield the forces of contacts: at the contact point, or at the center of pressure of several points."""
+    forces, points = getattr(run, "contact_forces", None) or {}, getattr(run, "points", None)
+    pairs = compiled_scene(run.scene).points
+    by_contact: dict[str, list[ContactPoint]] = {}
+    for touch in touches:
+        if touch.contact in forces:
+            by_contact.setdefault(touch.contact, []).append(touch)
+    for contact, own in by_contact.items():
+        joint, place = own[0].joint, own[0].place
+        if contact in pairs and points is not None:
+            columns = {points.names[k]: k for k in points.of(contact)}
+            own = [touch for touch in own if touch.name in columns]
+            if not own:  # it never touches
+                continue
+            joint, places = contact_bodies(run.scene, contact).joint, np.stack([x.place for x in own], axis=1)
+            loads = motion.of(points.loads[:, [columns[touch.name] for touch in own]])
+            loads[~loads.any(axis=1)] = 1.0  # the middle of the points has no force
+            place = centers(loads, places)
+        yield Arrow(contact, "total", "N", motion.of(forces[contact]), joint, place)
 
 
 def weight_scales(model: pin.Model, size: float) -> dict[str, float]:
@@ -169,7 +190,7 @@ def _user_gap_arrows(run: Trajectory, motion: Motion, name: str, lam: Array) -> 
     """Return the arrows of the generalized force A^T lam of a user-defined gap, at the joints."""
     scene, runner = run.scene, compiled_scene(run.scene).program.runner()
     states = zip(motion.q, motion.of(run.v), motion.times, lam, strict=True)
-    rows = scene.constraint_slices[name]
+    rows = compiled_scene(scene).slices[name]
     force = np.array([rows_at(runner, q, v, float(t))[0][rows].T @ own for q, v, t, own in states])
     arrows = _at_joints(scene.model, motion, "total", force)
     return [replace(arrow, name=f"{name}, {arrow.name}") for arrow in arrows]

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pin_nonideal.states.kinematics import frame_on_joint
+from pin_nonideal.trajectory.contact_points import contact_bodies
 from pin_nonideal.types import Array
 from pin_nonideal.validation import unit_axis
 
 from .contact_points import ContactPoint
 from .frames import Motion
 from .markers import Mark
-from .mode_timeline import bands_of
+from .mode_timeline import bands_of, point_bands_of
 from .visuals import joint_axis
 from .xy_plots import friction_joints
 
@@ -30,7 +31,7 @@ class Element:
 
     Attributes:
         name: name of the element in the run.
-        band: index among the modes of the run.
+        band: index among the modes of the run, followed by those of the points of pairs of shapes.
         joint: index of the joint that carries the element's position, 0 for the world.
         point: position in that joint's frame [m], (3,), or at each frame, (n, 3), if it moves.
         axis: axis of the joint or normal of the contact, in the frame of `axis_joint`, (3,) or (n, 3).
@@ -39,6 +40,7 @@ class Element:
         share: friction over its limit at each frame, 0 to 1, (n,), or None if it was not recorded.
         normal: normal force of a contact at each frame [N], (n,), or None.
         stays: whether the element is also drawn while its contact is open.
+        contact: name of the contact of which the element is a point; empty for other elements.
     """
 
     name: str
@@ -51,6 +53,7 @@ class Element:
     share: Array | None = None
     normal: Array | None = None
     stays: bool = True
+    contact: str = ""
 
 
 def elements_of(
@@ -66,17 +69,22 @@ def elements_of(
     """
     joints, elements = friction_joints(run), []
     contacts = {touch.name: touch for touch in touches}
+    bands, pairs = bands_of(run), {touch.contact for touch in touches if touch.name != touch.contact}
     places = {mark.name: mark for mark in marks}
     laws = dict(zip(run.element_names, run.element_laws, strict=False))
     counts = Counter(run.element_laws)
-    for band, (name, _) in enumerate(bands_of(run)):
+    for band, (name, _) in enumerate(point_bands_of(run), len(bands)):
+        if name in contacts:
+            point = _contact(run, motion, name, band, contacts[name], True)
+            elements.append(replace(point, contact=contacts[name].contact))
+    for band, (name, _) in enumerate(bands):
         law = run.law_names[laws[name]] if name in laws else name
         whole = name not in laws or counts[laws[name]] == 1
         if law in joints:
             at, share = joints[law], _joint_share(run, law, joints[law], run.element_names.index(name))
             axis, part = joint_axis(run.scene.model, at)[0], None if share is None else motion.of(share)
             elements.append(Element(name, band, at, np.zeros(3), np.asarray(axis), at, share=part))
-        elif law in contacts:
+        elif law in contacts and law not in pairs:
             elements.append(_contact(run, motion, name, band, contacts[law], whole))
         elif (mark := places.get(_anchor(run, law))) is not None:
             along = _hinge_axis(run, mark.name)
@@ -114,15 +122,25 @@ def _part(size: Array, limit: Array) -> Array:
     return np.clip(np.divide(size, limit, out=np.zeros_like(size), where=limit > 0.0), 0.0, 1.0)
 
 
+def _force(run: Trajectory, touch: ContactPoint) -> Array | None:
+    """Return the force of a contact point on the body of the point, (nt, 3), or None without forces."""
+    forces, points = getattr(run, "contact_forces", None) or {}, getattr(run, "points", None)
+    if touch.name == touch.contact or not forces or points is None:
+        return forces.get(touch.name)
+    side = 1.0 if contact_bodies(run.scene, touch.contact).joint == touch.joint else -1.0
+    force: Array = points.forces[:, points.names.index(touch.name)]
+    return side * force
+
+
 def _contact(
     run: Trajectory, motion: Motion, name: str, band: int, touch: ContactPoint, whole: bool
 ) -> Element:
     """Return a contact with its cone, and with the friction over its limit if forces were recorded."""
     share = pressing = None
     mu = float(getattr(touch.item, "mu", 0.0)) if whole or name == touch.name else 0.0
-    forces = getattr(run, "contact_forces", None) or {}
-    if touch.name in forces:
-        force = motion.of(forces[touch.name])
+    force = _force(run, touch)
+    if force is not None:
+        force = motion.of(force)
         pressing = np.sum(force * touch.normal, axis=1)
         across = np.linalg.norm(force - pressing[:, None] * touch.normal, axis=1)
         if mu > 0.0:

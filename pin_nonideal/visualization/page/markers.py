@@ -39,6 +39,7 @@ class Mark:
             (n, 3); None for a fixed point.
         closed: whether a contact mark is drawn at each frame, (n,), if the point is undefined for an open
             contact; None to draw it always.
+        contact: name of the contact of a contact point, as events have it; empty for other marks.
     """
 
     name: str
@@ -50,6 +51,7 @@ class Mark:
     axes: Array = field(default_factory=lambda: np.zeros((0, 3)))
     path: Array | None = None
     closed: NDArray[np.bool_] | None = None
+    contact: str = ""
 
 
 @dataclass(frozen=True)
@@ -92,13 +94,12 @@ def marks_of(scene: Scene, held: Sequence[Constraint] | None = None) -> list[Mar
         for name, item, shown in (constraints_of(scene) if held is None else held)
         if shown in (core.DisplayKind.anchor, core.DisplayKind.rod)
     ]
-    described = compiled_scene(scene).described
-    for name in scene.constraint_slices:
-        item = described[name]
+    compiled = compiled_scene(scene)
+    for name, item in compiled.described.items():
         if isinstance(item, PointContact):
             side = side_of(scene.model, item.frame)
-            point = side.placement.act(np.array(item.offset))
-            marks.append(Mark(name, "contact", side.joint, point, side.joint, point))
+            point, contact = side.placement.act(np.array(item.offset)), compiled.contact_of.get(name, name)
+            marks.append(Mark(name, "contact", side.joint, point, side.joint, point, contact=contact))
     springs = [item for item in scene.forces if isinstance(item, SpringDamper)]
     return marks + [_tie(scene, item.name or f"spring {item.frame1}", "spring", item) for item in springs]
 

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from pin_nonideal.core_loader import core
+from pin_nonideal.compilation.contact_groups import Groups
 from pin_nonideal.scene.scene import compiled_scene
+from pin_nonideal.trajectory.contact_points import gaps_of_points
 from pin_nonideal.types import Array
 
 from .style import CLOSED, OPEN
@@ -25,6 +26,7 @@ MAX_GAP_VALUES = 1e6
 MIN_GAP_SAMPLES = 20
 
 Bands = list[tuple[float, float, int]]
+NamedBands = list[tuple[str, Bands]]
 
 
 def mode_bands(t: Array, modes: NDArray[np.int8]) -> list[Bands]:
@@ -42,15 +44,15 @@ def mode_bands(t: Array, modes: NDArray[np.int8]) -> list[Bands]:
     return bands
 
 
-def bands_of(run: Trajectory) -> list[tuple[str, Bands]]:
+def bands_of(run: Trajectory) -> NamedBands:
     """Return the mode bands by name, for friction elements and frictionless contacts that open or close.
 
-    Contacts that stay open during the whole run are omitted, because two boxes already have 160 of them.
+    Contacts that stay open during the whole run are omitted.
 
     Args:
         run: run of the replay.
     """
-    named_bands: list[tuple[str, Bands]] = []
+    named_bands: NamedBands = []
     if run.modes is not None:
         modes = np.asarray(run.modes)
         is_ever_closed = np.any(modes != OPEN, axis=0)
@@ -69,6 +71,21 @@ def bands_of(run: Trajectory) -> list[tuple[str, Bands]]:
     return named_bands
 
 
+def point_bands_of(run: Trajectory) -> NamedBands:
+    """Return the mode bands of the points of pairs of shapes that rub, by name.
+
+    Args:
+        run: run of the replay.
+    """
+    points, rubbing = getattr(run, "points", None), {run.law_names[law] for law in run.element_laws}
+    if points is None:
+        return []
+    pairs = compiled_scene(run.scene).contact_of
+    shown = [k for k, name in enumerate(points.names) if name in pairs and points.contacts[k] in rubbing]
+    bands = mode_bands(run.t, points.modes[:, shown])
+    return [(points.names[k], band) for k, band in zip(shown, bands, strict=True)]
+
+
 def has_open_contact(run: Trajectory) -> bool:
     """Check if a contact of the run was ever open.
 
@@ -80,7 +97,7 @@ def has_open_contact(run: Trajectory) -> bool:
 
 
 def gaps_of(run: Trajectory, names: Sequence[str] | None = None) -> tuple[Array, dict[str, Array]]:
-    """Return times [s], (k,), and the gaps of contacts at these times by name [m, rad], (k,).
+    """Return times [s], (k,), and the least gaps of contacts at these times by name [m, rad], (k,).
 
     Args:
         run: run of the replay.
@@ -88,9 +105,9 @@ def gaps_of(run: Trajectory, names: Sequence[str] | None = None) -> tuple[Array,
     """
     t, compiled = np.asarray(run.t, dtype=float), compiled_scene(run.scene)
     names = run.scene.contact_names if names is None else names
-    count = int(np.clip(MAX_GAP_VALUES / max(1, len(names)), MIN_GAP_SAMPLES, MAX_GAP_SAMPLES))
+    points = [point for name in names for point in compiled.points.get(name, [name])]
+    count = int(np.clip(MAX_GAP_VALUES / max(1, len(points)), MIN_GAP_SAMPLES, MAX_GAP_SAMPLES))
     chosen = np.unique(np.linspace(0, len(t) - 1, min(len(t), count)).astype(int))
-    numbers = {name: block for block, name in enumerate(compiled.block_names)}
-    q = np.ascontiguousarray(run.q[chosen], dtype=float)
-    gaps = core.gap_values(compiled.program, q, t[chosen], [numbers[name] for name in names])
-    return t[chosen], dict(zip(names, gaps.T, strict=True))
+    gaps = gaps_of_points(run.scene, run.q[chosen], t[chosen], points)
+    least = Groups(points, compiled.contact_of).least(gaps, axis=1)
+    return t[chosen], dict(zip(names, least.T, strict=True))

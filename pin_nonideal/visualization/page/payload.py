@@ -23,7 +23,7 @@ from .frames import Motion, sample
 from .friction_glyphs import elements_of
 from .joint_tracks import Tracks
 from .markers import constraints_of, marks_of
-from .mode_timeline import bands_of
+from .mode_timeline import NamedBands, bands_of, point_bands_of
 from .relations import names_relation, stored_relations
 from .resampling import resample
 from .run_facts import facts_of, subtitle_of
@@ -125,7 +125,7 @@ def packed_runs(
         "arrows": [stored_arrow(payload, motion, arrow) for arrow in arrows],
         "plots": _plots(payload, runs, [one for one, _ in known], names, chosen, rounding),
         "events": _events(payload, run),
-        "modes": _modes(payload, run),
+        "modes": _modes(payload, bands_of(run)) + _modes(payload, point_bands_of(run), point=True),
         "elements": [
             stored_element(payload, motion, element if forces else replace(element, normal=None))
             for element in elements_of(finer, motion, marks, touches)
@@ -274,10 +274,11 @@ def _impulse(event: Any) -> Array:
     return np.zeros(3) if impulse is None else np.asarray(impulse, dtype=float)
 
 
-def _modes(payload: Payload, run: Trajectory) -> list[Table]:
-    """Return the mode bands of the elements: start and mode of each interval."""
+def _modes(payload: Payload, bands: NamedBands, point: bool = False) -> list[Table]:
+    """Return mode bands: start and mode of each interval, and whether they belong to a point of a contact."""
     timelines = []
-    for name, pieces in bands_of(run):
+    for name, pieces in bands:
         starts, modes = [piece[0] for piece in pieces], [piece[2] for piece in pieces]
-        timelines.append({"name": name, "starts": payload.add(starts, "f8"), "modes": payload.add(modes)})
+        arrays = {"starts": payload.add(starts, "f8"), "modes": payload.add(modes)}
+        timelines.append({"name": name, "point": point, **arrays})
     return timelines

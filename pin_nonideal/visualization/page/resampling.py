@@ -31,7 +31,7 @@ SAMPLED_FIELDS = (
     "lam_ideal",
     "limits",
 )
-TABLE_FIELDS = ("energy", "power", "law_forces", "reactions", "contact_forces")
+TABLE_FIELDS = ("energy", "power", "law_forces", "reactions", "contact_forces", "contact_torques")
 
 
 def resample(run: Trajectory, motion: Motion) -> tuple[Trajectory, Motion]:
@@ -70,6 +70,10 @@ def resample(run: Trajectory, motion: Motion) -> tuple[Trajectory, Motion]:
         parts = getattr(run, key, None)
         if parts is not None:
             values[key] = _ResampledFields(key, parts, getattr(dense, key, None) or {}, at_frames)
+    points = getattr(run, "points", None)
+    if points is not None:
+        forces = (at_frames(x) for x in (points.loads, points.forces))
+        values["points"] = points.samples(motion.before).with_forces(*forces)
     for key in ("modes", "closed"):  # constant from a sample to the next
         if run.recorded(key):
             values[key] = np.asarray(getattr(run, key))[motion.before]
@@ -87,7 +91,7 @@ def resample(run: Trajectory, motion: Motion) -> tuple[Trajectory, Motion]:
     return samples, replace(motion, before=np.arange(count), part=np.zeros(count))
 
 
-class _ResampledFields(Group):
+class _ResampledFields(Group[Array]):
     """Values by name at the frames of a replay, each resampled when it is read first.
 
     Args:

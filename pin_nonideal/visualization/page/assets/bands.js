@@ -15,7 +15,7 @@ function shortened(c, text, room) {
 
 class Bands {
   constructor(run, span, canvas, tip, seek, hover) {
-    Object.assign(this, { bands: run.modes, looks: run.looks, end: run.times[run.times.length - 1], canvas, tip });
+    Object.assign(this, { bands: run.modes.filter((band) => !band.point), looks: run.looks, end: run.times[run.times.length - 1], canvas, tip });
     canvas.parentElement.hidden = !this.bands.length;
     canvas.style.height = `${this.bands.length * BAND}px`;
     canvas.parentElement.addEventListener("scroll", () => this.writeRange());

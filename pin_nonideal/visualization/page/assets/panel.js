@@ -2,6 +2,13 @@
 
 const VIEWS = { usual: null, front: [0, -1, 0.15], side: [1, 0, 0.15], top: [0, -0.02, 1] };
 
+/** Lists of the items of each contact, which may have several points; other items stand alone. */
+function byContact(items) {
+  const lists = new Map();
+  items.forEach((item, i) => { const key = item.contact || i; lists.set(key, [...(lists.get(key) || []), item]); });
+  return lists.values();
+}
+
 class Panel {
   constructor(player) {
     Object.assign(this, { player, stage: player.stage, box: element("panel"), rows: [], chosen: new Map(), sections: new Map(), opened: null });
@@ -46,9 +53,9 @@ class Panel {
       if (!i && !own.length) return;
       this.addRow("bodies", i ? joint.name : "world", depth[i], own, i ? [["follow", () => this.follow(i)], ["path", () => this.path(i)]] : []);
     });
-    for (const mark of this.stage.marks.items) this.addRow("constraints", `${mark.name} (${mark.kind})`, 0, [mark]);
+    for (const marks of byContact(this.stage.marks.items)) this.addRow("constraints", `${marks[0].contact || marks[0].name} (${marks[0].kind})`, 0, marks);
     for (const guide of this.stage.guides.items) this.addRow("constraints", `${guide.name} (${guide.kind})`, 0, [guide]);
-    for (const item of this.stage.elements.items) this.addRow("elements", item.name, 0, [item]);
+    for (const items of byContact(this.stage.elements.items)) this.addRow("elements", items[0].contact || items[0].name, 0, items);
     for (const arrow of this.stage.arrows.items) this.addRow("arrows", `${arrow.name}, ${arrow.kind} [${arrow.unit}]`, 0, [arrow]);
     run.signals.forEach((signal) => this.addSignal(signal));
     run.relations.forEach((relation) => this.addRelation(relation));

@@ -205,7 +205,7 @@ class Stage {
       const at = this.onScreen(place), distance = at ? Math.hypot(at[0] - x, at[1] - y) : Infinity;
       if (distance < closest) { closest = distance; best = text; }
     };
-    for (const mark of this.marks.items.filter((item) => !item.apart)) look(`${mark.kind} ${mark.name}`, mark.places[0]);
+    for (const mark of this.marks.items.filter((item) => !item.apart)) look(`${mark.kind} ${mark.contact || mark.name}`, mark.places[0]);
     this.kinematics.groups.slice(1).forEach((joint) => look(`joint ${joint.name}`, new this.THREE.Vector3().setFromMatrixPosition(joint.matrixWorld)));
     return best;
   }

@@ -10,6 +10,7 @@ import pytest
 import pin_nonideal as pn
 
 from ....geometry.test_cylinder_pairs import distance
+from ....support.contact_points import points_of
 from ....support.mechanisms import GRAVITY, body, empty
 from ....support.seeds import seeds
 
@@ -73,7 +74,7 @@ class Drop:
     def check(self):
         run = pn.simulate(self.scene, 0.8, q=self.q, v=self.v, method="moreau", dt=DT)
         assert np.isfinite(run.q).all()
-        rounding = max(getattr(c, "radius2", 0.0) for c in self.scene.contacts)
+        rounding = max(getattr(c, "radius2", 0.0) for c in points_of(self.scene))
         fastest = 0.0  # maximum so far: penetration lasts until separation
         for q, v in zip(run.q, run.v, strict=True):
             fastest = max(fastest, self.approach(v))
@@ -124,7 +125,7 @@ def test_a_heavy_box_falls_on_a_light_one(seed, ratio):
     run = pn.simulate(scene, 0.6, q=q, method="moreau", dt=DT)
     assert np.isfinite(run.q).all()
     runner, fastest = scene._compiled.program.runner(), 0.0
-    corners = [i for i, c in enumerate(scene.contacts) if isinstance(c, pn.PointContact)]
+    corners = [i for i, c in enumerate(points_of(scene)) if isinstance(c, pn.PointContact)]
     for x, v in zip(run.q, run.v, strict=True):  # box on the floor
         fastest = max(
             fastest, *(np.linalg.norm(u[:3]) + 0.35 * np.linalg.norm(u[3:]) for u in (v[:6], v[6:]))

@@ -1,0 +1,158 @@
+"""Contacts of the user and their points in the core: a pair of shapes is one contact with several points.
+
+The core has a row, a friction element and a law for each contact point. No other module relates the entries
+of the core to the contacts of the user.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pin_nonideal.core_loader import core
+from pin_nonideal.description.contacts.pair_of_shapes import PairOfShapes
+from pin_nonideal.types import Array
+
+# Modes of friction elements.
+SLIP_PLUS, SLIP_MINUS = int(core.Mode.slip_plus), int(core.Mode.slip_minus)
+STICK, OPEN = int(core.Mode.sticking), int(core.Mode.unloaded)
+
+
+class Groups:
+    """Entries of the core by the contacts of the user; the points of a contact follow each other.
+
+    Args:
+        names: name of each entry, such as a row, a friction element or a law.
+        contact_of: contact of each point of the pairs of shapes with several points.
+
+    Attributes:
+        names: name of each group: of the contact, or of its only entry.
+        starts: first entry of each group, (n,).
+        count: number of entries.
+        single: whether each group has one entry.
+    """
+
+    def __init__(self, names: Sequence[str], contact_of: Mapping[str, str]) -> None:
+        self.names: list[str] = []
+        self.count, starts, before = len(names), [], None
+        for k, name in enumerate(names):
+            contact = contact_of.get(name)
+            if contact is None or contact != before:
+                starts.append(k)
+                self.names.append(contact or name)
+            before = contact
+        self.starts = np.array(starts, dtype=np.intp)
+        self.single = len(starts) == self.count
+
+    @property
+    def index(self) -> NDArray[np.intp]:
+        """Group of each entry, (count,)."""
+        return np.repeat(np.arange(len(self.starts)), self.sizes)
+
+    @property
+    def sizes(self) -> NDArray[np.intp]:
+        """Number of entries of each group, (n,)."""
+        return np.diff(np.append(self.starts, self.count))
+
+    def slices(self) -> dict[str, slice]:
+        """Return the entries of each group by name."""
+        ends = (self.starts + self.sizes).tolist()
+        return {n: slice(a, b) for n, a, b in zip(self.names, self.starts.tolist(), ends, strict=True)}
+
+    def any(self, values: NDArray[np.bool_], axis: int = -1) -> NDArray[np.bool_]:
+        """Check if any entry of each group is true.
+
+        Args:
+            values: values by entry.
+            axis: axis of the entries.
+        """
+        return values if self.single else np.logical_or.reduceat(values, self.starts, axis)
+
+    def sum(self, values: Array, axis: int = -1) -> Array:
+        """Compute the sum over the entries of each group.
+
+        Args:
+            values: values by entry.
+            axis: axis of the entries.
+        """
+        return values if self.single else np.add.reduceat(values, self.starts, axis)
+
+    def least(self, values: Array, axis: int = -1) -> Array:
+        """Return the least value of each group.
+
+        Args:
+            values: values by entry.
+            axis: axis of the entries.
+        """
+        return values if self.single else np.minimum.reduceat(values, self.starts, axis)
+
+    def modes(self, modes: NDArray[np.int8]) -> NDArray[np.int8]:
+        """Return the mode of each group: slip if any entry slips, else stick if any sticks, else open.
+
+        Args:
+            modes: modes by entry, (..., count).
+        """
+        if self.single:
+            return modes
+        found = [self.any(modes == mode) for mode in (SLIP_PLUS, SLIP_MINUS, STICK)]
+        return np.select(found, [SLIP_PLUS, SLIP_MINUS, STICK], OPEN).astype(np.int8)
+
+
+class RowGroups(NamedTuple):
+    """Rows of the core by the rows of the user: a pair of shapes has one, and its multiplier is a sum.
+
+    Attributes:
+        groups: groups of the rows of the core.
+        slices: rows of the user of each constraint and contact, by name.
+    """
+
+    groups: Groups
+    slices: dict[str, slice]
+
+
+def grouped_rows(slices: Mapping[str, slice], contact_of: Mapping[str, str]) -> RowGroups:
+    """Return the rows of the user.
+
+    Args:
+        slices: rows of the core of each constraint and contact point, by name and in order.
+        contact_of: contact of each point.
+    """
+    groups = Groups([name for name, s in slices.items() for _ in range(s.stop - s.start)], contact_of)
+    owners, first, shown = Groups(list(slices), contact_of), 0, {}
+    for name in owners.names:
+        own = slices.get(name, slice(0, 1))
+        shown[name] = slice(first, first + own.stop - own.start)
+        first = shown[name].stop
+    return RowGroups(groups, shown)
+
+
+def points_by_pair(contacts: Iterable[object]) -> dict[str, list[str]]:
+    """Return the names of the points of each pair of shapes with several points.
+
+    Args:
+        contacts: descriptions, with pairs of shapes in place of their descriptions.
+    """
+    pairs = [c for c in contacts if isinstance(c, PairOfShapes) and len(c.points) > 1]
+    return {pair.name: [str(getattr(point, "name", "")) for point in pair.points] for pair in pairs}
+
+
+def contacts_of_points(pairs: Mapping[str, Sequence[str]]) -> dict[str, str]:
+    """Return the name of the pair of each point.
+
+    Args:
+        pairs: names of points by pair, see `points_by_pair`.
+    """
+    return {point: pair for pair, points in pairs.items() for point in points}
+
+
+def contact_names(names: Iterable[str], contact_of: Mapping[str, str]) -> list[str]:
+    """Return names with contacts in place of their points, each once.
+
+    Args:
+        names: names of points, contacts and other parts.
+        contact_of: contact of each point.
+    """
+    return list(dict.fromkeys(contact_of.get(name, name) for name in names))
