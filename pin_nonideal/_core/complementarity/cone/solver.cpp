@@ -15,7 +15,7 @@ ConeStatus ConeComplementarity::solve(const Eigen::Ref<const MatX>& W, const Eig
     auto x = even_.vector(n);
     if (warm) x = f.cwiseQuotient(problem_.scale()) / problem_.force_unit();
     else x.setZero();
-    bool found = search(x, warm);
+    bool found = search(x);
     if (!found && brief_) return ConeStatus::failed;
     const ConeStatus status = found ? ConeStatus::solved : find_certificate(problem_, certificate_);
     if (status == ConeStatus::failed) found = random_restarts(x);
@@ -92,13 +92,9 @@ bool ConeComplementarity::polish(Eigen::Ref<VecX> f, int max_steps) {
     return true;
 }
 
-bool ConeComplementarity::search(Eigen::Ref<VecX> f, bool warm) {
+bool ConeComplementarity::search(Eigen::Ref<VecX> f) {
     if (problem_.n == 0) return true;
     if (polish(f, parameters.first_steps)) return true;
-    if (warm) {
-        f.setZero();
-        if (polish(f, parameters.first_steps)) return true;
-    }
     interior_point_.follow(problem_, f, ConeInteriorPoint::Slip::follows);
     if (polish(f, parameters.more_steps)) return true;
     return !brief_ && proximal_point(f);

@@ -1,8 +1,8 @@
 // Solver of contacts with Coulomb friction, for accelerations, impacts and time stepping. It finds f of the problem of
 // cone/problem.hpp for any square W (of any rank, symmetric or not). Newton's method on the modes starts from a warm
-// start or from zero. If it fails, the fallbacks are Newton's method from the end of the central path, proximal points with
-// decreasing compliance, and random starts unless a certificate shows that a solution may not exist. Buffers grow to the
-// largest problem. A call allocates no memory after that.
+// start, or else from zero. If it fails, the fallbacks are Newton's method from the end of the central path, proximal points
+// with decreasing compliance, and random starts unless a certificate shows that a solution may not exist. Buffers grow to
+// the largest problem. A call allocates no memory after that.
 #pragma once
 
 #include "complementarity/cone/certificate.hpp"
@@ -67,7 +67,7 @@ public:
     int path_steps() const { return interior_point_.steps(); }
 
 private:
-    bool search(Eigen::Ref<VecX> f, bool warm);
+    bool search(Eigen::Ref<VecX> f);
     bool polish(Eigen::Ref<VecX> f, int max_steps);
     bool stands_still(const Eigen::Ref<const VecX>& f);
     bool proximal_point(Eigen::Ref<VecX> f);
