@@ -68,29 +68,11 @@ struct Search {
             return std::nullopt;
         }
         if (needs_opposed_friction && !slip_opposes_friction(p, w, v)) return std::nullopt;
-        if (joint_motion && joint_motion->slides() && all_stay()) return std::nullopt;
         Choice next = choice;
         int change = pulling_contact(p, w);
         if (change < 0) change = fastest_approaching(choice);
         if (change >= 0) next[change] = !next[change];
         return next;
-    }
-
-    // Check if no contact begins to move. If the joint solution slides, no forces within the cones hold all contacts.
-    // The loads of a redundant set alone do not show this.
-    bool all_stay() {
-        for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
-            if (!rest[i]) continue;
-            evaluate_gap(p, w, t, v, i);
-            const double rounding = acceleration_rounding(p, w, i);
-            if (std::abs(gap_acceleration(p, w, i)) > rounding) return false;
-            const int e = p.gaps[i].sliding;
-            if (e < 0) continue;
-            if (!at_rest(p, w, e, v)) return false;
-            evaluate_block(p, w, t, v, p.frictions[e].block);
-            if (slip_acceleration(p, w, p.frictions[e]).norm() > rounding) return false;
-        }
-        return true;
     }
 
     // Return the open contact with the fastest relative approach acceleration, or -1.
@@ -218,33 +200,17 @@ void select_active_contacts(const Program& p, Workspace& w, double t, const VecX
         if (failure) throw *failure;
         throw Failure(Failure::Kind::not_converged, t);
     };
-    const auto restart = [&] {
-        failure.reset();
-        set_closed(p, w, before.closed);
-        set_modes(p, w, before.mode);
-        w.state = before;
-    };
-    // Load shares of slipping contacts follow friction, unlike those of the cone problem. If friction of unloaded
-    // contacts spoils the shares, the loaded contacts alone determine the motion.
-    const auto seek_from_joint_motion = [&](OnsetMotion guess) {
-        guess.is_initial_guess = true;
-        if (seek(guess.closed, &guess, true)) return true;
-        restart();
-        if (guess.loaded == guess.closed) return false;
-        guess.is_initial_guess = false;
-        guess.closed = guess.loaded;
-        if (seek(guess.closed, &guess, true)) return true;
-        restart();
-        return false;
-    };
     const bool many = std::count(query.rest.begin(), query.rest.end(), char(1)) >= active_set_parameters.may_share;
     std::optional<OnsetMotion> joint_motion;
     if (many && query.at_limit.empty()) {
         joint_motion = solve_jointly();
         if (joint_motion && joint_motion->closed == query.rest && !joint_motion->slides())
             return close(joint_motion->closed, &*joint_motion);
-        if (joint_motion && joint_motion->shared && joint_motion->slides() && seek_from_joint_motion(*joint_motion)) return;
-        if (joint_motion && joint_motion->shared) return close(joint_motion->closed, &*joint_motion);
+        if (joint_motion && joint_motion->shared) {
+            // Load shares of slipping contacts follow friction, unlike those of the cone problem.
+            joint_motion->is_initial_guess = joint_motion->slides();
+            return close(joint_motion->closed, &*joint_motion);
+        }
     }
     const auto unsolved = attempt({Failure::Kind::not_converged, Failure::Kind::paradox}, [&] {
         close(query.rest, nullptr);

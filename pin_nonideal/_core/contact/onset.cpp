@@ -84,11 +84,11 @@ bool with_problem(const Program& p, Workspace& w, double t, const VecX& q, const
 std::optional<OnsetMotion> onset_motion(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
                                         const OnsetQuery& query) {
     const std::vector<char> open(p.gaps.size(), 0);
-    OnsetMotion out{open, open, std::vector<Mode>(p.frictions.size(), unloaded),
+    OnsetMotion out{open, std::vector<Mode>(p.frictions.size(), unloaded),
                     std::vector<Vec3>(p.frictions.size(), Vec3::Zero()), {}};
     out.friction = out.direction;
     const auto rest = [&](const std::vector<int>& others) {
-        out.closed = out.loaded = query.rest;
+        out.closed = query.rest;
         for (size_t i = 0; i < p.gaps.size(); ++i)
             if (query.rest[i] && p.gaps[i].sliding >= 0) out.modes[p.gaps[i].sliding] = sticking;
         for (int e : others) out.modes[e] = sticking;

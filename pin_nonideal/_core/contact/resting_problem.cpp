@@ -214,7 +214,6 @@ void RestingProblem::read(OnsetMotion& out) const {
         if (i < rows.gaps.size()) {
             const int gap = rows.gaps[i];
             out.closed[gap] = a[first[i]] <= parameters.rounding * acceleration_scale();
-            out.loaded[gap] = out.closed[gap] && f[first[i]] > parameters.rounding * f.cwiseAbs().maxCoeff();
             if (e < 0 || !out.closed[gap]) continue;
             if (slides[i]) {
                 const Vec3 u = slip_velocity(w.now, p.frictions[e]);

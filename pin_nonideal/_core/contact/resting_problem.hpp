@@ -13,7 +13,6 @@ namespace pn {
 
 struct OnsetMotion {
     std::vector<char> closed;     // by gap
-    std::vector<char> loaded;     // closed contacts that press, by gap
     std::vector<Mode> modes;      // by element
     std::vector<Vec3> direction;  // slip direction at onset, by element
     std::vector<Vec3> friction;   // friction of each element, along its directions

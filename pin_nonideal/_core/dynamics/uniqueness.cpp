@@ -47,30 +47,12 @@ void sort_by_distance(const ReactionEquation& equation, const VecX& start, std::
     std::sort(roots.begin(), roots.end(), [&](const VecX& y, const VecX& x) { return rank(y) < rank(x); });
 }
 
-// Remove the rounding of the arrays from a solution near a motion. Return false if no motion is near.
-bool refine(Unknowns& u, const ReactionEquation& equation, VecX& y) {
-    const ReleasedZeroLoads free(u.w);
-    ReactionNewton newton;
-    VecX g(u.n);
-    for (int pass = 0; pass < uniqueness_parameters.refinements; ++pass) {
-        u.image(y, g);
-        const VecX miss = g - y;
-        if (!(miss.cwiseAbs().maxCoeff() <= uniqueness_parameters.near_motion * y.cwiseAbs().maxCoeff())) return false;
-        newton.factorize(equation, y);
-        newton.factor.solve(miss, newton.step);
-        y += newton.step;
-    }
-    return true;
-}
-
 // Select the solutions that are motions: limits are nonnegative, and unilateral contacts have no tension and no more
 // than their minimum-norm share.
-std::vector<VecX> motions_of(Unknowns& u, const ReactionEquation& equation, const std::vector<VecX>& roots) {
+std::vector<VecX> motions_of(Unknowns& u, const std::vector<VecX>& roots) {
     std::vector<VecX> list;
-    for (const VecX& root : roots) {
-        VecX y = root;
-        if (u.is_motion(y) || (refine(u, equation, y) && u.is_motion(y))) list.push_back(y);
-    }
+    for (const VecX& y : roots)
+        if (u.is_motion(y)) list.push_back(y);
     return list;
 }
 
@@ -148,7 +130,7 @@ void decide(Unknowns& u, const ReactionEquation& equation, const VecX& start, Ve
     std::vector<VecX>& found = roots.y;
     if (!found.empty() && !u.p.gaps.empty()) {
         sort_by_distance(equation, start, found);
-        const std::vector<VecX> motions = motions_of(u, equation, found);
+        const std::vector<VecX> motions = motions_of(u, found);
         if (motions.empty() && in_pieces) {  // the search continues in the zero-load set of the nearest solution
             y = found.front();
             return;

@@ -10,8 +10,6 @@ struct UniquenessParameters {
     int max_mixed_laws = 6;         // more laws mirror one branch at a time instead of all combinations
     double same_solution = 1e-9;    // relative residual at which a point is a solution
     double other_solution = 1e-6;   // relative distance beyond which two solutions differ
-    double near_motion = 1e-6;      // tolerance between solutions of the arrays and motions, relative to the unknowns
-    int refinements = 3;            // corrections of such a solution
     double limit_rounding = 1e-9;  // tolerance of a holding force, relative to its limit
     // Determinants below this value count as zero.
     double min_determinant = 1e-8;

@@ -142,11 +142,6 @@ void RestProblem::freeze_zero_loads(const VecX& x) {
     collect_loads();
 }
 
-void RestProblem::freeze_zero_loads(const std::vector<char>& has_zero_load) {
-    const FrozenZeroLoads frozen(w, has_zero_load);
-    collect_loads();
-}
-
 void RestProblem::evaluate_laws(const VecX& x, VecX& alpha, FrictionLimits& limits) {
     VecX C = VecX::Zero(p.mechanism.nv);
     problem_.add_forces(p, w, x, C);

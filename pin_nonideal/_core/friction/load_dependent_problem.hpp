@@ -24,11 +24,9 @@ public:
     VecX acceleration(const VecX& x) const { return without_ + problem_.response * x; }
     bool has_zero_load_sets() const { return equation.loads.rows() > 0 && shares_contact_loads(p, w); }
     // Check if forces x give a consistent motion. Then no unilateral contact has tension, and shared loads are
-    // consistent with the zero-load set of the equation. freeze_zero_loads sets up the equation for the zero-load set of x,
-    // or for a given set.
+    // consistent with the zero-load set of the equation. freeze_zero_loads sets up the equation for the zero-load set of x.
     bool is_motion(const VecX& x);
     void freeze_zero_loads(const VecX& x);
-    void freeze_zero_loads(const std::vector<char>& has_zero_load);
     // Factor of the limit of the i-th element while it sticks, and after slip onset.
     double holding_factor(size_t i) const;
     double sliding_factor(size_t i) const;

@@ -42,12 +42,6 @@ bool RestMotions::find(RestProblem& problem, VecX& x) {
         if (!problem.has_zero_load_sets() || problem.is_motion(x)) return true;
         problem.freeze_zero_loads(x);
     }
-    if (!problem.has_zero_load_sets()) return false;
-    for (const std::vector<char>& has_zero_load : zero_load_sets(p, w)) {
-        problem.freeze_zero_loads(has_zero_load);
-        x.setZero();
-        if (find_in_zero_load_set(problem, x) && problem.is_motion(x)) return true;
-    }
     return false;
 }
 

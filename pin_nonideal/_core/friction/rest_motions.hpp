@@ -13,9 +13,9 @@ public:
     RestMotions(const Program& program, Workspace& workspace, double t, const std::vector<int>& resting)
         : p(program), w(workspace), t_(t), list_(resting) {}
 
-    // Solve for one zero-load set after the other until the motion is consistent with its own set. If this fails, try
-    // all sets. Return false if no motion was found. Throw a paradox if all motions are known, and no motion has all
-    // the sticking elements of the others.
+    // Solve for one zero-load set after the other until the motion is consistent with its own set. Return false if no
+    // motion was found. Throw a paradox if all motions are known, and no motion has all the sticking elements of the
+    // others.
     bool find(RestProblem& problem, VecX& x);
     // Refine by Newton's method alone, near a solution.
     bool refine(RestProblem& problem, VecX& x);

@@ -56,20 +56,6 @@ struct Search {
         begin_step(p, w, t, q, v);
     }
 
-    // Check if the motion of the suggested modes satisfies their conditions. The motion is then unique, because no
-    // limit depends on the load. On return the workspace is evaluated at this motion.
-    bool keeps_suggestion() {
-        if (p.needs_reactions || !query.at_limit.empty()) return false;
-        // Driven elements do not stick.
-        if (attempt({Failure::Kind::inconsistent}, [&] { apply(query.modes, false); })) return false;
-        const double size = w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm();
-        return std::all_of(list.begin(), list.end(), [&](int e) {
-            if (w.state.mode[e] == sticking)
-                return holding_force(p, w, e, t, q, v).is_within(slip_onset_parameters.limit_rounding);
-            return p.frictions[e].dim == 1 && slip_rate_along_mode(p, w, e) >= -slip_onset_parameters.condition_slack * size;
-        });
-    }
-
     // Set the kinetic limit of elements at slip onset. Return true if any limit changed.
     bool release(const RestProblem& problem, RestEquation& equation, const std::vector<Mode>& modes) {
         bool any = false;
@@ -174,7 +160,6 @@ struct Search {
             w.now.several_element = list.front();
             return;
         }
-        if (keeps_suggestion()) return;
         std::vector<Mode> modes = query.modes;
         for (int e : list) modes[e] = unloaded;
         bool found = false;

@@ -21,8 +21,7 @@ struct StickSlipParameters {
 inline constexpr StickSlipParameters stick_slip_parameters{};
 
 // Decide if each element at rest sticks or slips, and in which direction. Elements that have just come to rest are
-// among them. At most events try_previous_modes (friction/mode_update.hpp) finds the modes first. On return the
-// workspace is evaluated with the new modes.
+// among them. On return the workspace is evaluated with the new modes.
 void resolve_modes(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, const ModeQuery& query);
 
 }  // namespace pn

@@ -15,12 +15,10 @@ ConeStatus ConeComplementarity::solve(const Eigen::Ref<const MatX>& W, const Eig
     auto x = even_.vector(n);
     if (warm) x = f.cwiseQuotient(problem_.scale()) / problem_.force_unit();
     else x.setZero();
-    best_residual_ = HUGE_VAL;
-    bool found = search(x, warm);
+    bool found = search(x);
     if (!found && brief_) return ConeStatus::failed;
-    ConeStatus status = found ? ConeStatus::solved : find_certificate(problem_, certificate_);
-    if (status == ConeStatus::jammed) found = friction_continuation(x);  // a solution may still exist
-    if (status == ConeStatus::failed) found = friction_continuation(x) || random_restarts(x) || accept_best(x);
+    const ConeStatus status = found ? ConeStatus::solved : find_certificate(problem_, certificate_);
+    if (status == ConeStatus::failed) found = random_restarts(x);
     if (found && uniform_compliance_) compliance_continuation(x);
     unique_shares_ = newton_.regular();
     const bool as_it_was = warm && may_keep_shares && newton_.steps() == steps;
@@ -94,16 +92,12 @@ bool ConeComplementarity::polish(Eigen::Ref<VecX> f, int max_steps) {
     return true;
 }
 
-bool ConeComplementarity::search(Eigen::Ref<VecX> f, bool warm) {
+bool ConeComplementarity::search(Eigen::Ref<VecX> f) {
     if (problem_.n == 0) return true;
     if (polish(f, parameters.first_steps)) return true;
-    if (warm) {
-        f.setZero();
-        if (polish(f, parameters.first_steps)) return true;
-    }
     interior_point_.follow(problem_, f, ConeInteriorPoint::Slip::follows);
     if (polish(f, parameters.more_steps)) return true;
-    return !brief_ && (proximal_point(f) || alternate(f) || projected_gauss_seidel(f));
+    return !brief_ && proximal_point(f);
 }
 
 // Solve with compliance to the whole forces that decreases to its limit. f is kept if this gives no solution.
@@ -143,8 +137,6 @@ void ConeComplementarity::tidy(Eigen::Ref<VecX> f) const {
     }
 }
 
-// --- Searches from afar
-
 // Proximal point algorithm (Rockafellar, SIAM J. Control Optim. 14, 1976). Each element yields in proportion to the
 // change of its force. Every problem on the way is then regular, however many elements share a load. Forces that no
 // longer change cause no compliance.
@@ -152,8 +144,8 @@ bool ConeComplementarity::proximal_point(Eigen::Ref<VecX> f) {
     grown_ = problem_;
     auto last = x_.vector(problem_.n), best = best_.vector(problem_.n);
     last.setZero();
-    double compliance = parameters.first_compliance, before = HUGE_VAL;
-    for (int turn = 0; turn < parameters.max_proximal_steps && !(best_residual_ <= parameters.stalled_residual); ++turn) {
+    double compliance = parameters.first_compliance, before = HUGE_VAL, least = HUGE_VAL;
+    for (int turn = 0; turn < parameters.max_proximal_steps && !(least <= parameters.stalled_residual); ++turn) {
         grown_.W() = problem_.W();
         grown_.W().diagonal().array() += compliance;
         grown_.w0() = problem_.w0() - compliance * last;
@@ -172,94 +164,19 @@ bool ConeComplementarity::proximal_point(Eigen::Ref<VecX> f) {
         last = f;
         if (polish(f, parameters.few_steps)) return true;
         error = newton_.error(problem_, f);
-        if (error > parameters.stall_ratio * before && error < best_residual_) {
+        if (error > parameters.stall_ratio * before && error < least) {
             best = f;
-            best_residual_ = error;
+            least = error;
         }
         before = error;
     }
-    return best_residual_ <= parameters.stalled_residual && accept_best(f);
-}
-
-// Set f to the stored forces of smallest residual, if this residual is accepted.
-bool ConeComplementarity::accept_best(Eigen::Ref<VecX> f) {
-    if (!(best_residual_ <= max_residual_)) return false;
-    f = best_.vector(problem_.n);
-    error_ = best_residual_;
+    if (!(least <= max_residual_)) return false;
+    f = best;
+    error_ = least;
     return true;
 }
 
-// Alternate between slip speeds and the forces for fixed slip speeds (Cadoux, "Méthodes d'optimisation pour la
-// dynamique non régulière", 2009).
-bool ConeComplementarity::alternate(Eigen::Ref<VecX> f) {
-    f.setZero();
-    for (int turn = 0; turn < parameters.max_alternations; ++turn) {
-        interior_point_.follow(problem_, f, ConeInteriorPoint::Slip::stands);
-        if (!f.allFinite()) f.setZero();
-        if (polish(f, parameters.more_steps)) return true;
-    }
-    return false;
-}
-
-// Projected Gauss-Seidel: set one element after the other to the nearest force in its cone.
-bool ConeComplementarity::projected_gauss_seidel(Eigen::Ref<VecX> f) {
-    auto w = w_.vector(problem_.n), x = x_.vector(problem_.n);
-    f.setZero();
-    problem_.respond(f, w);
-    for (int round = 0; round < parameters.max_sweep_rounds; ++round) {
-        for (int sweep = 0; sweep < parameters.sweeps_per_round; ++sweep)
-            for (int e = 0; e < problem_.size(); ++e) {
-                const ConeElement& element = problem_.elements[e];
-                const int i = problem_.at[e], d = element.dim, head = element.is(ConeKind::contact);
-                auto fe = f.segment(i, d);
-                auto before = x.head(d);
-                before = fe;
-                fe -= parameters.relaxation * problem_.stiffness(e) * w.segment(i, d);
-                if (head) fe[0] = std::max(fe[0], 0.0);
-                const double length = fe.tail(d - head).norm(), limit = element.bound * (head ? fe[0] : 1.0);
-                if (!element.is(ConeKind::equality) && length > limit) fe.tail(d - head) *= limit / length;
-                before -= fe;
-                for (int k = 0; k < d; ++k) w -= before[k] * problem_.W().col(i + k);
-            }
-        if (!f.allFinite()) return false;
-        if (polish(f, parameters.more_steps)) return true;
-    }
-    return false;
-}
-
-// Continuation from zero friction, where the problem is convex, to full friction.
-bool ConeComplementarity::friction_continuation(Eigen::Ref<VecX> f) {
-    grown_ = problem_;
-    double reached = 0.0, stretch = parameters.first_friction_part;
-    auto there = x_.vector(problem_.n);
-    f.setZero();
-    for (int tried = 0; tried < parameters.max_stretches && stretch > parameters.min_friction_part; ++tried) {
-        const double next = std::min(1.0, reached + stretch);
-        for (int e = 0; e < problem_.size(); ++e) grown_.elements[e].bound = next * problem_.elements[e].bound;
-        there = f;
-        double error = newton_.solve(grown_, there, parameters.more_steps);
-        for (int turn = 0; turn < parameters.alternations_per_stretch && !(error <= parameters.tolerance); ++turn) {
-            interior_point_.follow(grown_, there,
-                                   turn == 0 ? ConeInteriorPoint::Slip::follows : ConeInteriorPoint::Slip::stands);
-            if (!there.allFinite()) break;
-            auto end = f_.vector(problem_.n);
-            end = there;
-            error = newton_.solve(grown_, end, parameters.more_steps);
-            if (error <= parameters.tolerance) there = end;
-        }
-        if (!(error <= parameters.tolerance)) {
-            stretch *= 0.3;
-            continue;
-        }
-        f = there;
-        reached = next;
-        stretch *= 2.0;
-        if (reached == 1.0) return polish(f, parameters.more_steps);
-    }
-    return false;
-}
-
-// Random starts with a fixed seed.
+// Random starts with a fixed seed. Each one gives slip speeds, and the path for fixed slip speeds the next start.
 bool ConeComplementarity::random_restarts(Eigen::Ref<VecX> f) {
     std::minstd_rand lot(1);
     for (int start = 0; start < parameters.max_random_starts; ++start) {

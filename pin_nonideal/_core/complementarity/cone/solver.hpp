@@ -1,9 +1,8 @@
 // Solver of contacts with Coulomb friction, for accelerations, impacts and time stepping. It finds f of the problem of
 // cone/problem.hpp for any square W (of any rank, symmetric or not). Newton's method on the modes starts from a warm
-// start or from zero. If it fails, the fallbacks are: (1) Newton's method from the end of the central path, (2)
-// proximal points with decreasing compliance, (3) alternation with fixed slip speeds, (4) projected Gauss-Seidel, (5)
-// continuation from zero friction, (6) random starts. Buffers grow to the largest problem. A call without the last two
-// fallbacks allocates no memory after that.
+// start, or else from zero. If it fails, the fallbacks are Newton's method from the end of the central path, proximal points
+// with decreasing compliance, and random starts unless a certificate shows that a solution may not exist. Buffers grow to
+// the largest problem. A call allocates no memory after that.
 #pragma once
 
 #include "complementarity/cone/certificate.hpp"
@@ -22,21 +21,15 @@ struct ConeComplementarityParameters {
     double minimum_norm_tolerance = 1e-13;  // error of a minimum-norm solution
     // Newton steps from near a solution, from a guess, and from the end of the central path or of a continuation.
     int few_steps = 3, first_steps = 20, more_steps = 30;
-    int max_alternations = 30;                         // maximum alternations of slip speeds and forces
-    int max_sweep_rounds = 40, sweeps_per_round = 40;  // rounds of projected Gauss-Seidel sweeps, and sweeps of a round
-    double relaxation = 0.7;                           // part of an element's own step that a sweep takes
-    int max_random_starts = 100;                       // random starts
-    // Alternations at one part of the friction, and number of parts on the way to full friction.
-    int alternations_per_stretch = 10, max_stretches = 60;
     // Compliance of elements relative to their own response. It halves from the first value to the last.
     double first_compliance = 1e-2, min_compliance = 1e-9;
     int max_proximal_steps = 40;    // proximal steps, of which 24 reach the last compliance
     double compliance_ratio = 0.1;  // ratio of successive compliances, if only the limit is needed
+    int max_random_starts = 100;    // random starts
     // Residual below which the search ends if residuals are accepted, and ratio of successive residuals that counts as
     // stagnation. If the residual stagnates while elements stiffen, no forces change it. Elements that share a load,
     // such as the corners of a turning foot, then have contradicting velocities.
     double stalled_residual = 1e-9, stall_ratio = 0.9;
-    double first_friction_part = 0.1, min_friction_part = 1e-5;  // parts of the way from no friction to full friction
 };
 
 class ConeComplementarity {
@@ -74,15 +67,11 @@ public:
     int path_steps() const { return interior_point_.steps(); }
 
 private:
-    bool search(Eigen::Ref<VecX> f, bool warm);
+    bool search(Eigen::Ref<VecX> f);
     bool polish(Eigen::Ref<VecX> f, int max_steps);
     bool stands_still(const Eigen::Ref<const VecX>& f);
     bool proximal_point(Eigen::Ref<VecX> f);
-    bool accept_best(Eigen::Ref<VecX> f);
     bool compliance_continuation(Eigen::Ref<VecX> f);
-    bool alternate(Eigen::Ref<VecX> f);
-    bool projected_gauss_seidel(Eigen::Ref<VecX> f);
-    bool friction_continuation(Eigen::Ref<VecX> f);
     bool random_restarts(Eigen::Ref<VecX> f);
     void tidy(Eigen::Ref<VecX> f) const;
 
@@ -92,7 +81,7 @@ private:
     MinimumNormForces minimum_norm_;
     Buffer even_, x_, f_, w_, best_;
     VecX certificate_;
-    double error_ = 0.0, best_residual_ = 0.0, max_residual_ = 0.0;
+    double error_ = 0.0, max_residual_ = 0.0;
     bool unique_shares_ = false, uniform_compliance_ = false, brief_ = false;
 };
 

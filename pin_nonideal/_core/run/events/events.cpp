@@ -10,7 +10,7 @@
 #include "dynamics/state_projection.hpp"
 #include "dynamics/friction_limit.hpp"
 #include "dynamics/step_start.hpp"
-#include "friction/mode_update.hpp"
+#include "friction/stick_slip.hpp"
 #include "math/tolerances.hpp"
 #include "run/events/unloaded_contacts.hpp"
 
@@ -119,9 +119,7 @@ struct FrictionSwitch {
         if (known && event->kind == FoundEvent::Kind::released_together) mode_query.at_limit = mode_query.at_rest;
         else if (held >= 0) mode_query.at_limit = {held};
         if (joint_motion) joint_motion->to_modes(p, w, mode_query);
-        if (mode_query.is_solved_jointly || !known ||
-            !try_previous_modes(p, w, t, system.q, system.v, mode_query, event->index))
-            resolve_together(system, t, mode_query, strikes);
+        resolve_together(system, t, mode_query, strikes);
     }
 
     // Return the elements that stuck until they reached their limit at this event.
