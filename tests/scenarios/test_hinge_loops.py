@@ -157,6 +157,14 @@ def test_overconstrained_loops_move_by_their_one_freedom(
         assert halved < max(once / ratio, FLOOR), method
 
 
+@pytest.mark.parametrize(("family", "seed"), [(hinge_loops.sarrus, 3), (hinge_loops.planar, 36)])
+def test_moreau_has_one_error_constant(family: Callable[..., Any], seed: int) -> None:
+    """Steps of all lengths take as many sweeps at the same pose of a loop."""
+    case = Case(family, seed, damping=0.02 * (seed % 2))
+    missed = [case.missed(closed(case), method="moreau", dt=dt) for dt in (2e-3, 1e-3, 5e-4, 2.5e-4)]
+    assert np.abs(np.divide(missed[:-1], missed[1:]) - 4.0).max() < 0.5
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("method", ["Radau", "BDF", "LSODA"])
 @pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.__name__)
