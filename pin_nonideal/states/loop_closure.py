@@ -51,7 +51,7 @@ MANY_FREEDOMS = 200
 # starts continue up to MAX_STARTS until a closure is found, and until the nearest was found OFTEN times.
 STARTS, FURTHER_STARTS, FAR_MOVE, VERY_FAR_MOVE = 24, 12, 0.05, 0.5
 MAX_STARTS, OFTEN, FEW_FREEDOMS = 60, 4, 12
-SPREADS = (0.1, 0.3, 0.5, 1.0)  # spreads of starts, in turn, over max(1 unit, displacement of best closure)
+SPREADS = (0.1, 0.3, 0.5, 1.0)  # spreads of the starts before the first closure, in turn [units]
 # Smallest reciprocal condition number of the mass matrix. Closures below it (gimbal lock) are a fallback.
 MIN_RCOND = 1e-10
 # Smallest divisor.
@@ -154,11 +154,10 @@ class Search:
         max_starts = MAX_STARTS if len(self.unit) <= FEW_FREEDOMS else 0
         k = 0
         while k < starts or (k < max_starts and (further and often < OFTEN if best else fallback is None)):
-            longest = 1.0 if best is None else max(1.0, self._longest(best.q))
-            spread = longest * SPREADS[k % len(SPREADS)] * generator.standard_normal(len(self.unit))
+            start = self._start(k, best, generator)
             k += 1
             try:
-                iterate = self._close(self._integrate(self.q0, spread * self.unit) if k > 1 else self.q0)
+                iterate = self._close(start)
                 if not self._is_closed(iterate):
                     open_iterate = min(iterate, open_iterate, key=self._lacking)
                     continue
@@ -188,6 +187,16 @@ class Search:
             return fallback._replace(iterations=self.iterations), fallback.is_minimum
         lacking = self._lacking(open_iterate)
         return Closure(open_iterate.q, lacking, self._distance(open_iterate), False, self.iterations), False
+
+    def _start(self, k: int, best: Closure | None, generator: np.random.Generator) -> Array:
+        """Return start k: q0, then random starts, from the first closure on no farther away than the best."""
+        if k == 0:
+            return self.q0
+        x = generator.standard_normal(len(self.unit))
+        if best is None:
+            return self._integrate(self.q0, SPREADS[k % len(SPREADS)] * self.unit * x)
+        distance = best.distance * generator.uniform() ** (1.0 / len(x))  # uniform in the ball
+        return self._integrate(self.q0, np.linalg.solve(self.root, distance / np.linalg.norm(x) * x))
 
     def _unwound(self, closure: Closure) -> Closure:
         """Return the nearer of a closure and the closure without whole turns of its joints."""

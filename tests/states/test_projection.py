@@ -104,17 +104,14 @@ def check(seed):
     return report.nearest
 
 
-@pytest.mark.parametrize("seed", seeds(range(12), count=4))
+# Seed 77: the nearest closure is a third nearer than the one next to the start.
+@pytest.mark.parametrize("seed", seeds([*range(12), 77], always=[77], count=4))
 def test_random_loops(seed):
     check(seed)
 
 
-NEARER = pytest.mark.xfail(strict=True, reason="a longer search finds a nearer closure, see the limits")
-BLOCKS = [pytest.param(block, marks=NEARER if block < 3 else ()) for block in range(10)]
-
-
 @pytest.mark.stress
-@pytest.mark.parametrize("block", BLOCKS)
+@pytest.mark.parametrize("block", range(10))
 def test_many_random_loops(block):
     failed, known = [], 0
     for seed in range(100 * block, 100 * (block + 1)):

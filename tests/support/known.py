@@ -67,13 +67,6 @@ KNOWN: list[Known] = [
         functions="simulate moreau",
     ),
     Known(
-        "rows in Python change the ledger of time stepping by a tenth of its balance",
-        ("robot slider_crank", "an idle row", "simulate moreau"),
-        scenes="robot slider_crank",
-        transformations="an idle row",
-        functions="simulate moreau",
-    ),
-    Known(
         "differences in time, for a rate that is not given and for checks, have steps in seconds",
         ("rows of user", "tonnes, kilometers, hours", "solve"),
         scenes="rows of user",

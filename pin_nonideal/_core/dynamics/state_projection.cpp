@@ -91,18 +91,24 @@ void project_and_evaluate(const Program& p, Workspace& w, double t, VecX& q, Vec
     solve_dynamics(p, w, t, v);
 }
 
-void choose_rows_near(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
-    if (w.now.rows.blocks.empty() || !w.now.rows.orthogonal) return;
-    if (!p.gaps.empty() || w.state.sticks_anywhere()) return choose_rows(p, w);
+bool choose_rows_near(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
+    if (w.now.rows.blocks.empty() || !w.now.rows.orthogonal) return false;
+    if (!p.gaps.empty() || w.state.sticks_anywhere()) {
+        choose_rows(p, w);
+        return false;
+    }
     const VecX start = q;
+    bool moved = false;
     for (double tolerance : state_projection_parameters.tolerances_near) {
         choose_rows(p, w, tolerance);
-        project_position(p, w, t, q, v);
+        moved = project_position(p, w, t, q, v);
         if (dependent_residual(p, w) <= state_projection_parameters.creeping_gap * scene_size(p, w)) break;
         q = start;
+        moved = false;
         configure(p, w, t, q, v);
     }
     choose_rows(p, w);
+    return moved;
 }
 
 void project_anew(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {

@@ -35,7 +35,7 @@ bool project_past_sticking(const Program& p, Workspace& w, double t, VecX& q, co
 
 // Choose rows at a state near the constraints without rows from an earlier step, and project the position onto them.
 // The workspace must be configured at this state.
-void choose_rows_near(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
+bool choose_rows_near(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
 
 // Project a state without factors from an earlier step. Uses the factors and independent rows at the state itself, with
 // all elements slipping.

@@ -160,12 +160,12 @@ void System::settle(double t, VecX& y, VecX& dy, bool evaluates, bool may_lack_m
     // Factor the rows of the new modes. Sticking elements must not move during the projection.
     configure(p, w, t, q, v);
     const bool near = ng == 0 && w.now.rows.orthogonal && !w.state.sticks_anywhere();
-    if (near) choose_rows_near(p, w, t, q, v);
-    bool chosen = near || configure_step(p, w);
     const double before = energy && !w.now.rows.blocks.empty() ? total() : 0.0;
+    bool moved = near && choose_rows_near(p, w, t, q, v);
+    bool chosen = near || configure_step(p, w);
     const double longest_single = longest_single_move(p, w);
     if (longest_single > 0.0) q_before_ = q;
-    bool moved = project_position(p, w, t, q, v, true, !evaluates);
+    moved |= project_position(p, w, t, q, v, true, !evaluates);
     if (longest_single > 0.0 && left_planes(p, w, longest_single)) {
         q = q_before_;
         chosen = depenetrate(p, w, t, q, v);

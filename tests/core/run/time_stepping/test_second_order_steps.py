@@ -162,6 +162,24 @@ def test_the_ledger_tells_what_the_scheme_adds() -> None:
     assert np.abs(run.energy["balance"]).max() < 1e-4
 
 
+def test_an_idle_row_leaves_the_ledger_as_it_is() -> None:
+    """A zero row in Python makes the rows redundant; the energy of the projection remains the same."""
+    scene = pn.load("slider_crank")
+    nv = scene.model.nv
+    idle = pn.UserConstraint(
+        lambda t, q, v, data: (np.zeros((1, nv)), np.zeros(1)),
+        1,
+        residual=lambda t, q: np.zeros(1),
+        rate=lambda t, q, v: np.zeros(1),
+        name="idle",
+    )
+    ledgers = [
+        pn.simulate(s, 0.1, method="moreau", dt=1e-3, record="energy").energy["projection"]
+        for s in (scene, scene.replace(constraints=[*scene.constraints, idle]))
+    ]
+    np.testing.assert_allclose(ledgers[1], ledgers[0], rtol=0, atol=1e-6 * np.abs(ledgers[0]).max())
+
+
 def test_a_ball_rolls_down_at_the_exact_speed() -> None:
     radius, mass, slope, mu = 0.1, 1.0, 0.3, 0.6
     model = pin.Model()
