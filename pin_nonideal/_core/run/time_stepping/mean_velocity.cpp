@@ -47,16 +47,10 @@ void MeanVelocity::end(const VecX& a, VecX& v1) {
 
 bool MeanVelocity::move() {
     next_ = 0.5 * (start_ + end_);
-    double change = 0.0, speed = 0.0;
-    for (int k = 0; k < next_.size(); ++k) {
-        change = std::max(change, std::abs(next_[k] - value_[k]) / unit_[k]);
-        speed = std::max(speed, std::abs(start_[k]) / unit_[k]);
-    }
-    change *= h_;
-    double allowed = parameters.configuration_rounding;
-    if (moves_ == 0) travel_ = std::max(h_ * speed, std::sqrt(change));
-    else allowed = std::max(allowed, parameters.max_left_part * travel_ * travel_ * travel_);
-    if (moves_ == parameters.max_sweeps || change <= allowed) return false;
+    double change = 0.0;
+    for (int k = 0; k < next_.size(); ++k) change = std::max(change, std::abs(next_[k] - value_[k]) / unit_[k]);
+    const double allowed = moves_ == 0 ? parameters.configuration_rounding : parameters.configuration_tolerance;
+    if (moves_ == parameters.max_sweeps || h_ * change <= allowed) return false;
     value_ = next_;
     ++moves_;
     measure();

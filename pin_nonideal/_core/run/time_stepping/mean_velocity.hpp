@@ -10,10 +10,9 @@ namespace pn {
 struct MeanVelocityParameters {
     // Change of the configuration in a step that counts as rounding [rad, or radius of the tree].
     double configuration_rounding = 1e-13;
-    // Change by a further sweep below which no sweep follows, relative to the cube of the step's travel. The second sweep
-    // makes the step second order. Fast motion needs more sweeps to conserve its energy. The change and the error of
-    // the scheme both grow with the cube of the step, so shorter steps take as many sweeps at the same state.
-    double max_left_part = 0.12;
+    // Change by a further sweep below which no sweep follows. The second sweep makes the step second order. Fast motion
+    // needs more sweeps to conserve its energy.
+    double configuration_tolerance = 1e-9;
     int max_sweeps = 4;  // maximum number of sweeps of a step
 };
 
@@ -66,9 +65,6 @@ private:
     VecX value_, start_, end_, next_;
     VecX turning_;  // rates of the linear velocities by turning axes
     VecX start_difference_;     // velocity of the start minus mean, plus h/2 of these rates
-    // Travel of the step [rad, or radius of the tree]: that of its first velocity, or the root of that by its
-    // acceleration if it is larger.
-    double travel_ = 0.0;
     int moves_ = 0;  // sweeps after the first one
 };
 
