@@ -296,13 +296,16 @@ def with_manifolds(contacts: Iterable[object], model: Model, geometry: object) -
     shapes = geometry() if callable(geometry) else geometry
     if shapes is None:
         raise InputError("a GeometryContact needs the scene's collision_model; pass one, or use PointContact")
-    return tuple(_manifold(c, model, shapes) if isinstance(c, GeometryContact) else c for c in items)
+    named: dict[str, Shape] = {}
+    return tuple(_manifold(c, model, shapes, named) if isinstance(c, GeometryContact) else c for c in items)
 
 
-def _manifold(c: GeometryContact, model: Model, geometry: GeometryModel) -> PairOfShapes:
-    """Return a pair of shapes with the contacts of its manifold."""
+def _manifold(
+    c: GeometryContact, model: Model, geometry: GeometryModel, named: dict[str, Shape]
+) -> PairOfShapes:
+    """Return a pair of shapes with the contacts of its manifold. `named` keeps the shapes for other pairs."""
     who = label(c)
-    first, second = (_shape(who, item, model, geometry) for item in (c.geometry1, c.geometry2))
+    first, second = (_shape(who, item, model, geometry, named) for item in (c.geometry1, c.geometry2))
     if first.frame == second.frame:
         raise InputError(f"{who}: both geometries are on the same body, which cannot touch itself")
     ground, thing = (first, second) if first.normal is not None else (second, first)
@@ -312,6 +315,11 @@ def _manifold(c: GeometryContact, model: Model, geometry: GeometryModel) -> Pair
     return PairOfShapes(c, base, (first.name, second.name), tuple(points))
 
 
-def _shape(who: str, item: str | GeometryObject, model: Model, geometry: GeometryModel) -> Shape:
-    is_object = isinstance(item, pin.GeometryObject)
-    return shape_of(who, item if is_object else geometry_object(who, item, geometry), model)
+def _shape(
+    who: str, item: str | GeometryObject, model: Model, geometry: GeometryModel, named: dict[str, Shape]
+) -> Shape:
+    if isinstance(item, pin.GeometryObject):
+        return shape_of(who, item, model)
+    if item not in named:
+        named[item] = shape_of(who, geometry_object(who, item, geometry), model)
+    return named[item]
