@@ -303,7 +303,7 @@ def bodies(results: list[dict[str, Any]]) -> str:
     ]
     head = (
         "scene",
-        "contacts",
+        "contact points",
         "a step",
         "over MuJoCo",
         "moved [m]",

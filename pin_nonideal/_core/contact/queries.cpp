@@ -85,9 +85,7 @@ void remove_coincident(const Program& p, const Workspace& w, std::vector<int>& l
     size_t left = 0;
     for (int gap : list) {
         const auto end = list.begin() + static_cast<std::ptrdiff_t>(left);
-        const auto same = std::find_if(list.begin(), end, [&](int other) {
-            return p.bodies_of_gap[gap] == p.bodies_of_gap[other] && coincide(p, w, gap, other);
-        });
+        const auto same = std::find_if(list.begin(), end, [&](int other) { return coincide(p, w, gap, other); });
         if (same == end) list[left++] = gap;
         else if (precedes(gap, *same)) *same = gap;
     }

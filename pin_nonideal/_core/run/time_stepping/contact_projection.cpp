@@ -136,7 +136,6 @@ bool ContactProjection::open_blocked_contacts(const Program& p, Workspace& w) {
 void ContactProjection::measure_open(const Program& p, Workspace& w, double t, const std::vector<int>& near,
                                      const VecX& v) {
     open_.clear();
-    penetrating_.clear();
     for (int i : near) {
         if (w.state.closed[i] || is_bare(p, i)) continue;
         measure_gap(p, w, t, v, i);
