@@ -145,7 +145,7 @@ class _Joint:
             acting = float((self.rest.forces(self.q) - self.rest.undriven(self.q))[self.dof])
             low, high = cones.span()
             self.scale = self.scale or float(cones.unit / cones.lengths[-1])
-            self.known[x] = _Ends(acting + low, acting + high, cones.constant * cones.unit)
+            self.known[x] = _Ends(acting + low, acting + high, cones.constant)
         return self.known[x]
 
     def band(self) -> tuple[float, float]:

@@ -12,11 +12,13 @@ from pin_nonideal.compilation.contact_groups import contact_names
 from pin_nonideal.html_tables import NAMES_MAX, numbers, table
 from pin_nonideal.scene.scene import Scene, compiled_scene, require_scene
 from pin_nonideal.states.parsing import named_velocity
+from pin_nonideal.trajectory.contact_points import slip_axes
 from pin_nonideal.types import Array, Model, State, Table
 from pin_nonideal.validation import number
 
+from .cone_program import FACTOR_TOL
 from .holding import HoldingTorque, holding_torques
-from .limit_cones import FOUND, MAX_FACTOR, LimitCones
+from .limit_cones import LimitCones
 from .residual import AtRest
 
 MAX_NAMED = 4  # names in a reason
@@ -32,7 +34,8 @@ class Rest:
             no friction is needed, 0 if friction just suffices, negative if larger limits are needed, and -inf
             if no friction suffices.
         friction: force of each friction element by name, along its slip directions, for the smallest factor
-            [N or N m], a sum over the points of a pair of shapes; empty if no friction suffices.
+            [N or N m]; empty if no friction suffices. The friction of a pair of shapes is the sum of the
+            forces at its points, along the slip directions of the first loaded point.
         lam: multipliers of all rows with this friction; contacts press, (m,).
         reason: reason why the scene does not rest, with the names of joints, friction elements or contacts
             that cannot hold; empty if it rests.
@@ -75,7 +78,7 @@ def rest(scene: Scene, q: State | None = None, tau: State | None = None, *, t: f
     satisfy F + A^T lam + D^T f = 0 and |f_e| <= k limit_e for each friction element e. Contacts press:
     lam >= 0, and lam = 0 for open contacts. Limits of contacts depend on the unknown lam. Load-dependent
     limits of joints are computed from the reactions of the sticking scene, with least norm if they are not
-    unique. Cutting planes approximate disks and balls; each linear program is solved exactly.
+    unique. Newton's method finds k; each step is one second-order cone program, solved by Clarabel.
 
     Args:
         scene: the scene.
@@ -99,21 +102,31 @@ def rest(scene: Scene, q: State | None = None, tau: State | None = None, *, t: f
     cones = LimitCones(scene, at_rest, at)
     factor = cones.min_factor()
     holding = partial(holding_torques, scene, at, drives, time, at_rest.open)
-    if factor > MAX_FACTOR:
+    if np.isinf(factor):
         reason = _unheld(scene, at_rest, at, cones)
         rows = len(compiled_scene(scene).multipliers.groups.names)
         return Rest(False, -np.inf, {}, np.zeros(rows), reason, holding)
-    forces = cones.solve(factor)[1]
+    forces = cones.forces(factor)
     compiled = compiled_scene(scene)
     friction = {
-        name: np.sum([forces[part] for part in cones.parts[own]], axis=0)
+        name: _resultant(scene, at, time, [forces[part] for part in cones.parts[own]], own)
         for name, own in compiled.elements.slices().items()
     }
     margin = 1.0 - factor
-    rests = margin >= -10.0 * FOUND
+    rests = margin >= -10.0 * FACTOR_TOL
     reason = "" if rests else _elements_at_limit(scene, cones, factor)
-    lam = compiled.multipliers.groups.sum(forces[: len(cones.A)])
+    lam = compiled.multipliers.groups.sum(forces[: cones.rows])
     return Rest(rests, margin, friction, lam, reason, holding)
+
+
+def _resultant(scene: Scene, q: Array, t: float, forces: list[Array], own: slice) -> Array:
+    """Return the sum of the friction forces of a contact, along the axes of its first loaded point."""
+    loaded = [k for k, force in enumerate(forces) if force.any()]
+    if len(loaded) < 2:
+        return forces[loaded[0] if loaded else 0]
+    axes = slip_axes(scene, q, t, [own.start + k for k in loaded])
+    force = np.einsum("ki,kij->j", [forces[k] for k in loaded], axes)
+    return np.asarray(axes[0] @ force)
 
 
 def _elements_at_limit(scene: Scene, cones: LimitCones, factor: float) -> str:

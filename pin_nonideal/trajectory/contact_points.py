@@ -78,6 +78,23 @@ def contact_lines(scene: Scene, q: Array, t: Array, names: Sequence[str]) -> tup
     return lines[..., :3] - radii[:, None] * lines[..., 3:], lines[..., 3:]
 
 
+def slip_axes(scene: Scene, q: Array, t: float, elements: Sequence[int]) -> Array:
+    """Return the slip directions of friction elements of two directions in world axes, (elements, 2, 3).
+
+    Friction forces push the body of the force of their contact along these directions.
+
+    Args:
+        scene: the scene.
+        q: configuration, (nq,).
+        t: time [s].
+        elements: indices of the elements in the core's program, each of a point of a pair of shapes.
+    """
+    program = compiled_scene(scene).program
+    axes = core.slip_axes(program, np.ascontiguousarray(q[None]), np.array([t]), list(elements))
+    sides = [side_of_point(scene, program.element_names[e]) for e in elements]
+    return np.asarray(axes.reshape(-1, 2, 3) * np.reshape(sides, (-1, 1, 1)))
+
+
 def gaps_of_points(scene: Scene, q: Array, t: Array, names: Sequence[str]) -> Array:
     """Return the gaps of contacts [m or rad], (n, contacts).
 

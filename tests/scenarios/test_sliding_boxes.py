@@ -86,6 +86,12 @@ def any_box(seed):
     return thrown(size, mass, mu, v0, q0, restitution), size
 
 
+def test_four_corners_that_stop_at_once_come_to_rest():
+    """The last step passes the rest of all corners, whose directions are rounding then."""
+    run = pn.simulate(any_box(324)[0], 10.0, max_steps=5000)
+    assert np.abs(run.v[-1]).max() == 0.0
+
+
 @pytest.mark.parametrize("seeds", ranges(10, 40, 1000))
 def test_boxes_come_to_rest(seeds):
     """None fails or hangs, none sinks, and all lie still in the end."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -104,3 +105,59 @@ def test_a_motion_opens_a_contact_and_never_enters_it():
         assert scene.acceleration([0.0], [v], tau=lifted.tau) == pytest.approx([a])
     with pytest.raises(pn.InputError, match='"ground" misses it by'):
         pn.inverse_dynamics(scene, [0.0], [0.0], [-1.0])
+
+
+# --- Stacks and piles, whose contacts share loads -----------------------------------------------------------
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.3])
+@pytest.mark.parametrize("tilt", [0.0, 0.1, 0.4])
+@pytest.mark.parametrize("count", [1, 2, 4])
+@pytest.mark.parametrize("shape", [coal.Box(0.2, 0.2, 0.1), coal.Cylinder(0.1, 0.1)], ids=["box", "cylinder"])
+def test_the_margin_of_a_stack_is_that_of_its_slope(shape, count, tilt, yaw):
+    model, shapes = pin.Model(), pin.GeometryModel()
+    model.gravity.linear = G * np.array([np.sin(tilt), 0.0, -np.cos(tilt)])
+    shapes.addGeometryObject(pn.ground())
+    for k in range(count):
+        place = pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, k * yaw), np.array([0.0, 0.0, 0.05 + 0.1 * k]))
+        pn.free_body(model, f"body {k}", shape, mass=2.0, collision_model=shapes, place=place)
+    below = ["ground", *(f"body {k}" for k in range(count - 1))]
+    contacts = [pn.GeometryContact(f"body {k}", below[k], mu=0.5) for k in range(count)]
+    scene = pn.Scene(model, contacts=contacts, collision_model=shapes)
+    tips = 0.05 * count * np.tan(tilt) > 0.1
+    found = pn.rest(scene)
+    if tips:
+        assert found.margin == -np.inf
+        assert "would have to pull" in found.reason
+        return
+    assert found.margin == pytest.approx(1.0 - np.tan(tilt) / 0.5, abs=1e-8)
+    carried = 2.0 * G * np.cos(tilt) * np.arange(count, 0, -1)
+    assert found.lam == pytest.approx(carried, rel=1e-9)
+    held = [np.linalg.norm(force) for force in found.friction.values()]
+    assert held == pytest.approx(carried * np.tan(tilt), rel=1e-8, abs=1e-8)
+
+
+@pytest.mark.parametrize("seed", seeds(range(60)))
+def test_the_margin_of_a_bridge_of_balls_is_exact(seed):
+    """One ball on two needs a friction coefficient of tan(theta/2) between the balls, and less on the floor.
+
+    Each lower ball has equal friction at both of its contacts, as its moments balance. The balls press on
+    each other with half the weight of the upper ball. The line of their centers is theta off the vertical.
+    """
+    rng = np.random.default_rng(seed)
+    theta, mu, on_floor = rng.uniform(0.53, 1.0), rng.uniform(0.1, 1.0), rng.uniform(0.05, 0.5)
+    top, radius = rng.uniform(0.2, 5.0), 0.05
+    model, shapes = pin.Model(), pin.GeometryModel()
+    shapes.addGeometryObject(pn.ground())
+    turn = pin.rpy.rpyToMatrix(0.0, 0.0, rng.uniform(-3.0, 3.0))
+    apart, high = 2.0 * radius * np.sin(theta), radius + 2.0 * radius * np.cos(theta)
+    for name, x, z, mass in (("a", -apart, radius, 1.0), ("b", apart, radius, 1.0), ("top", 0.0, high, top)):
+        place = pin.SE3(np.eye(3), turn @ np.array([x, 0.0, z]))
+        pn.free_body(model, name, coal.Sphere(radius), mass=mass, collision_model=shapes, place=place)
+    pairs = [("a", "ground", on_floor), ("b", "ground", on_floor), ("top", "a", mu), ("top", "b", mu)]
+    contacts = [pn.GeometryContact(one, other, mu=value) for one, other, value in pairs]
+    found = pn.rest(pn.Scene(model, contacts=contacts, collision_model=shapes))
+    between = np.tan(0.5 * theta)
+    factor = max(between / mu, 0.5 * top * between / (1.0 + 0.5 * top) / on_floor)
+    assert found.margin == pytest.approx(1.0 - factor, rel=1e-7, abs=1e-7)
+    assert found.rests == (factor <= 1.0)

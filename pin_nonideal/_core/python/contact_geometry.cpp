@@ -65,11 +65,29 @@ Table action_lines(const Program& p, const Array2& q, const Array& t, const std:
     return to_table(std::move(lines), t.shape(0), 6 * blocks.size());
 }
 
+// Two slip directions of each friction element at a state in world axes, (elements, 6): the friction force pushes the
+// body of frame 1 along them.
+Table slip_axes(const Program& p, const Array2& q, const Array& t, const std::vector<int>& elements) {
+    std::vector<int> blocks;
+    for (const int element : elements) {
+        if (element < 0 || element >= static_cast<int>(p.frictions.size()) || p.frictions[element].dim != 2)
+            throw std::invalid_argument("no such friction element of two directions");
+        blocks.push_back(p.frictions[element].block);
+    }
+    std::vector<double> axes;
+    evaluate_blocks(p, q, t, blocks, Part::place, [&](const Block&, const RowValues& values) {
+        for (int row = 0; row < 2; ++row)
+            for (int k = 0; k < 3; ++k) axes.push_back(values.wrench[row].force[k]);
+    });
+    return to_table(std::move(axes), t.shape(0) * elements.size(), 6);
+}
+
 }  // namespace
 
 void bind_contact_geometry(nb::module_& m) {
     m.def("gap_values", &gap_values, "program"_a, "q"_a, "t"_a, "blocks"_a);
     m.def("action_lines", &action_lines, "program"_a, "q"_a, "t"_a, "blocks"_a);
+    m.def("slip_axes", &slip_axes, "program"_a, "q"_a, "t"_a, "elements"_a);
 }
 
 }  // namespace pn

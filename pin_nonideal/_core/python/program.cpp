@@ -3,7 +3,10 @@
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
+
+#include <tuple>
 
 #include "dynamics/law_forces.hpp"
 #include "dynamics/power.hpp"
@@ -56,6 +59,16 @@ void bind_program(nb::module_& m) {
             std::vector<std::string> names;
             for (const Friction& f : p.frictions) names.push_back(f.name);
             return names;
+        })
+        // Static limit of each element as constant + coefficient |lam| of a row; row -1 for limits of another form.
+        .def_prop_ro("element_limits", [](const Program& p) {
+            std::vector<std::tuple<int, double, double>> limits;
+            for (const Friction& f : p.frictions) {
+                const bool loaded = f.load == Friction::Load::multiplier;
+                limits.emplace_back(loaded ? f.row : -1, loaded ? f.mu * f.static_ratio : 0.0,
+                                    f.constant * f.static_ratio);
+            }
+            return limits;
         })
         .def("runner", [](std::shared_ptr<const Program> p) { return Runner(std::move(p)); });
 }

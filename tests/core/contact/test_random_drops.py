@@ -60,6 +60,12 @@ def test_contacts_that_rattle_come_to_rest(seed):
     assert np.abs(run.energy["balance"]).max() < 1e-5 * run.energy["total"][0]
 
 
+def test_a_slip_of_rounding_comes_to_rest():
+    """The direction of a slip of 2e-9 m/s relaxes faster than any step that the tolerances require."""
+    run = pn.simulate(dropped(636), 3.0, max_steps=2000)
+    assert run.t[-1] == 3.0
+
+
 @pytest.mark.parametrize("those", ranges(5, 60, 1000))
 def test_random_bodies_dropped(those, kept, tmp_path):
     """No run fails, hangs or penetrates; every tenth is repeated and resumed in flight bit by bit."""

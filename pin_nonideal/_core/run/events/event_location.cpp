@@ -44,12 +44,17 @@ double EventLocator::margin_at_end(const Watch& watch) {
     return search_.margin(watch, stepper_.t0 + stepper_.h, stepper_.y1);
 }
 
-// Check if slip in several directions has come to rest at the end of a fixed step.
+// Check if slip in several directions has come to rest at the end of a fixed step, or at the end of an adaptive step
+// that begins with slip whose direction neither rounding nor the tolerances resolve. No such step locates the rest.
 bool EventLocator::has_arrived(int e) const {
-    if (p.frictions[e].dim == 1 || stepper_.method.adaptive()) return false;
-    const double speed = system_.velocity(stepper_.y1).cwiseAbs().maxCoeff();
+    if (p.frictions[e].dim == 1 || stepper_.method.outside()) return false;
+    const double scale = 1.0 + system_.velocity(stepper_.y1).cwiseAbs().maxCoeff();
     const double slip = slip_velocity(w.now, p.frictions[e]).norm();
-    return slip < slip_at_start_[e] && slip <= parameters.arrived_speed * (1.0 + speed);
+    if (!(slip < slip_at_start_[e])) return false;
+    if (!stepper_.method.adaptive()) return slip <= parameters.arrived_speed * scale;
+    if (w.state.is_sticking_deferred[e] || slip_at_start_[e] > min_directed_speed * scale) return false;
+    norm_.set_tolerances(stepper_.y0, stepper_.y1, stepper_.h);
+    return norm_.of_speed(slip_at_start_[e]) <= 1.0;
 }
 
 // Move the step's end to `size`, or repeat the step if the move is too long.

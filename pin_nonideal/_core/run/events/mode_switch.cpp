@@ -116,7 +116,8 @@ bool ModeChanges::is_of_closed_contacts(const Failure& failure) {
 }
 
 bool ModeChanges::is_of_contradicting_contacts(const Failure& failure) const {
-    return failure.kind == Failure::Kind::inconsistent && failure.value > 0.0 &&
+    // The residual of rows has either sign, and the failure of an impact has none.
+    return failure.kind == Failure::Kind::inconsistent && failure.value != 0.0 &&
            std::all_of(failure.elements.begin(), failure.elements.end(), [&](int block) { return block >= p.first_gap; });
 }
 
@@ -131,8 +132,9 @@ bool ModeChanges::bridge_with_time_stepping(const Failure& failure, bool of_hand
         chatter_.bridge_stretch(element, options_.end());
         const auto again = attempt([&] { select_new_modes(); });
         if (!again) return true;
-        // The solver fails again a little later.
-        if (system_.ng == 0 || !is_of_modes(*again) || !is_recoverable(*again)) throw *again;
+        // The solver fails again a little later, or the contacts still contradict each other.
+        const bool goes_on = (is_of_modes(*again) && is_recoverable(*again)) || is_of_contradicting_contacts(*again);
+        if (system_.ng == 0 || !goes_on) throw *again;
         if (progress_.t >= options_.end()) return true;
     }
 }

@@ -91,26 +91,42 @@ bool ContactProjection::is_projected(const Program& p, Workspace& w, const VecX&
            !blocks_.has_slow_tree(v, immobile_speed);
 }
 
-// Move q until the gaps are closed. Bodies that turn keep their momentum. Return true if q moves.
+// Move q until the gaps are closed. Bodies that turn keep their momentum. Return true if q moves. If rows turn so far
+// that the largest gap widens, q ends where it was least.
 bool ContactProjection::close_gaps(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
     const double floor = projection_floor * scene_size(p, w);
-    double last = HUGE_VAL;
-    bool moves = false;
-    for (int k = 0; k < parameters.max_moves; ++k) {
-        const double largest = measure_gaps(p, w);
-        if (k > parameters.sure_moves && largest > parameters.stall_ratio * last) break;
+    const auto place = [&] {
+        place_bodies(p.mechanism, w.now.terms, q);
+        for (int i : w.now.closed_gaps) measure_gap(p, w, t, v, i);
+        for (const Open& open : penetrating_) measure_gap(p, w, t, v, open.gap);
+    };
+    const double before = measure_gaps(p, w);
+    double last = HUGE_VAL, least = HUGE_VAL, largest = before;
+    int moves = 0, best = 0;
+    while (true) {
+        if (largest < least) {
+            least = largest;
+            best = moves;
+            q_best_ = q;
+            v_best_ = v;
+        }
+        if (moves == parameters.max_moves) break;
+        if (moves > parameters.sure_moves && largest > parameters.stall_ratio * last) break;
         last = largest;
         if (!least_.find(r_, floor, move_)) break;
         hold_locked(p, w, move_);
         q_from_ = q;
         retract(p.mechanism, q_from_.data(), move_.data(), q.data());
         for (const auto& flyer : flyers_) flyer.turn_axes(v, move_.segment<3>(flyer.dof + 3));
-        place_bodies(p.mechanism, w.now.terms, q);
-        for (int i : w.now.closed_gaps) measure_gap(p, w, t, v, i);
-        for (const Open& open : penetrating_) measure_gap(p, w, t, v, open.gap);
-        moves = true;
+        place();
+        largest = measure_gaps(p, w);
+        ++moves;
     }
-    return moves;
+    if (!(largest > before)) return moves > 0;
+    q = q_best_;
+    v = v_best_;
+    place();
+    return best > 0;
 }
 
 // Check if a closed contact is left open or penetrates.

@@ -56,7 +56,7 @@ private:
     std::vector<StepRow> rows_;
     std::vector<ConeElement> elements_;
     std::vector<int> gap_;  // by row: gap whose residual it closes, -1 for sliding
-    VecX r_, move_, q_from_;
+    VecX r_, move_, q_from_, q_best_, v_best_;
     std::vector<char> closed_;
     struct Open {
         int gap;
