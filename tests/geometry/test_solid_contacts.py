@@ -14,7 +14,8 @@ from pin_nonideal.geometry.manifold import DEFAULT_ROUNDING
 from ..support.contact_points import closed_points, point_loads
 from ..support.mechanisms import GRAVITY, body, empty, frame
 from ..support.same_run import assert_same_run
-from .test_geometry_pairs import by_coal, cloud, convex
+from .test_cylinder_pairs import distance
+from .test_geometry_pairs import cloud, convex
 
 DEPTH = 1e-10  # maximum penetration [m]
 # Corners of a box of edges 1, in an order that is not that of the package's own boxes.
@@ -208,7 +209,7 @@ def test_thrown_bodies_do_not_enter(kind, seeds):
         assert np.isfinite(run.q).all()
         struck += any(event.kind == "impact" for event in run.events)
         world = pin.SE3.Identity()
-        depths = [by_coal(first, pin.XYZQUATToSE3(q), second, world)[0] for q in run.q]
+        depths = [distance(first, pin.XYZQUATToSE3(q), second, world) for q in run.q]
         assert min(depths) > 2.0 * edge - DEPTH
         if seed == 0:
             assert_same_run(run, pn.simulate(scene, 0.5, output_dt=0.002, max_steps=20000, **start))
@@ -233,7 +234,7 @@ def test_a_corner_lands_beside_one_that_slides():
     run = pn.simulate(scene, 0.25, output_dt=1e-4, **start)
     assert closed_points(run).shape[1] > 1
     assert sum(event.kind == "impact" for event in run.events) > 1
-    depths = [by_coal(first, pin.XYZQUATToSE3(q), second, pin.SE3.Identity())[0] for q in run.q]
+    depths = [distance(first, pin.XYZQUATToSE3(q), second, pin.SE3.Identity()) for q in run.q]
     assert min(depths) > 2.0 * edge - DEPTH
 
 
