@@ -25,6 +25,7 @@ FLOOR, RATIOS = 1e-8, {"rk4": 8.0, "semi_implicit_euler": 1.6, "moreau": 2.5}
 DRIVEN = [pytest.param(each, marks=[pytest.mark.slow] * (k % 4 > 0)) for k, each in enumerate(FAMILIES)]
 # Factors of rows in Python: the first family takes them by default, the others with -m slow.
 FACTORS = (1e3, 1e-3)
+BETWEEN = 10  # poses in each interval of samples at which a loop is apart: a fast loop turns by 90 degrees in one
 # Least rate of the driven hinge along the unit vector of all rates.
 TURNS = 0.2
 
@@ -33,14 +34,16 @@ class Case:
     """A loop that stays apart from poses of a second freedom, and its motion at the given times."""
 
     def __init__(self, family: Callable[..., Any], seed: int, damping: float = 0.0) -> None:
-        self.times = np.linspace(0.0, DURATION, 16)
+        between = np.linspace(0.0, DURATION, 15 * BETWEEN + 1)
+        self.times = between[::BETWEEN]
         for further in range(100):
             self.loop = hinge_loops.drawn(family, 1000 * seed + further)
             self.damping = damping * self.loop.length**2
             still = np.zeros(self.loop.count)
             self.v0 = self.loop.velocity(still, SPEED)
-            self.q, self.v = self.loop.motion(still, self.v0, self.times, self.damping)
-            if min(self.loop.margin(q) for q in self.q) > APART:
+            q, v = self.loop.motion(still, self.v0, between, self.damping)
+            if min(self.loop.margin(each) for each in q) > APART:
+                self.q, self.v = q[::BETWEEN], v[::BETWEEN]
                 return
         raise AssertionError("no regular loop")
 
