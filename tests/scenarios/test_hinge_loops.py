@@ -25,7 +25,7 @@ FLOOR, RATIOS = 1e-8, {"rk4": 8.0, "semi_implicit_euler": 1.6, "moreau": 2.5}
 DRIVEN = [pytest.param(each, marks=[pytest.mark.slow] * (k % 4 > 0)) for k, each in enumerate(FAMILIES)]
 # Factors of rows in Python: the first family takes them by default, the others with -m slow.
 FACTORS = (1e3, 1e-3)
-BETWEEN = 10  # poses in each interval of samples at which a loop is apart: a fast loop turns by 90 degrees in one
+BETWEEN = 10  # poses in each interval of samples at which a loop is apart: fast hinges turn by half a radian
 # Least rate of the driven hinge along the unit vector of all rates.
 TURNS = 0.2
 
