@@ -22,6 +22,8 @@ from .residual import AtRest, Balance, weight
 DIFFERENCE_STEP = 6e-6
 # Longest step [units, see `AtRest.units`], shortest step, and maximum number of steps.
 MAX_STEP, MIN_STEP, MAX_STEPS = 0.5, 1e-13, 300
+# Longest step if all coordinates are slides, whose unit may be any unit of length.
+MAX_SLIDE = 1e9
 CLOSINGS = 20  # maximum number of iterations to the configuration at which a contact closes
 # Newton step at which an equilibrium is found [units].
 CONVERGED_STEP = 1e-9
@@ -135,6 +137,7 @@ class _Search:
         self.least = np.inf
         self.nearest = np.array(rest.scene.q0)
         self.unit = np.ones(rest.scene.model.nv)  # unit displacement of each coordinate
+        self.longest = MAX_SLIDE if rest.only_slides else MAX_STEP
 
     def elsewhere(self, start: Array, k: int) -> Array | None:
         """Return the k-th start, with a spread that grows with k; deterministic."""
@@ -164,7 +167,7 @@ class _Search:
                 q, now = next_state
                 if self.rest.touch(q):
                     now = self.rest.balance(q)
-                longest = min(MAX_STEP, 2.0 * max(longest, scale * size))
+                longest = min(self.longest, 2.0 * max(longest, scale * size))
             elif (longest := min(longest, scale * size) / 4.0) < MIN_STEP:
                 break
         return None

@@ -61,6 +61,7 @@ class AtRest:
         gaps: mask of rows of unilateral contacts, (m,).
         touching: gap up to which a contact touches [m].
         open: mask of rows of open contacts, which exert no force, (m,).
+        only_slides: whether all coordinates are lengths.
     """
 
     def __init__(self, scene: Scene, tau: Array | None, t: float, q: Array) -> None:
@@ -69,6 +70,7 @@ class AtRest:
         self.runner = self.program.runner()
         self.still = np.zeros(scene.model.nv)
         self._slides = slides(scene.model)
+        self.only_slides = bool(self._slides.all())
         self._smooth = [core.Mode.unloaded] * len(self.program.element_sizes)
         self.gaps = gap_rows(self.program)
         self.touching = TOUCHING_GAP * max(1.0, compiled_scene(scene).projection.length)

@@ -96,6 +96,19 @@ def test_a_spring_carries_a_weight():
     assert neutral.stable is None
 
 
+@pytest.mark.parametrize("unit", [1e-3, 1.0, 1e4])
+def test_a_slide_finds_its_spring_in_any_unit(unit):
+    """The spring balances the weight 1.9 m from the start, also where a meter is ten thousand units."""
+    model = pin.Model()
+    model.gravity.linear = np.array([0.0, 0.0, -G * unit])
+    joint = model.addJoint(0, pin.JointModelPZ(), pin.SE3.Identity(), "slide")
+    model.appendBodyToJoint(joint, pin.Inertia(2.0, np.zeros(3), np.eye(3)), pin.SE3.Identity())
+    spring = pn.JointSpring("slide", stiffness=50.0, rest=1.9 * unit + 2.0 * G * unit / 50.0)
+    found = pn.equilibrium(pn.Scene(model, forces=[spring]), starts=1)
+    assert found.q[0] == pytest.approx(1.9 * unit, rel=1e-9)
+    assert found.stable is True
+
+
 def test_what_falls_has_no_rest():
     model = pin.Model()
     model.addJoint(0, pin.JointModelPZ(), pin.SE3.Identity(), "fall")
