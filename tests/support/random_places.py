@@ -14,6 +14,7 @@ from .random_trees import attach, place_of, tree
 SINGLE = ("revolute x", "revolute unaligned", "prismatic y", "helical z", "endless z")
 SEVERAL = ("universal", "planar", "translation", "spherical", "free flyer")
 WIDE = 0.07  # radius for rotations [m]
+MOVES = 1e-9  # least speed, if all coordinates begin with 1 rad/s or 1 m/s
 
 
 @dataclass
@@ -36,8 +37,16 @@ class Places:
 
 
 def places(seed):
-    """Return the mechanism of a seed."""
-    rng = np.random.default_rng(seed)
+    """Return the mechanism of a seed: the first one of its draws that can move."""
+    for further in range(100):
+        made = _drawn(seed, np.random.default_rng([seed, further] if further else seed))
+        if np.abs(made.scene.project(made.q, np.ones_like(made.v))[1]).max() > MOVES:
+            return made
+    raise AssertionError("no mechanism with a freedom")
+
+
+def _drawn(seed, rng):
+    """Return a mechanism, whose constraints may leave no freedom."""
     closed = bool(rng.random() < 0.4)
     kinds = [*rng.choice(SINGLE, rng.integers(2, 4)), *rng.choice(SEVERAL[:-1], rng.integers(1, 3))]
     rng.shuffle(kinds)
