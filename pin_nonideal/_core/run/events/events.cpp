@@ -1,7 +1,6 @@
 #include "run/events/events.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "contact/active_set.hpp"
 #include "contact/impact.hpp"
@@ -14,7 +13,6 @@
 #include "friction/stick_slip.hpp"
 #include "math/tolerances.hpp"
 #include "run/events/unloaded_contacts.hpp"
-#include "tree/terms.hpp"
 
 namespace pn {
 
@@ -149,21 +147,6 @@ void rest(System& system, double t) {
     begin_step(system.p, system.w, t, system.q, system.v);
 }
 
-// Refuse closed contacts whose projection takes motion away. Contacts at rest have rates of rounding. Only rows that
-// depend on each other at this position alone turn it into motion, as those of a contact that opens at a hand-over.
-void refuse_lost_motion(const System& system, double t, const VecX& v) {
-    const Program& p = system.p;
-    Workspace& w = system.w;
-    if (w.state.sticks_anywhere()) return;  // restore_motion keeps their motion
-    const double before = kinetic_energy(p.mechanism, w.now.terms, v);
-    const VecX lost = v - system.v;
-    const double taken = kinetic_energy(p.mechanism, w.now.terms, lost);
-    if (!(taken > step_start_parameters.max_removed_energy_part * before)) return;
-    std::vector<int> blocks;
-    for (int gap : w.now.closed_gaps) blocks.push_back(p.gaps[gap].block);
-    throw Failure(Failure::Kind::inconsistent, t, blocks, std::sqrt(taken / before));
-}
-
 // Select the active set of the resting contacts, and the stick-slip modes with it.
 void close_and_find(System& system, double t, bool starts, FrictionSwitch& friction) {
     const Program& p = system.p;
@@ -182,7 +165,7 @@ void close_and_find(System& system, double t, bool starts, FrictionSwitch& frict
         system.v = v;
         update_kinematics(p, system.w, t, q, v);
         friction.find(joint_motion);
-        if (!landing) refuse_lost_motion(system, t, v);
+        if (!landing) refuse_lost_motion(p, system.w, t, v, system.v);
         if (landing && !p.moves_in_time && system.v.cwiseAbs().maxCoeff() <= rest_speed) rest(system, t);
     });
 }
