@@ -103,19 +103,19 @@ class ConeProgram:
         """
         low, high, factor = 0.0, math.inf, 0.0
         for _ in range(MAX_STEPS):
-            excess = self.least_excess(factor)
+            excess, root = self.least_excess(factor), math.inf
             if excess.value <= EXCESS_TOL:
-                high, root = factor, math.nan
+                high = factor
             elif factor >= MAX_FACTOR:
                 return math.inf
             else:
-                low, root = factor, math.inf
+                low = factor
                 if excess.slope < 0.0:
                     root = factor - excess.value / excess.slope
             end = min(root, high)
             if end - low <= FACTOR_TOL * (1.0 + end) or abs(root - high) <= FACTOR_TOL * (1.0 + end):
                 return end
-            if low < root < high:
+            if root < high:
                 factor = min(root, MAX_FACTOR)
             else:
                 factor = 0.5 * (low + high) if high < math.inf else MAX_FACTOR

@@ -112,7 +112,7 @@ def test_a_motion_opens_a_contact_and_never_enters_it():
 
 @pytest.mark.parametrize("yaw", [0.0, 0.3])
 @pytest.mark.parametrize("tilt", [0.0, 0.1, 0.4])
-@pytest.mark.parametrize("count", [1, 2, 4])
+@pytest.mark.parametrize("count", [1, 3])
 @pytest.mark.parametrize("shape", [coal.Box(0.2, 0.2, 0.1), coal.Cylinder(0.1, 0.1)], ids=["box", "cylinder"])
 def test_the_margin_of_a_stack_is_that_of_its_slope(shape, count, tilt, yaw):
     model, shapes = pin.Model(), pin.GeometryModel()
