@@ -168,17 +168,6 @@ void begin_rows_inside(const Program& p, Workspace& w, double t0, const VecX& q0
     if (w.now.rows.orthogonal) choose_rows_anew(p, w, static_cast<int>(rank));
 }
 
-void refuse_lost_motion(const Program& p, Workspace& w, double t, const VecX& v, const VecX& projected) {
-    if (w.state.sticks_anywhere()) return;  // restore_motion keeps their motion
-    const VecX lost = v - projected;
-    const double removed = kinetic_energy(p.mechanism, w.now.terms, lost);
-    const double part = removed / kinetic_energy(p.mechanism, w.now.terms, v);
-    if (!(part > step_start_parameters.max_removed_energy_part)) return;
-    std::vector<int> blocks;
-    for (int gap : w.now.closed_gaps) blocks.push_back(p.gaps[gap].block);
-    throw Failure(Failure::Kind::inconsistent, t, blocks, std::sqrt(part));
-}
-
 void project_into_modes(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
     begin_rows(p, w, t, q, v);
     project(p, w, t, q, v);

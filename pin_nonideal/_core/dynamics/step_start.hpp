@@ -38,9 +38,6 @@ bool begin_step_on_rates(const Program& p, Workspace& w, double t, VecX& v, bool
 // Keep bodies moving after a change of modes. If newly chosen rows would stop the motion, rows that sticking elements
 // hold with negligible forces count as dependent from now on. The workspace is evaluated at (q, v) before and after.
 void restore_motion(const Program& p, Workspace& w, double t, const VecX& v);
-// Refuse closed contacts whose projection of a velocity v removes motion. Contacts at rest have rates of rounding, which
-// only rows that depend on each other at this position alone turn into motion, as a contact that opens at a hand-over.
-void refuse_lost_motion(const Program& p, Workspace& w, double t, const VecX& v, const VecX& projected);
 // Project a state onto the rows of newly set modes, with independent rows at this state.
 void project_into_modes(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
 

@@ -165,7 +165,6 @@ void close_and_find(System& system, double t, bool starts, FrictionSwitch& frict
         system.v = v;
         update_kinematics(p, system.w, t, q, v);
         friction.find(joint_motion);
-        if (!landing) refuse_lost_motion(p, system.w, t, v, system.v);
         if (landing && !p.moves_in_time && system.v.cwiseAbs().maxCoeff() <= rest_speed) rest(system, t);
     });
 }
