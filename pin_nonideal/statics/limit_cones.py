@@ -106,9 +106,8 @@ class LimitCones:
             Row and coefficient of each element, row -1 without such a row, and constant limits [N or N m],
             (ne,).
         """
-        laws = len(
-            at_rest.scene.laws
-        )  # laws of joints come before the friction of contacts and rolling bodies
+        # Laws of joints come before the friction of contacts and rolling bodies.
+        laws = len(at_rest.scene.laws)
         elements = [
             (row if law >= laws else -1, coefficient, constant)
             for law, (row, coefficient, constant) in zip(

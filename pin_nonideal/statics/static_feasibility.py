@@ -91,6 +91,7 @@ def rest(scene: Scene, q: State | None = None, tau: State | None = None, *, t: f
 
     Raises:
         InputError: an argument does not fit.
+        FrictionConvergenceError: the solver found neither forces nor a proof that there are none.
     """
     require_scene("rest", scene)
     still = np.zeros(scene.model.nv)
