@@ -19,6 +19,7 @@ static void size(const Program& p, RunState& state) {
     state.held_torque = VecX::Zero(p.mechanism.nv);
     state.unknown = VecX::Zero(p.unknowns());
     if (!p.gaps.empty() || !p.frictions.empty()) state.percussion = VecX::Zero(p.layout.rows);
+    for (VecX& rate : state.last_rates.rate) rate = VecX::Zero(p.mechanism.nv);
     state.third_order_lam = VecX::Zero(p.layout.rows);
 }
 

@@ -36,6 +36,13 @@ struct Counters {
 enum class Uniqueness : signed char { shown, not_shown, several };
 constexpr int undecided_steps = 1 << 30;
 
+// Rates of the velocity in the last steps of time stepping, latest first.
+struct VelocityRates {
+    static constexpr int most = 3;
+    VecX rate[most];
+    int count = 0;  // known rates
+};
+
 // Data that the next step needs from earlier steps, besides the state (q, v) and the choice of independent rows.
 struct RunState {
     Modes mode;
@@ -52,6 +59,7 @@ struct RunState {
     VecX unknown;                 // last solution of the implicit reaction equation, by element and law (warm start)
     bool warm = false;             // true if `unknown` is an initial guess for the next solution
     VecX percussion;  // impulses of contacts and friction in the last time step, by row and divided by its length
+    VelocityRates last_rates;
     VecX third_order_lam;         // third-order multipliers of the step, divided by its cubed length
     bool has_ideal_row_choice = false;   // rows that are independent without sticking elements are chosen for this step
     Uniqueness unique = Uniqueness::shown;  // uniqueness of the motion in these modes, as last decided

@@ -20,15 +20,35 @@ std::vector<MeanVelocity::FreeFlyer> MeanVelocity::flyers(const Program& p) {
 }
 
 MeanVelocity::MeanVelocity(const Program& p)
-    : flyers_(flyers(p)), unit_(p.mechanism.unit), turning_(VecX::Zero(p.mechanism.nv)) {}
+    : flyers_(flyers(p)), unit_(p.mechanism.unit), turning_(VecX::Zero(p.mechanism.nv)),
+      tolerance_(p.gaps.empty() ? parameters.configuration_tolerance : parameters.contact_tolerance) {}
 
-void MeanVelocity::begin(double h, const VecX& v0) {
+void MeanVelocity::begin(double h, const VecX& v0, const VelocityRates& last) {
     h_ = h;
     start_ = v0;
     for (const FreeFlyer& flyer : flyers_) flyer.turn_axes(start_, 0.5 * h * v0.segment<3>(flyer.dof + 3));
     value_ = start_;
+    predict(last);
     moves_ = 0;
     measure();
+}
+
+// Predict the mean velocity. Dofs at rest stay at rest.
+void MeanVelocity::predict(const VelocityRates& last) {
+    is_predicted_ = false;
+    if (last.count < 2) return;
+    const auto& [a, b, c] = last.rate;
+    const double none = size(a), constant = size(a - b), linear = last.count > 2 ? size(a - 2.0 * b + c) : HUGE_VAL;
+    if (!(std::min(constant, linear) < parameters.max_unpredicted * none)) return;
+    is_predicted_ = true;
+    for (int k = 0; k < start_.size(); ++k)
+        if (start_[k] != 0.0) value_[k] += 0.5 * h_ * (linear < constant ? 2.0 * a[k] - b[k] : a[k]);
+}
+
+void MeanVelocity::keep_rate(VelocityRates& last) const {
+    for (int k = VelocityRates::most - 1; k > 0; --k) last.rate[k].swap(last.rate[k - 1]);
+    last.rate[0] = (end_ - start_) / h_;
+    last.count = std::min(last.count + 1, VelocityRates::most);
 }
 
 void MeanVelocity::measure() {
@@ -47,10 +67,8 @@ void MeanVelocity::end(const VecX& a, VecX& v1) {
 
 bool MeanVelocity::move() {
     next_ = 0.5 * (start_ + end_);
-    double change = 0.0;
-    for (int k = 0; k < next_.size(); ++k) change = std::max(change, std::abs(next_[k] - value_[k]) / unit_[k]);
-    const double allowed = moves_ == 0 ? parameters.configuration_rounding : parameters.configuration_tolerance;
-    if (moves_ == parameters.max_sweeps || h_ * change <= allowed) return false;
+    const double allowed = moves_ == 0 && !is_predicted_ ? parameters.configuration_rounding : tolerance_;
+    if (moves_ == parameters.max_sweeps || h_ * size(next_ - value_) <= allowed) return false;
     value_ = next_;
     ++moves_;
     measure();
@@ -60,7 +78,7 @@ bool MeanVelocity::move() {
 void MeanVelocity::start_rates(const Program& p, Workspace& w, int i) const {
     const Block& block = p.blocks[i];
     const RowValues& values = w.now.values[i];
-    const bool differs = moves_ > 0 || !flyers_.empty();
+    const bool differs = moves_ > 0 || is_predicted_ || !flyers_.empty();
     if (differs) multiply(block, w.now.A, start_difference_, w.scratch.r);
     for (size_t k = 0; k < block.kept.size(); ++k) {
         double& rate = w.scratch.r[block.row + k];

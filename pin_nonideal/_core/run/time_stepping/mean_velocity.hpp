@@ -10,14 +10,17 @@ namespace pn {
 struct MeanVelocityParameters {
     // Change of the configuration in a step that counts as rounding [rad, or radius of the tree].
     double configuration_rounding = 1e-13;
-    // Change by a further sweep below which no sweep follows. The second sweep makes the step second order. Fast motion
-    // needs more sweeps to conserve its energy.
-    double configuration_tolerance = 1e-9;
-    int max_sweeps = 4;  // maximum number of sweeps of a step
+    // Change by a further sweep below which no sweep follows. Rounding decides if a change is just above or just below
+    // it. The velocity at the step's end then differs by a small part of tolerance / h. Sweeps of contacts cost more.
+    double configuration_tolerance = 1e-12, contact_tolerance = 1e-9;
+    int max_sweeps = 6;  // maximum number of sweeps of a step
+    // Maximum error of a prediction of the last rate, relative to this rate, for the next rate to be predicted.
+    double max_unpredicted = 0.1;
 };
 
-// The mean of the velocities at the start and at the end of a step depends on the forces. Sweeps find it: the first one
-// takes the forces at the velocity of the start.
+// The mean of the velocities at the start and at the end of a step depends on the forces. Sweeps find it. The first one
+// takes the forces at a prediction by the rates of the last steps: constant, linear or none, as would have predicted the
+// last step best.
 //
 // The linear velocity v of a free flyer is given in axes that turn with it. Inside a step it is given in the axes at the
 // middle of the step, so that the velocity u = v + w x c of its center of mass c keeps its direction in space. Its rate
@@ -37,13 +40,16 @@ public:
 
     explicit MeanVelocity(const Program& p);
 
-    // Begin a step of length h at the velocity v0.
-    void begin(double h, const VecX& v0);
+    // Begin a step of length h at the velocity v0, after steps with these rates.
+    void begin(double h, const VecX& v0, const VelocityRates& last);
+    // Add the rate of this step.
+    void keep_rate(VelocityRates& last) const;
     // Compute the velocity at the step's end for the acceleration a.
     void end(const VecX& a, VecX& v1);
     // Move the mean to that of the step's start and end for another sweep. Return false if no further sweep is needed.
     bool move();
 
+    bool is_predicted() const { return is_predicted_; }  // the first sweep is at another velocity than the start
     const VecX& value() const { return value_; }  // velocity at which the forces are taken
     const VecX& start() const { return start_; }  // velocity of the start, in the axes at the middle of the step
     const VecX& finish() const { return end_; }   // velocity of the end, in these axes
@@ -58,6 +64,10 @@ public:
 
 private:
     void measure();
+    void predict(const VelocityRates& last);
+    // Largest entry, in units of its dof.
+    template <class X>
+    double size(const X& x) const { return x.cwiseQuotient(unit_).cwiseAbs().maxCoeff(); }
 
     std::vector<FreeFlyer> flyers_;
     VecX unit_;  // by dof
@@ -65,7 +75,9 @@ private:
     VecX value_, start_, end_, next_;
     VecX turning_;  // rates of the linear velocities by turning axes
     VecX start_difference_;     // velocity of the start minus mean, plus h/2 of these rates
+    double tolerance_;
     int moves_ = 0;  // sweeps after the first one
+    bool is_predicted_ = false;
 };
 
 }  // namespace pn

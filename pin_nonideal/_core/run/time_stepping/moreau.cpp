@@ -46,11 +46,12 @@ void Moreau::step(double t, double h, VecX& y, double& numerical_energy) {
     t0_ = t;
     q0_ = y.head(system_.nq);
     set_modes(p, w, unloaded_);
-    mean_.begin(h, v0_);
+    mean_.begin(h, v0_, w.state.last_rates);
     system_.read(y);
     JointDrives::Step drives(drives_, p, w, t, h, system_.q, v0_);
     sweep(middle, drives, true);
     while (mean_.move()) sweep(middle, drives, p.has_user_rows);
+    mean_.keep_rate(w.state.last_rates);
     flight_.move(p, w, h, y.data(), v0_, mean_.value(), v1_);
     if (system_.energy) {
         numerical_energy += drives.energy(mean_.start(), mean_.finish());

@@ -71,11 +71,12 @@ void MoreauContacts::step(double t, double h, VecX& y, double& numerical_energy,
     t0_ = t;
     q0_ = y.head(system_.nq);
     select(open_, unloaded_, true);
-    mean_.begin(h, v0_);
+    mean_.begin(h, v0_, w.state.last_rates);
     system_.read(y);
     JointDrives::Step drives(drives_, p, w, t, h, system_.q, v0_);
     sweep(middle, drives, true);
     while (mean_.move() && correct(middle, drives)) {}
+    mean_.keep_rate(w.state.last_rates);
     flight_.begin();
     for (const StepRow& row : elements_.rows) flight_.touch(p.blocks[row.block]);
     flight_.move(p, w, h, y.data(), v0_, mean_.value(), v1_);
@@ -108,12 +109,8 @@ void MoreauContacts::sweep(double t, JointDrives::Step& drives, bool first) {
     if (first || p.has_user_rows) begin_rows_inside(p, w, t0_, q0_, t, q_mid_, mean_.value());
     drives.move(mean_.start(), mean_.value());
     solve_free(t);
-    if (first) {
-        find_touching(t);
-        elements_.gather(p, w, touching_, was_closed_, modes_, v0_);
-    } else {
-        move_touching(t);
-    }
+    if (first) gather(t);
+    else move_touching(t);
     forces_.pose(mean_, h_, a_free_, first || p.has_user_rows);
     solve(t);
     end_velocity();
@@ -126,7 +123,7 @@ bool MoreauContacts::correct(double t, JointDrives::Step& drives) {
     const bool found = !attempt({Failure::Kind::not_converged}, [&] { sweep(t, drives, false); });
     if (found && (relaxed_before || forces_.law_miss().block < 0)) return true;
     if (!relaxed_before) forces_.clear_miss();
-    mean_.begin(h_, v0_);
+    mean_.begin(h_, v0_, w.state.last_rates);
     sweep(t, drives, false);
     return false;
 }
@@ -163,12 +160,22 @@ const VecX& MoreauContacts::path_since_last() {
     return force_;
 }
 
+// Collect the elements that take part, with the rates at the step's start, and evaluate them at the mean velocity.
+void MoreauContacts::gather(double t) {
+    if (mean_.is_predicted()) move_bodies(p.mechanism, w.now.terms, mean_.start());
+    find_touching(t);
+    elements_.gather(p, w, touching_, was_closed_, modes_, v0_);
+    if (!mean_.is_predicted()) return;
+    move_bodies(p.mechanism, w.now.terms, mean_.value());
+    if (!touching_.empty()) move_touching(t);
+}
+
 // Find the contacts whose gap is closed at the step's middle, and contacts that were closed before. Their loads decide
 // if they stay closed.
 void MoreauContacts::find_touching(double t) {
     touching_.clear();
     for (int i : watch_.advance(path_since_last())) {
-        measure_gap(p, w, t, mean_.value(), i);
+        measure_gap(p, w, t, mean_.start(), i);
         const double width = gap_width(p, w, i);
         const bool touches = was_closed_[i] || (width <= 0.0 && has_known_direction(i, width));
         if (touches) touching_.push_back(i);
@@ -176,8 +183,8 @@ void MoreauContacts::find_touching(double t) {
     }
     watch_.skip_wide();
     for (int i : touching_) {
-        evaluate_block(p, w, t, mean_.value(), p.gaps[i].block);
-        for (int e : p.gaps[i].elements) evaluate_block(p, w, t, mean_.value(), p.frictions[e].block);
+        evaluate_block(p, w, t, mean_.start(), p.gaps[i].block);
+        for (int e : p.gaps[i].elements) evaluate_block(p, w, t, mean_.start(), p.frictions[e].block);
     }
     if (touching_.size() > 1)
         remove_coincident(p, w, touching_, [&](int i, int other) { return was_closed_[i] && !was_closed_[other]; });

@@ -57,6 +57,7 @@ private:
     bool correct(double t, JointDrives::Step& drives);
     void solve_free(double t);
     const VecX& path_since_last();
+    void gather(double t);
     void find_touching(double t);
     void move_touching(double t);
     bool rest_within_limits(double t);
