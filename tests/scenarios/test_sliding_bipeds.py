@@ -60,10 +60,13 @@ def test_slides_on(mu, v0):
 
 
 def test_straight_legs_go_on_by_time_stepping():
-    """There the rows of the feet lose their rank, and the loads beside it are as large as one likes."""
+    """There the rows of the feet lose their rank, and the loads beside it are as large as one likes.
+
+    Steps of 1 ms are too long for these loads: the impacts that follow differ.
+    """
     scene = biped(0.1, (1.0, 0.5, 0.0), 0.0)
     run = pn.simulate(scene, 0.5)
     assert any(event.kind == "chatter" for event in run.events)
-    steps = pn.simulate(scene, 0.5, method="moreau", dt=1e-3)
-    np.testing.assert_allclose(run.q[-1], steps.q[-1], atol=1e-3)
-    np.testing.assert_allclose(run.v[-1], steps.v[-1], atol=1e-3)
+    steps = pn.simulate(scene, 0.5, method="moreau", dt=5e-4)
+    np.testing.assert_allclose(run.q[-1], steps.q[-1], atol=1e-4)
+    np.testing.assert_allclose(run.v[-1], steps.v[-1], atol=2e-4)

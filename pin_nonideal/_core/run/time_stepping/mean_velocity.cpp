@@ -29,6 +29,12 @@ void MeanVelocity::begin(double h, const VecX& v0, const VelocityRates& last) {
     for (const FreeFlyer& flyer : flyers_) flyer.turn_axes(start_, 0.5 * h * v0.segment<3>(flyer.dof + 3));
     value_ = start_;
     predict(last);
+    first_ = value_;
+    restart();
+}
+
+void MeanVelocity::restart() {
+    value_ = first_;
     moves_ = 0;
     measure();
 }

@@ -42,6 +42,8 @@ public:
 
     // Begin a step of length h at the velocity v0, after steps with these rates.
     void begin(double h, const VecX& v0, const VelocityRates& last);
+    // Return to the mean of the first sweep.
+    void restart();
     // Add the rate of this step.
     void keep_rate(VelocityRates& last) const;
     // Compute the velocity at the step's end for the acceleration a.
@@ -72,7 +74,7 @@ private:
     std::vector<FreeFlyer> flyers_;
     VecX unit_;  // by dof
     double h_ = 0.0;
-    VecX value_, start_, end_, next_;
+    VecX value_, first_, start_, end_, next_;
     VecX turning_;  // rates of the linear velocities by turning axes
     VecX start_difference_;     // velocity of the start minus mean, plus h/2 of these rates
     double tolerance_;

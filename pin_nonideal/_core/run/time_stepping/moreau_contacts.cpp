@@ -66,6 +66,7 @@ void MoreauContacts::step(double t, double h, VecX& y, double& numerical_energy,
     forces_.clear_miss();
     if (watch_.gaps.current || q_sampled_.size() == 0) {
         q_sampled_ = y.head(system_.nq);
+        has_unknown_percussions_ = true;
         watch_.begin_time_steps(parameters.width_rounding * scene_size(p, w));
     }
     t0_ = t;
@@ -74,7 +75,7 @@ void MoreauContacts::step(double t, double h, VecX& y, double& numerical_energy,
     mean_.begin(h, v0_, w.state.last_rates);
     system_.read(y);
     JointDrives::Step drives(drives_, p, w, t, h, system_.q, v0_);
-    sweep(middle, drives, true);
+    begin_sweeps(middle, drives);
     while (mean_.move() && correct(middle, drives)) {}
     mean_.keep_rate(w.state.last_rates);
     flight_.begin();
@@ -104,13 +105,24 @@ bool MoreauContacts::project(double t, VecX& y, double& numerical_energy) {
     return true;
 }
 
+// Solve the step with the forces at the predicted mean velocity. If no motion is found, or only a relaxed one, solve it at
+// the velocity of the start.
+void MoreauContacts::begin_sweeps(double t, JointDrives::Step& drives) {
+    const auto failure = attempt({Failure::Kind::not_converged}, [&] { sweep(t, drives, true); });
+    if (failure && !mean_.is_predicted()) throw *failure;
+    if (!mean_.is_predicted() || (!failure && forces_.law_miss().block < 0)) return;
+    forces_.clear_miss();
+    mean_.begin(h_, v0_, VelocityRates());
+    sweep(t, drives, false);
+}
+
 // Solve the step with the forces at the mean velocity found so far.
 void MoreauContacts::sweep(double t, JointDrives::Step& drives, bool first) {
     if (first || p.has_user_rows) begin_rows_inside(p, w, t0_, q0_, t, q_mid_, mean_.value());
+    if (first) gather(t);
     drives.move(mean_.start(), mean_.value());
     solve_free(t);
-    if (first) gather(t);
-    else move_touching(t);
+    if (!first || mean_.is_predicted()) move_touching(t);
     forces_.pose(mean_, h_, a_free_, first || p.has_user_rows);
     solve(t);
     end_velocity();
@@ -123,7 +135,7 @@ bool MoreauContacts::correct(double t, JointDrives::Step& drives) {
     const bool found = !attempt({Failure::Kind::not_converged}, [&] { sweep(t, drives, false); });
     if (found && (relaxed_before || forces_.law_miss().block < 0)) return true;
     if (!relaxed_before) forces_.clear_miss();
-    mean_.begin(h_, v0_, w.state.last_rates);
+    mean_.restart();
     sweep(t, drives, false);
     return false;
 }
@@ -160,26 +172,25 @@ const VecX& MoreauContacts::path_since_last() {
     return force_;
 }
 
-// Collect the elements that take part, with the rates at the step's start, and evaluate them at the mean velocity.
+// Collect the elements that take part, with the rates at the step's start. A velocity after a strike is not predicted.
 void MoreauContacts::gather(double t) {
-    if (mean_.is_predicted()) move_bodies(p.mechanism, w.now.terms, mean_.start());
+    move_bodies(p.mechanism, w.now.terms, mean_.start());
     find_touching(t);
     elements_.gather(p, w, touching_, was_closed_, modes_, v0_);
-    if (!mean_.is_predicted()) return;
-    move_bodies(p.mechanism, w.now.terms, mean_.value());
-    if (!touching_.empty()) move_touching(t);
+    if (elements_.strike()) mean_.begin(h_, v0_, VelocityRates());
 }
 
 // Find the contacts whose gap is closed at the step's middle, and contacts that were closed before. Their loads decide
 // if they stay closed.
 void MoreauContacts::find_touching(double t) {
     touching_.clear();
+    const double uncertainty = parameters.width_rounding * scene_size(p, w);
     for (int i : watch_.advance(path_since_last())) {
         measure_gap(p, w, t, mean_.start(), i);
         const double width = gap_width(p, w, i);
         const bool touches = was_closed_[i] || (width <= 0.0 && has_known_direction(i, width));
         if (touches) touching_.push_back(i);
-        watch_.gaps.width[i] = touches ? 0.0 : width - parameters.width_rounding * scene_size(p, w);  // guaranteed width
+        watch_.gaps.width[i] = touches ? 0.0 : width - uncertainty;  // guaranteed width
     }
     watch_.skip_wide();
     for (int i : touching_) {
@@ -250,17 +261,22 @@ void MoreauContacts::solve(double t) {
         ++w.counters.iterations;
     }
     if (n == 0) apply();
-    if (has_percussions_ || n > 0) w.state.percussion.setZero();
-    has_percussions_ = n > 0;
-    for (int i = 0; i < n; ++i) {
-        const StepRow& row = elements_.rows[i];
-        w.state.percussion[p.blocks[row.block].row + row.k] = forces_.f[i];
-    }
+    keep_percussions();
     if (n == 0) return;
     const ConeResiduals r = forces_.residuals();
     w.counters.signorini = std::max(w.counters.signorini, r.signorini);
     w.counters.coulomb = std::max(w.counters.coulomb, r.coulomb);
     w.counters.dissipation = std::max(w.counters.dissipation, r.dissipation);
+}
+
+// Keep the forces as the first guess of the next step.
+void MoreauContacts::keep_percussions() {
+    const auto entry = [&](const StepRow& row) -> double& { return w.state.percussion[p.blocks[row.block].row + row.k]; };
+    if (has_unknown_percussions_) w.state.percussion.setZero();
+    has_unknown_percussions_ = false;
+    for (const StepRow& row : rows_of_percussions_) entry(row) = 0.0;
+    rows_of_percussions_ = elements_.rows;
+    for (size_t i = 0; i < rows_of_percussions_.size(); ++i) entry(rows_of_percussions_[i]) = forces_.f[i];
 }
 
 // Compute the velocity, the closed contacts and the modes at the step's end. A force below

@@ -53,6 +53,7 @@ private:
         return width > -MoreauContacts::parameters.nearly_all * rounded_by_[gap];
     }
     void select(const std::vector<char>& closed, const std::vector<Mode>& modes, bool flies);
+    void begin_sweeps(double t, JointDrives::Step& drives);
     void sweep(double t, JointDrives::Step& drives, bool first);
     bool correct(double t, JointDrives::Step& drives);
     void solve_free(double t);
@@ -63,6 +64,7 @@ private:
     bool rest_within_limits(double t);
     void solve(double t);
     void apply();
+    void keep_percussions();
     void end_velocity();
     void book_work(VecX& y, double& numerical_energy, double& impact_energy);
 
@@ -83,7 +85,8 @@ private:
     std::vector<double> rounded_by_;   // rounding of each gap
     bool rounded_ = false;             // a gap has rounding
     bool had_contacts_ = false;  // the last step had a closed contact or an active element
-    bool has_percussions_ = true;  // percussions of the last step may be nonzero
+    bool has_unknown_percussions_ = true;  // other rows than these may have percussions
+    std::vector<StepRow> rows_of_percussions_;
     VecX q_mid_, q_sampled_, v0_, v1_, a_free_, lam_free_, power_;
     ContactProjection projection_;
     VecX b_, force_;

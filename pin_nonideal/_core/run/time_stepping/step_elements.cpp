@@ -44,12 +44,13 @@ void StepElements::gather(const Program& p, Workspace& w, const std::vector<int>
     parts.clear();
     cones.clear();
     rubbing_ = outside_contacts_;
+    const double still = rest_rate(v0);
     for (int i : touching) {
         const Gap& gap = p.gaps[i];
         const int slides = gap.sliding < 0 ? 0 : static_cast<int>(p.blocks[p.frictions[gap.sliding].block].kept.size());
         Part part{i, gap.sliding, gap.restitution * std::min(0.0, gap_rate(p, w, i))};
         part.rests = gap.sliding >= 0 && (modes[gap.sliding] == sticking ||
-                                          slip_velocity(w.now, p.frictions[gap.sliding]).norm() <= rest_rate(v0));
+                                          slip_velocity(w.now, p.frictions[gap.sliding]).norm() <= still);
         part.strikes = !closed[i];
         const double mu = gap.sliding < 0 ? 0.0 : coefficient(p, w, part);
         add(p, part, gap.block, 1, ConeElement::contact(1 + slides, mu));

@@ -4,6 +4,7 @@
 // or a disk whose limits may follow loads. The rows of the elements lie in sequence.
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include "complementarity/cone/problem.hpp"
@@ -45,6 +46,10 @@ public:
     // the given closed contacts and modes at the velocity v0.
     void gather(const Program& p, Workspace& w, const std::vector<int>& touching, const std::vector<char>& closed,
                 const std::vector<Mode>& modes, const VecX& v0);
+    // Check if a contact was open at the step's start.
+    bool strike() const {
+        return std::any_of(parts.begin(), parts.end(), [](const Part& part) { return part.strikes; });
+    }
     // Update the coefficients of contacts to the velocity of the workspace.
     void move(const Program& p, const Workspace& w);
     // Check if a limit of dry friction follows a load. The loads must then have minimum norm, because limits of other
