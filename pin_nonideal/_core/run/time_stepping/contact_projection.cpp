@@ -19,6 +19,7 @@ static void hold_locked(const Program& p, const Workspace& w, VecX& x) {
 ContactProjection::ContactProjection(const Program& p)
     : blocks_(p), flyers_(MeanVelocity::flyers(p)), r_(VecX::Zero(p.layout.rows)), move_(VecX::Zero(p.mechanism.nv)) {
     least_.lever = p.mechanism.lever;
+    for (const Joint& joint : p.mechanism.joints) weight_ += joint.mass * p.mechanism.gravity.norm();
 }
 
 // Add an element of the rows of a block, or join them to the last element.
@@ -225,7 +226,10 @@ bool ContactProjection::correct(const Program& p, Workspace& w, double t, double
     };
     const double before = energy ? total() : 0.0;
     measure_open(p, w, t, near, v);
-    const double allowed = std::max(measure_gaps(p, w), h * v.cwiseAbs().cwiseProduct(p.mechanism.lever).maxCoeff());
+    q_start_ = q;
+    v_start_ = v;
+    const double largest = measure_gaps(p, w), height = potential_energy(p.mechanism, w.now.terms);
+    const double allowed = std::max(largest, h * v.cwiseAbs().cwiseProduct(p.mechanism.lever).maxCoeff());
     bool moves = close_gaps(p, w, t, q, v), posed = true;
     for (int k = 0; k < parameters.max_choices; ++k) {
         const bool penetrates = moves && find_penetrating(p, w, t, v, allowed), opens = is_open(p, w);
@@ -235,6 +239,12 @@ bool ContactProjection::correct(const Program& p, Workspace& w, double t, double
         moves |= close_gaps(p, w, t, q, v);
     }
     penetrating_.clear();
+    if (moves && largest > max_projected_gap * scene_size(p, w) &&
+        potential_energy(p.mechanism, w.now.terms) - height > parameters.max_lift * weight_ * largest) {
+        q = q_start_;
+        v = v_start_;
+        place_bodies(p.mechanism, w.now.terms, q);
+    }
     if (moves) place_rows(p, w, t, v);
     if (!posed) pose(p, w, true);
     else if (moves) blocks_.fill(p, w, rows_, elements_, least_.problem);

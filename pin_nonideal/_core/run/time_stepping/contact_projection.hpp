@@ -12,6 +12,9 @@ struct ContactProjectionParameters {
     // or rows that contradict each other.
     double stall_ratio = 0.5;
     int sure_moves = 1, max_moves = 12;  // first moves, which `stall_ratio` does not judge, and maximum number of moves
+    // Maximum height by which the moves may lift all bodies, relative to the largest gap that they close. Rows that nearly
+    // contradict each other lift farther.
+    double max_lift = 1.01;
     // Maximum number of choices of closed contacts.
     int max_choices = 4;
 };
@@ -56,7 +59,7 @@ private:
     std::vector<StepRow> rows_;
     std::vector<ConeElement> elements_;
     std::vector<int> gap_;  // by row: gap whose residual it closes, -1 for sliding
-    VecX r_, move_, q_from_, q_best_, v_best_;
+    VecX r_, move_, q_from_, q_best_, v_best_, q_start_, v_start_;
     std::vector<char> closed_;
     struct Open {
         int gap;
@@ -64,7 +67,7 @@ private:
     };
     std::vector<Open> open_, penetrating_;  // open contacts, and those that the moves let penetrate
     std::vector<double> width_;             // by row: width that its gap gets
-    double moved_energy_ = 0.0;
+    double moved_energy_ = 0.0, weight_ = 0.0;
 };
 
 }  // namespace pn
