@@ -1,4 +1,4 @@
-// Friction elements in the current motion: slip, load and force.
+// Friction elements in the current motion: slip, load, friction limit and force.
 #pragma once
 
 #include <array>

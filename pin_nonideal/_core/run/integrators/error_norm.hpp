@@ -1,4 +1,5 @@
-// Norm of a state error relative to the tolerances, and size of the first step.
+// Norm of a state error relative to the tolerances, and size of the first step. RungeKutta::error combines the norms of
+// the two error estimates of dop853.
 #pragma once
 
 #include <limits>
