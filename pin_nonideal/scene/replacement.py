@@ -39,7 +39,7 @@ def parts_after(
 
     Args:
         compiled: the scene before.
-        new: lists that replace present ones, by kind; None keeps a list.
+        new: lists that replace the lists of the scene, by kind; None keeps a list.
         added: lists that are appended, by kind.
         remove: names of descriptions to leave out.
 
@@ -81,10 +81,10 @@ def parts_of_replacement(
     """Return the parts of a scene, as `copying.parts_of` does, after `Scene.replace`.
 
     Args:
-        parts: parts of the scene before.
-        compiled: the compiled scene before.
-        states: states of the scene before.
-        lists: lists that replace present ones, by kind; None keeps a list.
+        parts: parts of the scene before the replacement.
+        compiled: the compiled scene before the replacement.
+        states: states of the scene before the replacement.
+        lists: lists that replace the lists of the scene, by kind; None keeps a list.
         added: lists that are appended, by kind.
         remove: names of descriptions to leave out.
         others: new actuation, or UNCHANGED; new "q0", "v0" and "name", or None for the present ones.

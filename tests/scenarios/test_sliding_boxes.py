@@ -28,7 +28,7 @@ def thrown(size, mass, mu, v0, q0=None, restitution=0.0):
 
 
 def loads(size, mass, mu, state):
-    """Normal forces of the corners, the least-norm ones for their sum and their moments; and their slips."""
+    """Return the corners, the directions of their slips, and their normal forces of least norm."""
     x, y, turn = state[:3]
     del x, y
     R = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
@@ -37,7 +37,7 @@ def loads(size, mass, mu, state):
     ways = slips / np.linalg.norm(slips, axis=1)[:, None]
     E = np.column_stack([np.ones(4), corners]).T
     lever = 0.5 * size[2] * mu
-    G = np.column_stack([np.zeros(4), lever * ways]).T  # moments that friction asks the loads for
+    G = np.column_stack([np.zeros(4), lever * ways]).T  # moments of friction, which the loads balance
     least = np.linalg.pinv(E)
     N = np.linalg.solve(np.eye(4) - least @ G, least @ [mass * GRAVITY, 0.0, 0.0])
     return corners, ways, N

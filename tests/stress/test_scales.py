@@ -185,7 +185,8 @@ def test_scaled_copies_beside_the_loop_itself(plain):
 
 
 def test_copies_that_are_found_only_in_the_run_leave_friction_a_load():
-    """Copies given as functions are found at the first step: the laws are asked after that, not before."""
+    """Copies given as functions are found at the first step: the laws are evaluated after that, not
+    before."""
     robot = pn.load("four_bar")
     names = [f"own {k}" for k in range(3)]
     frames = [robot.model.getFrameId(n) for n in ("coupler_tip", "rocker_tip")]

@@ -123,7 +123,7 @@ static PN_INLINE void evaluate_kind(const K& kind, const State& s, RowValues& ou
     }
 }
 
-// Like std::visit but inlined into the caller, for the first kinds.
+// Like std::visit but inlined into the caller, for the first kinds of constraint.
 template <Part part, size_t... k>
 static PN_INLINE void evaluate_some(const Kind& kind, const State& s, RowValues& out, std::index_sequence<k...>) {
     (void)((kind.index() == k && (evaluate_kind<part>(*std::get_if<k>(&kind), s, out), true)) || ...);

@@ -94,7 +94,7 @@ static double shortest_passing(const RowSystem& s) {
     return shortest;
 }
 
-// Compute the Cholesky factor of the unit-diagonal B B^T inside the envelope. Returns true if its pivots are safe.
+// Compute the Cholesky factor of the unit-diagonal B B^T inside the envelope. Return true if its pivots are safe.
 static PN_INLINE bool factor_cholesky(RowSystem& s) {
     const Envelope& at = s.envelope;
     double* L = s.factor.data();

@@ -44,7 +44,7 @@ VecX newton(const ContactRows& rows, double t, VecX w0) {
 }
 
 // Poisson's law of restitution. After the impulses that stop the approach, each contact gives e times its own impulse.
-// It gives more only to prevent penetration. Friction of the restitution impulse has a known limit: a box along the
+// A contact gives more only to prevent penetration. Friction of the restitution impulse has a known limit: a box along the
 // directions of the cone for the additional impulse.
 VecX poisson(const ContactRows& rows, double t, const VecX& velocity) {
     VecX P = percussions(rows, t, rows.W, velocity, rows.cones);

@@ -74,7 +74,7 @@ bool only_opening(const Unknowns& u) {
     return std::all_of(list.begin(), list.end(), [&](int e) { return u.p.frictions[e].gap >= 0; });
 }
 
-// Check if a unilateral contact has tension. It is then about to open.
+// Check if a unilateral contact has tension. Such a contact is about to open.
 bool pulls(const Unknowns& u, const VecX& y) {
     const std::vector<int> list = u.elements();
     for (size_t i = 0; i < list.size(); ++i)

@@ -94,7 +94,7 @@ static void set_active(const Program& p, Workspace& w, int gap, char closed) {
     for (int e : p.gaps[gap].elements) w.now.is_inactive[p.frictions[e].block] = !closed;
 }
 
-// Thousands of contacts may be open. They cost a comparison of bytes each.
+// Thousands of contacts may be open. Each open contact costs a comparison of bytes.
 static void select_contacts(const Program& p, Workspace& w) {
     const std::vector<char>& closed = w.state.closed;
     if (same_bytes(closed, w.now.selected)) return;

@@ -1,5 +1,5 @@
 // Run whose steps are taken by an integrator outside the core. The integrator evaluates rates under the modes of the
-// current step. The core then treats each step like its own. It projects the step's end onto the constraints, ends the
+// current step. The core then treats each step like its own. The core projects the step's end onto the constraints, ends the
 // step at the first event inside, and records samples.
 #pragma once
 

@@ -12,7 +12,7 @@
 
 namespace pn {
 
-// Compute gains and pivots of the dofs of deep trees. Returns -1, or the dof with a pivot that is not positive.
+// Compute gains and pivots of the dofs of deep trees. Return -1, or the dof with a pivot that is not positive.
 int factorize_articulated(const Mechanism& m, BodyTerms& terms);
 
 // Sweeps of mass_factor.hpp for the dofs of deep trees. Forces `body` on bodies, about their reference points, are

@@ -1,9 +1,9 @@
 // Results of a pass over the tree: placements and motions of the bodies, M(q) and the bias forces.
 //
-// All quantities are in world axes about one reference point per kinematic tree. It is the origin of the first joint
-// that turns, frozen for the instant of the evaluation. Numbers stay small for a robot far from the world's origin, on
-// a floating base or on sliding joints. In a deep tree each body has its own reference point, the origin of its joint.
-// About a point a hundred links away, the inertia of the body would lose most digits.
+// All quantities are in world axes about one reference point per kinematic tree. The reference point is the origin of the
+// first joint that turns, frozen for the instant of the evaluation. Numbers stay small for a robot far from the world's
+// origin, on a floating base or on sliding joints. In a deep tree each body has its own reference point, the origin of its
+// joint. About a point a hundred links away, the inertia of the body would lose most digits.
 #pragma once
 
 #include <vector>

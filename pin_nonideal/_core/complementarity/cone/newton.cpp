@@ -33,7 +33,7 @@ Disk disk_of(const ConeProblem& p, int e, const Eigen::Ref<const VecX>& f, const
 
 }  // namespace
 
-// Evaluate F of the equations F = 0. Returns its squared length.
+// Evaluate F of the equations F = 0. Return its squared length.
 double ConeNewton::evaluate(const ConeProblem& p, const Eigen::Ref<const VecX>& f) {
     auto w = w_.vector(p.n), F = F_.vector(p.n);
     p.respond(f, w);
@@ -111,7 +111,7 @@ void ConeNewton::differentiate(const ConeProblem& p, const Eigen::Ref<const VecX
     }
 }
 
-// Take the longest step that reduces the error. Returns false if no step reduces the error and no blind steps are left.
+// Take the longest step that reduces the error. Return false if no step reduces the error and no blind steps are left.
 bool ConeNewton::advance(const ConeProblem& p, Eigen::Ref<VecX> f, double& merit) {
     auto step = step_.vector(p.n), ahead = ahead_.vector(p.n);
     double length = 1.0;

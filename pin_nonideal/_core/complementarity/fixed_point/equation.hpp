@@ -38,7 +38,7 @@ struct ReactionEquation {
     void slope(const VecX& y, double s, MatX& J) const;
     // Compute L, the largest |dg_i/dy_j| over all y.
     void steepest(MatX& L) const;
-    // Return the same bound for the derivative in s. Its entries are the limits if friction causes no load.
+    // Return the same bound for the derivative in s. The entries of s are the limits if friction causes no load.
     VecX steepest_in_s() const;
     bool finite() const;
 };
@@ -59,9 +59,9 @@ struct ReactionNewton {
     LU factor;
     VecX image, residual, step;
 
-    // Factorize I - dg/dy at y. Returns the determinant.
+    // Factorize I - dg/dy at y. Return the determinant.
     double factorize(const ReactionEquation& equation, const VecX& y);
-    // Iterate from y to a solution. Returns false if the method finds none.
+    // Iterate from y to a solution. Return false if the method finds none.
     bool solve(const ReactionEquation& equation, VecX& y);
 };
 

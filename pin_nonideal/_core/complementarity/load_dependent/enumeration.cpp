@@ -217,7 +217,7 @@ struct Search {
         else ++undecided;
     }
 
-    // Krawczyk's test. Returns true if the box is done. Otherwise the box may have shrunk.
+    // Krawczyk's test. Return true if the box is done. Otherwise the box may have shrunk.
     bool decide(Box& box) {
         const Point radius = (enumeration_parameters.box_overlap * box.radius).array() +
                              enumeration_parameters.radius_rounding * (box.radius.array() > 0.0).cast<double>();

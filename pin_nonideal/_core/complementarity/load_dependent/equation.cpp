@@ -13,7 +13,7 @@ namespace {
 
 auto part(const VecX& x, const RestElement& e) { return x.segment(e.row, e.dim); }
 
-// Compute G with W = G G^T, and the loads' derivatives times G^-T. Returns false if forces that move nothing change a load.
+// Compute G with W = G G^T, and the loads' derivatives times G^-T. Return false if forces that move nothing change a load.
 bool energy_factor(const RestEquation& equation, MatX& G, MatX& loads) {
     const MatX& W = equation.W;
     Cholesky cholesky;

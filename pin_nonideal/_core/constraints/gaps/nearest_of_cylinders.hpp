@@ -66,7 +66,8 @@ private:
                                second.support(Scalar(n.dot(e2)), Scalar(n.cross(e2).norm()));
         return between > distance - shown_nearest * (first.reach + second.reach);
     }
-    // Find the nearest points on crossing lines of both sides. Their common normal has a known angle to both axes.
+    // Find the nearest points on crossing lines of both sides. The common normal of these lines has a known angle to both
+    // axes.
     bool find_sides(const Sides& s, const Revolved& first, const Revolved& second) {
         using std::sqrt;
         if (first.half == 0.0 || second.half == 0.0) return false;

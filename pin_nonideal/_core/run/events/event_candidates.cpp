@@ -46,8 +46,8 @@ bool EventCandidates::may_reach_limit(int e) {
 // Check if a slipping element has reversed at the step's end, or may have done so inside.
 bool EventCandidates::may_stop(int e) const { return slip_along_mode(p, w, e) + allowance(e) < -noise() || dips(e); }
 
-// Check if a slip speed may dip through zero and back. Speeds and their rates are known at the stages and at both ends.
-// The minima of the cubics through them decide.
+// Check if a slip speed may dip through zero and back. Speeds and their rates are known at the stages and at both ends, and
+// give the minima of cubics between them.
 bool EventCandidates::dips(int e) const {
     if (stepper_.method.order < 2) return false;
     const std::vector<Stepper::RateSample>& rate_samples = stepper_.rate_samples();

@@ -65,9 +65,9 @@ double EventSearch::interpolated_share(int e, double part) const {
     return stepper_.interpolated_rate(part, system_.ns + 2 * e);
 }
 
-// Return the error bound of the interpolated force / limit ratio of a sticking element. It comes from the further
-// stages of the interpolant, which are as accurate as the interpolant. Without further stages it comes from the other
-// stages and from a fraction of the ratio's change.
+// Return the error bound of the interpolated force / limit ratio of a sticking element. The bound comes from the further
+// stages of the interpolant, which are as accurate as the interpolant. Without further stages it comes from the other stages
+// and from a fraction of the ratio's change.
 double EventSearch::share_error(int e) const {
     const Method& method = stepper_.method;
     const bool further = method.further_stages > 0;
@@ -135,8 +135,8 @@ double EventSearch::first_crossing(const Watch& watch, Source source) {
     for (int k = 1; k <= parameters.grid; ++k) {
         g[k] = margin_at(k * parameters.spacing);
         if (begins && g[k] < 0.0) {
-            // Slip in several directions that has just begun may first turn. It has come to rest again only if it rose
-            // before. Slip that decreases from the start came to rest at the end of the last step.
+            // Slip in several directions that has just begun may first turn. The slip speed has fallen to rest again only if
+            // the speed rose before. Slip that decreases from the start came to rest at the end of the last step.
             const bool turns = slips && p.frictions[watch.index].dim > 1 && !slows_down(watch.index, rest);
             const double part = k > 1 ? 0.0 : root_after_start(parameters.spacing, g[1], turns ? rest : 0.0, margin_at);
             if (part > 0.0 || !turns) return part;

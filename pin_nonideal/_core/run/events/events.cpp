@@ -61,7 +61,7 @@ bool shares_load(System& system, double t, const std::vector<int>& resting, int 
     return shares;
 }
 
-// Request collocation steps if slip in several directions begins from rest. Its velocity does not define a direction
+// Request collocation steps if slip in several directions begins from rest. The slip velocity does not define a direction
 // yet.
 void set_direction_search(System& system, const std::vector<int>& resting, bool sought) {
     const auto begins = [&](int e) { return system.p.frictions[e].dim > 1 && slips(system.w.state.mode[e]); };

@@ -151,7 +151,7 @@ GapSearch::Touch GapSearch::between(int gap, const GapSample& a, const GapSample
 
 std::optional<GapSearch::Touch> GapSearch::search(int gap, const GapSample& a, const GapSample& b, const Bends& bends) {
     const double bound = bends.below;
-    // A touching gap that the solver left open stays on its plane. It touches again if it penetrates.
+    // A touching gap that the solver left open stays on its plane. Such a gap touches again if it penetrates.
     const bool rests = stepper_.t0 < start_.retry_time[gap];
     if (rests && std::abs(a.width) <= rounding_ && std::abs(b.width) <= rounding_) return std::nullopt;
     if (stays_open(gap, a, b, bound)) return std::nullopt;
@@ -160,7 +160,7 @@ std::optional<GapSearch::Touch> GapSearch::search(int gap, const GapSample& a, c
     if (b.width < -rounding_ && a.rate + bends.above * length < 0.0) return between(gap, a, b);
     if (bends.above * length * length < rounding_ || samples_ > parameters.max_samples) {
         // Bodies can slide to the next contact point, as a corner from a face onto an edge. The gap of that point then
-        // falls to zero and stays zero. It does not touch before it becomes negative.
+        // falls to zero and stays zero. The gap does not touch before it becomes negative.
         const bool has_closed = samples_ > parameters.max_samples && !rests && !(a.separation && slides_on(gap));
         if (a.width > 0.0 && b.width < -rounding_) return between(gap, a, b);
         if (b.width < -rounding_ || has_closed) return Touch{b.part, b.rate * stepper_.h};

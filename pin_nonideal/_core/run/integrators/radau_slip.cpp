@@ -273,7 +273,8 @@ double Collocation::error() {
         error_ -= (part * table.at_start[j]) * F_[j];
         speed += table.at_start[j] * sigma_.col(j);
     }
-    // Components of the error along slip directions decay as the directions relax. Filter them by (1 - part df/dv)^-1.
+    // Components of the error along slip directions decay as the directions relax. The filter (1 - part df/dv)^-1 reduces
+    // these components.
     MatX K = part * P_[0] * Q_[0];
     for (size_t at = 0; at < elements_.size(); ++at)
         for (int k = 0; k < elements_[at].dim - 1; ++k) {

@@ -30,7 +30,7 @@ public:
 
     DenseRecorder(System& system, Stepper& stepper, bool holds_torque, DenseOutput& out);
 
-    // Record the step just taken. Leaves the workspace at other states.
+    // Record the step just taken. This leaves the workspace at other states.
     void step(double numerical_energy);
     // Record a step of time stepping as a straight line between both states.
     void straight(double t0, const VecX& y0, double t1, const VecX& y1, double numerical_energy);
