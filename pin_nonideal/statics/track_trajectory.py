@@ -219,7 +219,7 @@ def _with_gain(model: Model, gain: Array) -> Mask:
 
 
 class _Tracking:
-    """Torques along a reference, with a feedforward of the tree.
+    """Torques along a reference, with a feedforward from the tree without its constraints.
 
     Args:
         model: pinocchio.Model.

@@ -85,7 +85,7 @@ def test_falls(seed: int, mu: float, rtol: float) -> None:
 @pytest.mark.parametrize("rtol", [1e-4, 1e-8])
 @pytest.mark.parametrize("seed", [2, 3, 9, 11, 19])
 def test_a_corner_that_others_hold_hides_no_landing(seed: int, rtol: float) -> None:
-    """Its gap is zero but for rounding, and so is its rate: the instant of its touch is any."""
+    """Gap and gap rate of the corner are rounding, so any instant may be that of its touch."""
     check(seed, 0.0, rtol, 0.3, kp=20.0, kd=0.4)
 
 

@@ -60,7 +60,7 @@ def test_slides_on(mu, v0):
 
 
 def test_straight_legs_go_on_by_time_stepping():
-    """There the rows of the feet lose their rank, and the loads beside it are as large as one likes."""
+    """Rows of the feet lose their rank at straight legs, and loads grow without bound nearby."""
     scene = biped(0.1, (1.0, 0.5, 0.0), 0.0)
     run = pn.simulate(scene, 0.5)
     assert any(event.kind == "chatter" for event in run.events)

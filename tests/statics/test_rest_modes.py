@@ -111,7 +111,8 @@ def random_stance(seed, static_ratio):
 
 
 def check_stance(seed, static_ratio, beyond):
-    """It gives way at the optimum, and nothing fails `beyond` seconds later; None where a foot would lift.
+    """Check that slip begins at the optimal load, and that the run continues; return None if a foot would
+    lift.
 
     A foot that is kept and pulls rubs as if it pressed: with it the optimum is another, and several motions
     are possible.

@@ -1,4 +1,4 @@
-"""Arguments drawn by lot: every public function takes them, or refuses them by name."""
+"""Random arguments: every public function accepts them, or raises an error that names the argument."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Random stances to the instant at which they give way and beyond; chains of ball joints."""
+"""Random stances up to slip onset and beyond; chains of ball joints."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def test_feet_that_cannot_pull_give_way_in_time(seed):
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [463, 484])
 def test_feet_rest_as_long_as_any_forces_hold_them(seed):
-    """Feet that are relieved while all rest: some could slip long before they must."""
+    """Feet lose their load while all feet rest: some could slip long before they must."""
     scene, oracle = stance(seed, unilateral=True)
     instant = oracle.give_way(LATEST)
     run = pn.simulate(scene, instant - GIVES_WAY)
@@ -114,7 +114,7 @@ def test_feet_rest_as_long_as_any_forces_hold_them(seed):
     ],
 )
 def test_feet_that_cannot_pull_slide_on(seeds):
-    """One that passes by the center of rotation sticks again where its share allows it, and nowhere else."""
+    """A foot that passes the center of rotation sticks again only if its share of the load allows it."""
     steps = []
     for seed in seeds:
         scene, oracle = stance(seed, unilateral=True)

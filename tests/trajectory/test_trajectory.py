@@ -1,4 +1,4 @@
-"""Trajectories: their fields, their words, and files of them, good and bad."""
+"""Trajectories: fields, printed texts, and valid and damaged files."""
 
 from __future__ import annotations
 

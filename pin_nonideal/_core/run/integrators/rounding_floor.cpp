@@ -29,8 +29,8 @@ RoundingFloor::RoundingFloor(System& system, Stepper& stepper, ErrorNorm& norm, 
 }
 
 // Measure the rounding of the rates by changes of the last digits of the state, which alter every rounding on the way.
-// Opposite changes make opposite differences except for rounding. The second difference has the variance 1 + 1 + 4
-// times that of a rate.
+// Opposite changes of the state give opposite changes of the rates, except for rounding. The second difference of the rates
+// has 1 + 1 + 4 times the variance of the rounding of one rate.
 void RoundingFloor::measure() {
     const double at = stepper_.t0 + stepper_.h, epsilon = std::numeric_limits<double>::epsilon();
     const RunState kept = system_.w.state;
