@@ -109,7 +109,7 @@ def test_example_robot_data_couples_mimic_joints():
 
 
 def test_example_robot_data_with_a_loader_of_its_own(monkeypatch):
-    """A robot whose class loads it by itself is the same robot."""
+    """A robot with its own loader class is the same robot."""
     from example_robot_data import robots_loader
 
     class Own(robots_loader.DoublePendulumLoader):

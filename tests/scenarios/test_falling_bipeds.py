@@ -90,7 +90,7 @@ def test_a_corner_that_others_hold_hides_no_landing(seed: int, rtol: float) -> N
 
 
 def test_a_corner_slides_under_hardly_any_load() -> None:
-    """Talos leans until a corner of an edge lifts: its load is 1e-5 of the other's at last."""
+    """Talos leans until a corner of an edge lifts: its load falls to 1e-5 of the load of the other corner."""
     talos = pn.load("talos")
     model, contacts = talos.model, []
     for sole in ("left_sole_link", "right_sole_link"):

@@ -229,7 +229,7 @@ def test_a_velocity_that_grows_beyond_all_bounds():
     model = pin.Model()
     add(model, "p", "prismatic x", 0, np.random.default_rng(0))
     model.gravity = pin.Motion.Zero()
-    # Trial steps may overshoot far; a user's function that overflows there would be an error of its own.
+    # Trial steps may overshoot far, and a user's function that overflows would raise another error.
     scene = pn.Scene(model, forces=[pn.UserForce(lambda t, q, v: np.minimum(v, 1e100) ** 3)], v0=[1.0])
     with pytest.raises(StepSizeError, match=r"the step size fell below rounding at t = 0\.") as caught:
         pn.simulate(scene, 10.0)

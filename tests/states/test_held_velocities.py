@@ -134,7 +134,7 @@ def test_bodies_that_are_held_still_change_nothing(seed):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_a_disk_rolls_on_any_mount(seed):
-    """Rows of its point on the ground see little of it where it stands upright, whatever their axes."""
+    """Rows of the disk's contact point have small entries for an upright disk, for any axes."""
     scene = pn.load("rolling_disk")
     turn = pin.SE3(pin.exp3(np.random.default_rng(seed).normal(size=3)), np.zeros(3))
     model = scene.model.copy()

@@ -159,7 +159,7 @@ def test_many_stances(static_ratio):
 
 
 def pulse(seed):
-    """Feet under a push of 5 to 63 ms that they do not hold, when they let go, and a time after it."""
+    """Feet under a push of 5 to 63 ms beyond their limits, with the time of slip onset and a later time."""
     rng = np.random.default_rng(seed)
     feet, mu = star(int(rng.integers(3, 6)), 0.1), 0.5
     peak, length, part = rng.uniform(0.3, 2.0), 10.0 ** rng.uniform(-2.3, -1.2), rng.uniform(1.02, 2.0)
@@ -184,7 +184,7 @@ def test_a_push_within_a_step_at_rest(seed):
 
 
 def test_four_feet_give_way_together():
-    """A star of feet, pulled at one of them: until they let go all of them stick."""
+    """A star of feet is pulled at one foot: all feet stick until slip onset."""
     star = [(0.3 * np.cos(x), 0.3 * np.sin(x), -0.3) for x in np.arange(4) * np.pi / 2]
     scene = block_on_feet(star, lambda t: [0.0, 60.0 * t, 0.0, 0.0, 0.0, 0.0], star[0], 0.5)
     run = pn.simulate(scene, 0.6)

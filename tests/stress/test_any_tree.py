@@ -27,7 +27,7 @@ SOLVED = 1e-9
 KNOWN = 1e5
 # Rows whose singular values all lie outside this band are dependent or not, and no tolerance decides.
 DEPENDENT, INDEPENDENT = 1e-11, 1e-3
-# A singular M that rounding lets pass for a definite one: no answer is right or wrong.
+# A singular M that is definite by rounding: no result can be checked.
 SINGULAR = 1e13
 
 
@@ -44,7 +44,7 @@ def mechanism(seed):
 
 
 def check(seed):
-    """Compare both providers with pin.aba, or a dense system of all constraints; return the number of cases."""
+    """Compare both providers with pin.aba or a dense system of constraints; return the number of cases."""
     model, q, v, constraints, tau = mechanism(seed)
     M = mass_matrix(model, q)
     condition = (

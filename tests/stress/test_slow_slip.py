@@ -16,7 +16,7 @@ from .measure import at_most, ledger
 long = pytest.mark.stress
 
 LATEST = 200.0  # loads grow until then [s]
-GIVES_WAY = 1e-6  # [s]: the optimum is found by a program of its own, to 1e-9 of the limits
+GIVES_WAY = 1e-6  # [s]: a separate program finds the optimum, to 1e-9 of the limits
 WITHIN = 1e-4  # part of mu: a run ends where another motion comes in from infinite loads, before it is there
 crawls = pytest.mark.xfail(reason="sliding feet that share loads find no motion, see limits.md", run=False)
 STEPS = {"stance": 2000, "balls": 3000}

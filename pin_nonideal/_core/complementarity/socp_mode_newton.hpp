@@ -26,8 +26,8 @@ VecX ball_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dim
 VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& s,
                       const VecX* initial = nullptr);
 VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const FrictionLimits& limits);
-// Return slip accelerations slightly beyond the load of slip onset. At onset they are rounding. If elements share a
-// load, their forces give the directions of a common slip only to the square root of rounding.
+// Return slip accelerations slightly beyond the load of slip onset. At onset the slip accelerations are rounding. If
+// elements share a load, their forces give the directions of a common slip only to the square root of rounding.
 VecX onset_accelerations(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const FrictionLimits& limits);
 
 }  // namespace pn

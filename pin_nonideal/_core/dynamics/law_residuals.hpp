@@ -63,15 +63,16 @@ struct MotionState {
     bool is_end = false;
 };
 
-// Collect the forces of the motion in the workspace. Limits that depend on reactions are those of its own loads.
+// Collect the forces of the motion in the workspace. Limits that depend on reactions follow from the loads of the same
+// motion.
 const MotionForces& motion_forces(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 // Return the largest residuals of the acceleration and forces of a motion, for the terms and rows in the workspace.
 // The rows of open contacts are evaluated here.
 LawResiduals law_residuals(const Program& p, Workspace& w, double t, const VecX& v, const VecX& a,
                            const MotionForces& forces, const MotionState& state);
 
-// Return the residuals of the motion in the workspace. If they are small, the counters of the workspace keep the largest
-// ones. Scenes without friction and contacts have no residuals.
+// Return the residuals of the motion in the workspace. If the residuals are small, the counters of the workspace keep the
+// largest residuals. Scenes without friction and contacts have no residuals.
 LawResiduals check_laws(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, const MotionState& state);
 
 }  // namespace pn

@@ -42,8 +42,7 @@ double gather_residuals(const Program& p, Workspace& w, const std::vector<char>&
 
 double gather_residuals(const Program& p, Workspace& w) { return gather_residuals(p, w, w.now.rows.active); }
 
-// Compute A v + phi_t from the rows in the workspace without motion of the bodies. A user's rate is a function of its
-// own.
+// Compute A v + phi_t from the rows in the workspace without motion of the bodies. A user's rate is a separate function.
 double gather_rates(const Program& p, Workspace& w, double t, const VecX& v, const std::vector<char>& counts) {
     const State state{p.mechanism, w.now.terms, w.now.row_time(t), w.now.terms.q, v};
     for (int i : w.now.rows.blocks) {

@@ -56,7 +56,8 @@ std::vector<VecX> motions_of(Unknowns& u, const std::vector<VecX>& roots) {
     return list;
 }
 
-// Check if all sticking elements hold in the motion of a solution. If one of them slips, the motion has other modes.
+// Check if all sticking elements hold in the motion of a solution. If one of these elements slips, the motion has other
+// modes.
 bool holds(Unknowns& u, const VecX& y) {
     const ReleasedZeroLoads free(u.w);
     u.set(y);

@@ -22,8 +22,8 @@ inline constexpr UniquenessParameters uniqueness_parameters{};
 // the failure shows two.
 void decide(Unknowns& unknowns, const ReactionEquation& equation, const VecX& start, VecX& y, bool solved);
 
-// Solve with all zero-load sets after one of them had no solution. y becomes the solution nearest to `start` in any
-// set. If no set has a solution, throw `failure`.
+// Solve with all zero-load sets after one set had no solution. y becomes the solution nearest to `start` in any set. If no
+// set has a solution, throw `failure`.
 void decide_over_zero_load_sets(Unknowns& unknowns, const VecX& start, VecX& y, const Failure& failure);
 
 // Search for other solutions with user functions among the unknowns. J is dg/dy at y. Throw a failure if the

@@ -46,7 +46,7 @@ public:
     void restore(const std::string& state);
     // Integrate to the end, from the start or from a restored state.
     void run();
-    // Report progress and check the wall time at evaluations too. A step may take many of them.
+    // Report progress and check the wall time at evaluations too. A step may take many evaluations.
     void watch_evaluations() { run_limits.watch_evaluations(); }
 
 protected:

@@ -299,7 +299,7 @@ class TestPuck:
 
 
 def test_a_body_that_floats():
-    """Constant friction in 3 + 3 directions: v/(c/m) and w/(c radius/J), whichever way it flies."""
+    """Constant friction in 3 + 3 directions: v/(c/m) and w/(c radius/J), for any direction of flight."""
     model = empty((0.0, 0.0, 0.0))
     body(model, 0, pin.JointModelFreeFlyer(), "float", 2.0, inertia=0.1 * np.eye(3))
     law = pn.JointFriction("float", coulomb=0.5, radius=0.2, name="fluid")

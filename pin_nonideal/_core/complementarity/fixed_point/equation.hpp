@@ -25,7 +25,7 @@ struct ReactionEquation {
     MatX offset;               // b_k, (3, vectors)
     MatX columns;              // stacked P_k, (3 vectors, elements)
     // True for vectors that count by their first component, with its sign: loads of unilateral contacts, at which
-    // friction goes through zero. The search for all solutions treats them as lengths.
+    // friction goes through zero. The search for all solutions treats these vectors as lengths.
     std::vector<char> directed;
 
     // Set the numbers of elements and vectors.

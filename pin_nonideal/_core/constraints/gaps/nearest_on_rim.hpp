@@ -129,7 +129,7 @@ private:
         return true;
     }
     // Return the direction of the nearest point of the whole disk, by bisection over the chords along `direction`. The least
-    // distance of a chord is convex across them.
+    // distance of a chord is convex across the chords.
     Direction of_chords(const Sides& s, const Revolved& solid, const Direction& direction) const {
         const Vec along = out(direction), beside = around(direction);
         Direction found = direction;

@@ -28,7 +28,7 @@ void GapSearch::bound_rates() {
     }
 }
 
-// Return bounds of the second derivative of a gap between the step's ends. For a user's gap they are estimates:
+// Return bounds of the second derivative of a gap between the step's ends. For a user's gap the bounds are estimates:
 // multiples of the second derivatives of the cubic between the ends, and of the acceleration at the end.
 GapSearch::Bends GapSearch::bends(int gap, const GapSample& end) const {
     if (CurvatureBounds::has_bounds(p, gap)) return {curvature_.lower_bound(w, gap), curvature_.upper_bound(w, gap)};
