@@ -16,7 +16,7 @@ from ..support.random_loaded_trees import loaded_tree
 from ..support.seeds import seeds
 from ..support.standing import plate, star
 
-# A fold of the equation of rest costs half the digits of a force near it.
+# Near a fold of the solutions at rest, forces have half of the digits.
 MOTION = 1e-7
 # Error of the time of slip onset, and residual of the optimizer's conditions [N or N^2].
 GIVE_WAY = 1e-6

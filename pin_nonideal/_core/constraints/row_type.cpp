@@ -40,7 +40,7 @@ bool has_comparable_rows(const Kind& kind) {
 
 int pressing_row(const Kind& kind) {
     return std::visit([](const auto& k) {
-        if constexpr (answers<std::decay_t<decltype(k)>>([](const auto& own) -> decltype(own.pressing) { return {}; }))
+        if constexpr (answers<std::decay_t<decltype(k)>>([](const auto& row) -> decltype(row.pressing) { return {}; }))
             return k.pressing;
         else
             return -1;

@@ -29,8 +29,8 @@ public:
 
     // Compute dy/dt of y = (q, v, law states, work of the ledger's columns), and its Jacobian by y with central
     // differences.
-    void derivative(double at, const VecX& y_outside, VecX& rate_outside);
-    MatX jacobian(double at, const VecX& y_outside);
+    void derivative(double time, const VecX& y_outside, VecX& rate_outside);
+    MatX jacobian(double time, const VecX& y_outside);
     // Follow a step from the current state to one at time `end`. Return true if the integrator must restart from the
     // current state.
     bool follow(double end, const OutsideStep::Interpolant& interpolant);

@@ -19,7 +19,7 @@ public:
     Torques(System& system, Progress& progress, const Options& options, Output& output, Breaks& breaks);
 
     // Pass the breaks of time functions up to a time. Time stepping computes velocity jumps itself.
-    void enter(double at) { if (breaks_.next() <= at) breaks_.enter(at); }
+    void enter(double time) { if (breaks_.next() <= time) breaks_.enter(time); }
     // Sample the sampled control if the next period of this control begins at the time of the run.
     void sample();
     // Call the user's callback, and set the torques that it returns. Return false if the callback ends the run.

@@ -19,7 +19,7 @@ struct Body {
     Motion v{Vec3::Zero(), Vec3::Zero()};
     Motion a{Vec3::Zero(), Vec3::Zero()};  // acceleration at zero qdd, minus gravity
     Force f{Vec3::Zero(), Vec3::Zero()};   // bias force of the subtree
-    Inertia own, Y;                        // inertia of the body (own: native pass), and of its subtree (Y)
+    Inertia inertia, Y;                    // inertia of the body (native pass only), and of its subtree (Y)
 };
 
 // Quantities of a deep tree that replace the rows of M.
@@ -67,8 +67,8 @@ PN_INLINE Inertia in_world(const Body& b, double mass, const Vec3& com, const Ma
 
 // Return the bias force of one body without its subtree.
 PN_INLINE Force bias_force(const Body& b) {
-    Force f = b.own * b.a;
-    f += cross(b.v, b.own * b.v);
+    Force f = b.inertia * b.a;
+    f += cross(b.v, b.inertia * b.v);
     return f;
 }
 

@@ -117,10 +117,10 @@ bool ConeNewton::advance(const ConeProblem& p, Eigen::Ref<VecX> f, double& merit
     double length = 1.0;
     for (int halving = 0; halving < parameters.max_halvings; ++halving, length *= 0.5) {
         ahead = f - length * step;
-        const double there = evaluate(p, ahead);
-        if (there < (1.0 - 2.0 * parameters.decrease * length) * merit) {
+        const double new_merit = evaluate(p, ahead);
+        if (new_merit < (1.0 - 2.0 * parameters.decrease * length) * merit) {
             f = ahead;
-            merit = there;
+            merit = new_merit;
             return true;
         }
     }

@@ -63,7 +63,8 @@ public:
         w.noalias() += W() * f;
     }
     // Compute the scale of the errors of each element's equations: the response to the largest w0, plus the rounding of
-    // much larger forces. Forces that only squeeze do not make an error small.
+    // much larger forces. The scale grows only by a small part of the forces, so that forces without a response do not hide
+    // an error.
     void force_scales(const Eigen::Ref<const VecX>& f, Eigen::Ref<VecX> size) const;
 
 private:

@@ -57,8 +57,8 @@ Search::Search(const ReactionEquation& given) : eq_(given), n_(given.size()) {
     // Scale the unknowns to the size that loads without friction give them, directly or through each other.
     std::fill(eq_.directed.begin(), eq_.directed.end(), char(0));
     eq_.steepest(L_);
-    const VecX own = eq_.steepest_in_s();
-    scale_ = own + L_ * own;
+    const VecX direct_size = eq_.steepest_in_s();
+    scale_ = direct_size + L_ * direct_size;
     scale_ = scale_.cwiseMax(scale_.maxCoeff() * 1e-12 + 1e-300);
     for (int k = 0; k < eq_.vectors(); ++k) {
         eq_.offset.col(k) /= scale_[eq_.element[k]];

@@ -54,8 +54,8 @@ private:
         distance = other.at.distance;
         n = of_second ? Vec(-other.at.n) : other.at.n;
     }
-    void try_rim(const Sides& s, const Revolved& own, double end, const Revolved& other, bool of_second) {
-        const NearestAroundRim<Sides> rim(s, end * own.half, end > 0.0 ? own.above : own.below);
+    void try_rim(const Sides& s, const Revolved& rim_solid, double end, const Revolved& other, bool of_second) {
+        const NearestAroundRim<Sides> rim(s, end * rim_solid.half, end > 0.0 ? rim_solid.above : rim_solid.below);
         const Found there = rim.find(s, other);
         if (there.at.distance < distance) take(there, of_second);
     }

@@ -37,13 +37,13 @@ double EventSearch::margin(const Watch& watch, double t, const VecX& y) {
 std::optional<Crossing> EventSearch::deepest_penetration(const Watch& touches) {
     std::optional<Crossing> out;
     if (gaps_.candidates().empty()) return out;
-    double least = -touching_width * scene_size(p, w);
+    double lowest_width = -touching_width * scene_size(p, w);
     for (const GapSearch::Candidate& candidate : gaps_.candidates()) {
         const Watch watch{Watch::Kind::gap, candidate.gap};
         if (touches.kind == watch.kind && touches.index == watch.index) continue;
-        const double deep = margin(watch, stepper_.t0 + stepper_.h, stepper_.y1);
-        if (!(deep < least)) continue;
-        least = deep;
+        const double width = margin(watch, stepper_.t0 + stepper_.h, stepper_.y1);
+        if (!(width < lowest_width)) continue;
+        lowest_width = width;
         out = Crossing{watch, 1.0, gap_rate(p, w, candidate.gap) * stepper_.h};
     }
     return out;

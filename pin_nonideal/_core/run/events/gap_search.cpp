@@ -81,28 +81,28 @@ const std::vector<GapSearch::Candidate>& GapSearch::find_candidates() {
 // Check if a gap stays open between two samples. The two parabolas of the bound through both samples lie below the gap.
 // The gap is open if the larger of them is positive at its lowest point.
 bool GapSearch::stays_open(int gap, const GapSample& a, const GapSample& b, double bound) const {
-    const double length = (b.part - a.part) * stepper_.h, least = -rounding_;
-    if (!(a.width > least) || !(b.width > least)) return false;
+    const double length = (b.part - a.part) * stepper_.h, min_width = -rounding_;
+    if (!(a.width > min_width) || !(b.width > min_width)) return false;
     if (a.separation) {
         const Kind& kind = p.blocks[p.gaps[gap].block].kind;
-        return stays_apart(kind, *a.separation, *b.separation, bound, curvature_.speed(gap), length, least);
+        return stays_apart(kind, *a.separation, *b.separation, bound, curvature_.speed(gap), length, min_width);
     }
-    if (has_lowest_point(p, gap)) return stays_above(a.width, b.width, 0.5 * bound * length * length, least);
+    if (has_lowest_point(p, gap)) return stays_above(a.width, b.width, 0.5 * bound * length * length, min_width);
     const double change = b.rate - a.rate + bound * length;  // negative: no valid bound
     if (change <= 0.0) return change >= -parameters.rate_rounding * (std::abs(a.rate) + std::abs(b.rate));
     const double meet = (a.width - b.width + b.rate * length + 0.5 * bound * length * length) / change;
     if (!(meet > 0.0 && meet < length)) return true;
-    return a.width + meet * (a.rate - 0.5 * bound * meet) > least;
+    return a.width + meet * (a.rate - 0.5 * bound * meet) > min_width;
 }
 
 // Check if a duplicate of the gap is closed. The gap follows the duplicate.
 bool GapSearch::has_closed_copy(int gap) const {
     const std::vector<int>& closed_gaps = w.now.closed_gaps;
-    return std::any_of(closed_gaps.begin(), closed_gaps.end(), [&](int held) { return are_duplicates(p, held, gap); });
+    return std::any_of(closed_gaps.begin(), closed_gaps.end(), [&](int closed) { return are_duplicates(p, closed, gap); });
 }
 
 bool GapSearch::slides_on(int gap) const {
-    return std::any_of(closed_round_.begin(), closed_round_.end(), [&](int held) { return same_bodies(p, gap, held); });
+    return std::any_of(closed_round_.begin(), closed_round_.end(), [&](int closed) { return same_bodies(p, gap, closed); });
 }
 
 GapSample GapSearch::above(GapSample sample, double level) const {
@@ -114,10 +114,10 @@ GapSample GapSearch::above(GapSample sample, double level) const {
 double GapSearch::level_here(int gap, double part) const {
     double level = plane(gap);
     if (!Separation::has(p, gap)) return level;
-    for (int held : closed_round_) {
-        if (!same_bodies(p, gap, held)) continue;
-        measure_gap(p, w, stepper_.t0 + part * stepper_.h, system_.v, held);
-        level = std::min(level, gap_width(p, w, held));
+    for (int closed : closed_round_) {
+        if (!same_bodies(p, gap, closed)) continue;
+        measure_gap(p, w, stepper_.t0 + part * stepper_.h, system_.v, closed);
+        level = std::min(level, gap_width(p, w, closed));
     }
     return level;
 }

@@ -13,7 +13,7 @@ struct ModeSwitchParameters {
     double forced_switch_spacing = 1e3;
     // Maximum speed [m/s or rad/s] of slip that is about to rest or to begin, relative to 1 + the largest velocity.
     double max_creep_speed = 1e-8;
-    // Length of a tiny step, relative to the time, in seconds below 1 s. In shorter steps the motion itself fails.
+    // Length of a tiny step, relative to the time, in seconds below 1 s. Motions over shorter steps are lost in rounding.
     double tiny_step = 1e-10;
 };
 

@@ -94,11 +94,11 @@ double ReleaseLocator::release_part(double rate, const std::vector<Mode>& modes,
         stepper_.interpolate(next, y);
         system_.read(y);
         update_kinematics(p, w, t, system_.q, system_.v);
-        const std::optional<double> there = release_rate(t, y, modes, mode_query);
-        falls = there && rate < HUGE_VAL && *there < parameters.max_rate_ratio * rate;
-        if (there) {
+        const std::optional<double> found_rate = release_rate(t, y, modes, mode_query);
+        falls = found_rate && rate < HUGE_VAL && *found_rate < parameters.max_rate_ratio * rate;
+        if (found_rate) {
             beyond = std::exchange(high, next);
-            rate_beyond = std::exchange(rate, *there);
+            rate_beyond = std::exchange(rate, *found_rate);
         } else {
             low = next;
         }

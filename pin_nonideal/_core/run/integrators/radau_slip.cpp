@@ -112,7 +112,7 @@ void Collocation::evaluate_stages(bool first) {
 void Collocation::find_response() {
     Workspace& w = system_.w;
     const double end = step_.t0 + step_.h;
-    const VecX here = w.now.a, v = w.now.v;
+    const VecX acceleration = w.now.a, v = w.now.v;
     for (const Element& e : elements_) {
         for (int k = 0; k < e.dim; ++k) {
             double& component = w.state.last_direction[e.index][k];
@@ -120,7 +120,7 @@ void Collocation::find_response() {
             component += parameters.perturbation;
             solve_dynamics(system_.p, w, end, v);
             component = before;
-            G_.col(e.row + k) = (w.now.a - here) / parameters.perturbation;
+            G_.col(e.row + k) = (w.now.a - acceleration) / parameters.perturbation;
         }
     }
 }
