@@ -25,9 +25,9 @@ class ProjectionReport:
             of the mechanism. The name is the joint's name, with an index from 0 if the joint has several
             coordinates. Empty without a displacement.
         moved: displacement of this coordinate [rad or m].
-        gap: largest residual before [m or rad, in the scale of its row]. iterations: steps of the search; 0
-        if Newton's method sufficed. nearest: whether the search confirms the configuration as nearest: it is
-        a local minimum of the
+        gap: largest residual before [m or rad, in the scale of its row].
+        iterations: steps of the search; 0 if Newton's method sufficed.
+        nearest: whether the search confirms the configuration as nearest: it is a local minimum of the
             distance, and no other start led to a nearer one. After a long displacement, two starts of the
             search must end at the same configuration.
         velocity_distance: sqrt(d^T M d) of the change d = v' - v of the velocity [sqrt(kg) m/s].
