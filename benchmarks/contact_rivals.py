@@ -1,7 +1,7 @@
 """MuJoCo, Drake and Pinocchio's ADMM solver on contact cases, with their best settings.
 
-MuJoCo and Drake (discrete solver SAP) have compliant contacts.  Their stiffness is the largest that the step
-resolves.  The contact of the bouncing ball has the damping of its restitution.
+MuJoCo and Drake (discrete solver SAP) have compliant contacts. The stiffness of both is the largest that the
+step resolves. The contact of the bouncing ball has the damping of its restitution.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Unilateral contacts, compared with MuJoCo, Drake and Pinocchio's ADMM solver.
 
 The module measures time against error of three cases with closed forms: a bouncing ball, a box that slides to
-rest, and a box at rest on a slope.  It also measures the cost of a step of a standing quadruped, of an
-impact, and of open contacts.  Settings of rivals follow their documentation (`contact_rivals`).
+rest, and a box at rest on a slope. The benchmark also measures the cost of a step of a standing quadruped, of
+an impact, and of open contacts. Settings of rivals follow their documentation (`contact_rivals`).
 """
 
 from __future__ import annotations

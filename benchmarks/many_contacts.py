@@ -39,7 +39,7 @@ QUICK = 4  # number of scenes of a quick run
 def measure(given: ContactScene, rounds: int, with_mujoco: bool) -> dict[str, Any]:
     """Return the times of one scene, and what its motion shows.
 
-    The time of a run includes its start. It is the processor's, by the minimum of some interleaved runs.
+    The time of a run includes its start. This time is processor time, the minimum of some interleaved runs.
     """
     begin = timing.clock()
     scene = ours(given)

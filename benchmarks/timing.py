@@ -1,7 +1,7 @@
 """Timing on a shared machine: batches, contestants in alternating rounds, minima, medians of ratios.
 
-`clock` measures the processor time of the calling thread.  It equals wall time on an idle machine, since
-tools run on one thread.  On a busy machine, wall time would penalize long runs, which are preempted more
+`clock` measures the processor time of the calling thread. Processor time equals wall time on an idle machine,
+since tools run on one thread. On a busy machine, wall time would penalize long runs, which are preempted more
 often.
 """
 

@@ -1,9 +1,9 @@
 """Overconstrained loops of hinges with one degree of freedom.
 
 Random linkages of Goldberg, Myard, Sarrus and Bricard, and planar four-bars.  Hinge k is a line through a
-point along a unit vector at zero angles.  It joins body k - 1 to body k.  Body 0 is the ground, and the last
-hinge joins the last body to the ground.  The columns of J are the hinges' screws in world axes, and t is the
-unit vector with J t = 0:
+point along a unit vector at zero angles. Hinge k joins body k - 1 to body k. Body 0 is the ground, and the
+last hinge joins the last body to the ground. The columns of J are the hinges' screws in world axes, and t is
+the unit vector with J t = 0:
 
     v = t s,   t' = -J^+ (J' t),   J'_k = [sum_{i<k} J_i t_i, J_k],
     m s' = f - n s^2,   m = sum of (mass c'.c' + w.I w),   n = sum of (mass c'.c'' + w.I w')

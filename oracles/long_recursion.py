@@ -1,7 +1,7 @@
 """Accelerations of trees in long double, by the articulated-body recursion in body axes.
 
-The recursion is Featherstone's, with 6 x 6 matrices and velocity products at each body.  It shares no code
-with the core, which works in world axes and on the bias forces of the whole motion.
+The recursion is Featherstone's, with 6 x 6 matrices and velocity products at each body. The recursion shares
+no code with the core, which works in world axes and on the bias forces of the whole motion.
 """
 
 from __future__ import annotations

@@ -73,7 +73,7 @@ if TYPE_CHECKING:
     from .statics.equilibrium import Equilibrium, equilibrium
     from .statics.holding import HoldingTorque
     from .statics.inverse_dynamics import InverseDynamics, inverse_dynamics
-    from .statics.static_feasibility import Rest, rest
+    from .statics.rest import Rest, rest
     from .statics.track_trajectory import TrackTrajectory
     from .sweeps.grid import sweep_grid, sweep_samples
     from .sweeps.store import Sweep
@@ -100,8 +100,8 @@ _LATER = {
     "HoldingTorque": "statics.holding",
     "InverseDynamics": "statics.inverse_dynamics",
     "inverse_dynamics": "statics.inverse_dynamics",
-    "Rest": "statics.static_feasibility",
-    "rest": "statics.static_feasibility",
+    "Rest": "statics.rest",
+    "rest": "statics.rest",
     "TrackTrajectory": "statics.track_trajectory",
     "sweep_grid": "sweeps.grid",
     "sweep_samples": "sweeps.grid",

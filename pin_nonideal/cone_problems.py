@@ -84,7 +84,7 @@ def cone_complementarity(
 
     The friction cone is circular and exact. The conditions are equivalent to f in K = {|f_t| <= mu f_n},
     u = w + (mu |w_t|, 0) in the dual cone of K, and f . u = 0. W is the Delassus matrix A M^-1 A^T of the
-    contacts' rows, of any rank. It may be any square matrix: contacts with known slip direction give
+    contacts' rows, of any rank. W may be any square matrix: contacts with known slip direction give
     nonsymmetric ones. w are velocities and f impulses, or w accelerations and f forces.
 
     Args:

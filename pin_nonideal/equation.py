@@ -35,8 +35,8 @@ Array = NDArray[np.floating[Any]]
 RANK_TOLERANCE = 1e-10
 # A row below this part of the longest row is the rounding of a vanishing row (a planar loop closed in 3D).
 ZERO_ROW = 1e-14
-# Redundant rows are inconsistent if their residual exceeds this part of the acceleration scale. It is a
-# hundred times the largest remainder of a redundant row, so rounding alone never raises.
+# Redundant rows are inconsistent if their residual exceeds this part of the acceleration scale. The tolerance
+# is a hundred times the largest remainder of a redundant row, so rounding alone never raises.
 RESIDUAL_TOLERANCE = 1e-8
 # Number of refinements. Each gains the correct digits of one response, which are few if M has condition 1e12.
 REFINEMENTS = 2

@@ -59,8 +59,8 @@ def states(problem: Any) -> Any:
 class Coordinates:
     """Map of configurations and velocities between a pinocchio.Model and MuJoCo.
 
-    MuJoCo may have another order of joints.  Its quaternions begin with the real part.  The linear velocity
-    of its free joints is in world axes.
+    MuJoCo may have another order of joints. Quaternions of MuJoCo begin with the real part. The linear
+    velocity of its free joints is in world axes.
     """
 
     def __init__(self, model: Any, mj: Any) -> None:

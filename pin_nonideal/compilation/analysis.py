@@ -1,6 +1,6 @@
 """Checks before the first step: invalid numbers in the model, zero or duplicate rows, wrong derivatives.
 
-User functions are called near states of a run only. Rows that they define are never removed.
+User functions are called near states of a run only. Rows of user functions are never removed.
 """
 
 from __future__ import annotations

@@ -63,7 +63,7 @@ class SampledControl:
     Args:
         function: (t, q, v) -> tau, shape (nv,) or by joint name, called once per period.
         period: sample period [s].
-        delay: delay of the torque [s], not negative. It is rounded up to a whole number of periods.
+        delay: delay of the torque [s], not negative. The delay is rounded up to a whole number of periods.
         delay_samples: delay as a number of samples instead.
         initial: torque before the first delayed torque [N m or N], (nv,) or by joint name; None for zero.
         name: used in messages and results.

@@ -145,8 +145,8 @@ class UserLaw:
     """Any law C(q, v, t, reactions) as a Python function, optionally with states.
 
     `reactions.lam` holds all multipliers, `reactions[name]` those of one constraint, and
-    `reactions.wrench(name)` the wrench of a joint or an anchor. The function must be pure. It must be finite
-    for any reactions, since iterations call it with provisional reactions.
+    `reactions.wrench(name)` the wrench of a joint or an anchor. The function must be pure. The force must be
+    finite for any reactions, since iterations call it with provisional reactions.
 
     Args:
         function: (t, q, v, reactions) -> C, shape (nv,); with states: (t, q, v, reactions, z) -> (C, dz/dt).

@@ -24,9 +24,9 @@ DEFAULT_ROUNDING = 1e-3
 # Number of points that support a cylinder on its face, and the radius of their circle relative to the radius
 # of the face. From a tilt of 0.03 rad on, the rim is lower than these points.
 FACE_POINTS, FACE_CIRCLE_RATIO = 8, 0.97
-# Inset of the side of a cylinder, relative to the rounding of edges or to the inset of rims. It keeps the
-# side apart from rims and corners, so that no two contacts coincide and a line along the side touches both
-# rims.
+# Inset of the side of a cylinder, relative to the rounding of edges or to the inset of rims. The inset keeps
+# the side apart from rims and corners, so that no two contacts coincide and a line along the side touches
+# both rims.
 SIDE_INSET = 0.01
 
 

@@ -1,4 +1,4 @@
-"""New scenes from a scene: parts replaced, added or removed, and robots put on the ground."""
+"""Base class of scenes with `replace` and `put_on_ground`, which return changed copies."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from pin_nonideal.types import State
 
 from .base import SceneBase
 from .copying import rebuilt
-from .editing import UNCHANGED, UnchangedType, on_ground, parts_of_replacement
+from .replacement import UNCHANGED, UnchangedType, on_ground, parts_of_replacement
 
 S = TypeVar("S", bound="EditableScene")
 

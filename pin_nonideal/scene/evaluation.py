@@ -61,7 +61,7 @@ class Evaluator:
             tau: joint torques instead of the scene's actuation, (nv,).
             modes: mode of each friction element, or None.
             several: "error" or "continue".
-            unilateral: whether the scene has contacts that open.
+            unilateral: whether the scene has unilateral contacts.
 
         Raises:
             InputError: wrong shapes or numbers.

@@ -172,7 +172,8 @@ class Scene(EditableScene):
                 open contact. The mode of a pair of shapes holds at all of its points. None determines the
                 modes by velocity and complementarity.
             several: behavior if the laws admit several motions: "error", or "continue" with the motion of
-                least friction. An element at rest that may stick or slip sticks in either case.
+                least friction. An element at rest that the laws allow to stick or to slip sticks in both
+                cases.
 
         Returns:
             The Solution; `lam` holds all rows in the order of `constraint_slices`, and zero for rows that
@@ -350,7 +351,7 @@ def require_scene(who: str, scene: object) -> None:
         scene: the argument.
 
     Raises:
-        InputError: it is something else; the message tells how a name or a model becomes a scene.
+        InputError: it is no Scene; the message states how a name or a model becomes a scene.
     """
     if isinstance(scene, Scene):
         return

@@ -123,7 +123,7 @@ class SceneStates:
         return np.array([self.configuration(one, "q") for one in q]).reshape(q.shape)
 
     def check_functions_at(self, q: State, v: State, t: float) -> None:
-        """Compare derivatives of user functions, if no state was known before.
+        """Compare derivatives of user functions, if no earlier state is known.
 
         Args:
             q: configuration, (nq,) or by joint name.

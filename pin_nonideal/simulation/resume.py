@@ -30,8 +30,8 @@ def resume(
     events and counters. `stats.wall_s` is the sum over all parts. The file is updated as before, so a run may
     be stopped any number of times. For a finished run, the trajectory is returned at once.
 
-    The file does not hold memory of user functions. They must depend on their arguments only, and keep memory
-    in the states of a `UserLaw`.
+    The file does not hold memory of user functions. User functions must depend on their arguments only, and
+    keep memory in the states of a `UserLaw`.
 
     Args:
         path: the file.

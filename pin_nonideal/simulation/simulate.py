@@ -61,7 +61,7 @@ def simulate(
             onto the constraints (`Scene.project`): an array by the least displacement, a table with its named
             entries held. `Trajectory.notes` lists notable displacements; for an array, they are also a
             RuntimeWarning.
-        v: initial velocity, (nv,) or by joint name; the scene's when None. It is projected like q.
+        v: initial velocity, (nv,) or by joint name; the scene's when None. The velocity is projected like q.
         t0: initial time [s].
         method: "dop853" (order 8) or "dopri5" (order 5), adaptive; "rk4", "semi_implicit_euler" or "moreau"
             (time stepping at velocity level), fixed dt; "Radau", "BDF" or "LSODA" by SciPy, for stiff scenes.
@@ -93,8 +93,8 @@ def simulate(
         strict: whether an impact that gains energy raises an ImpactEnergyError; Newton's law of restitution
             with friction may gain energy. Otherwise an event of kind "impact" has a positive energy_change.
         progress: progress bar on standard error; None shows it on a terminal only.
-        checkpoint: file from which `resume` can continue the run if it is killed; None for no file. It is
-            replaced atomically at the start, at the end, on Ctrl-C between two steps, and every
+        checkpoint: file from which `resume` can continue the run if it is killed; None for no file. The file
+            is replaced atomically at the start, at the end, on Ctrl-C between two steps, and every
             `checkpoint_interval`. Methods of the core only.
         checkpoint_interval: wall time between checkpoints [s]; 0 for a checkpoint after every step.
 
@@ -112,8 +112,8 @@ def simulate(
         WallTimeError: `max_wall` is exceeded.
         RunError: the run stopped early; its `trajectory` holds the samples before the stop.
         ImpactEnergyError: an impact gained energy, and `strict` is True.
-        RunInterrupted: Ctrl-C was pressed; its `trajectory` holds the samples before the stop. It is empty if
-            decoupled mechanisms ran one after another.
+        RunInterrupted: Ctrl-C was pressed; its `trajectory` holds the samples before the stop. The trajectory
+            is empty if decoupled mechanisms ran one after another.
     """
     require_scene("simulate", scene)
     requests, between = parse_events(events), parse_callback(callback, scene.model.nv)

@@ -64,9 +64,9 @@ def named_configuration(
     """Return a configuration from numbers, a table by joint name, or a name, (nq,).
 
     A table maps a joint name to a number, to the joint's values, or to a table of pieces. A floating base has
-    the pieces "xyz" and either "rpy" or "quaternion" [x, y, z, w]. Its name is the name of the joint or the
-    body, or "base". A ball joint has "rpy" or "quaternion", a planar joint "xy" and "angle", and a
-    translation joint "xyz". An angle [rad] replaces (cos, sin). Missing entries stay as in `base`. A string
+    the pieces "xyz" and either "rpy" or "quaternion" [x, y, z, w]. The name of a floating base is that of the
+    joint or the body, or "base". A ball joint has "rpy" or "quaternion", a planar joint "xy" and "angle", and
+    a translation joint "xyz". An angle [rad] replaces (cos, sin). Missing entries stay as in `base`. A string
     is the name of a reference configuration of the model.
 
     Args:

@@ -28,8 +28,8 @@ class ProjectionReport:
         gap: largest residual before [m or rad, in the scale of its row].
         iterations: steps of the search; 0 if Newton's method sufficed.
         nearest: whether the search confirms the configuration as nearest: it is a local minimum of the
-            distance, and no other start led to a nearer one. After a long displacement, two starts must end
-            at it.
+            distance, and no other start led to a nearer one. After a long displacement, two starts of the
+            search must end at the same configuration.
         velocity_distance: sqrt(d^T M d) of the change d = v' - v of the velocity [sqrt(kg) m/s].
         velocity_coordinate: name of the coordinate with the largest change of velocity over its unit; empty
             without a change.
@@ -68,8 +68,8 @@ def report_of(
         model: pinocchio.Model.
         unit: unit displacement of each coordinate, (nv,).
         mass: q -> M, (nv, nv).
-        start: q (nq,) and v (nv,) before.
-        projected: q (nq,) and v (nv,) after.
+        start: q (nq,) and v (nv,) before the projection.
+        projected: q (nq,) and v (nv,) after the projection.
         held: named entries.
         gap: largest residual before [m or rad, in the scale of its row].
         iterations: steps of the search.

@@ -21,7 +21,7 @@ from .residual import AtRest
 
 Mask = NDArray[np.bool_]
 
-# Velocities of a coordinate below this part of the admitted ones depend on the coordinates chosen before.
+# Velocities of a coordinate below this part of the admitted velocities depend on coordinates chosen earlier.
 MIN_INDEPENDENT_VELOCITY = 1e-6
 MAX_MOVE = 0.1  # move of a given coordinate between two closures, in rad or relative to the scene's length
 LOG_ROUNDING = 1e-3  # largest move of a given coordinate, in rad or relative to the scene's length

@@ -46,8 +46,8 @@ class Equilibrium:
         free: orthonormal basis of the motions that the constraints admit, (nv, k).
         stiffness: stiffness matrix along `free`, - free^T d(F + A^T lam)/dq free, (k, k).
         rates: eigenvalues of the stiffness relative to the inertia along `free`, sorted by real part
-            [1/s^2], (k,). They are squared angular frequencies of small motions. A negative or complex
-            eigenvalue belongs to a growing motion.
+            [1/s^2], (k,). The eigenvalues are squared angular frequencies of small motions. A negative or
+            complex eigenvalue belongs to a growing motion.
         stable: True, False, or None if a direction is neutral and no motion grows.
         starts: number of starts used.
     """

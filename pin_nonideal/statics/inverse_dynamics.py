@@ -82,10 +82,10 @@ def inverse_dynamics(
     square radius of gyration of the driven joints.
 
     The torques satisfy free^T (M a - F - C - tau) = 0 along the motions `free` that the constraints admit.
-    They act on the actuated joints only. Friction C follows from the reactions under these torques. The
-    scene's actuation is ignored. A sticking element that stays at rest exerts no friction. At rest, `holding`
-    has the band of torques around tau in which friction holds the scene. Contacts that are open, or that the
-    motion opens, exert no force.
+    The torques act on the actuated joints only. Friction C follows from the reactions under these torques.
+    The scene's actuation is ignored. A sticking element that stays at rest exerts no friction. At rest,
+    `holding` has the band of torques around tau in which friction holds the scene. Contacts that are open, or
+    that the motion opens, exert no force.
 
     Args:
         scene: the scene.

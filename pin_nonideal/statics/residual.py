@@ -213,8 +213,8 @@ class AtRest:
         """Return unit displacements of coordinates: 1 rad for angles, and a length for slides, (k,).
 
         The length is the root mean square radius of gyration along the motions that the constraints admit.
-        It is independent of the unit of length and of the mount. It is 1 if all coordinates are angles or all
-        are slides.
+        This length is independent of the unit of length and of the mount. The length is 1 if all coordinates
+        are angles or all are slides.
 
         Args:
             M: mass matrix, (nv, nv).

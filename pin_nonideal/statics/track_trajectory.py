@@ -41,7 +41,7 @@ class TrackTrajectory(SceneDrive):
     of the components of both velocities. The reference passes through the samples: q_r is a cubic in
     tangent coordinates between two samples, v_r and a_r are its derivatives. Before the first and after the
     last sample, the reference rests at the end of the samples: v_r = a_r = 0. Steps end at the first and the
-    last sample. They end at all samples if v is given, or if the configurations of a joint are no vectors.
+    last sample. Steps end at all samples if v is given, or if the configurations of a joint are no vectors.
 
     The drive commands the joints of `joints`. If `joints` is None, it commands the joints that q names. If q
     is an array, it commands the joints that kp or kd name, a number acts on joints with one degree of
@@ -219,7 +219,7 @@ def _with_gain(model: Model, gain: Array) -> Mask:
 
 
 class _Tracking:
-    """Torques along a reference, with a feedforward of the tree.
+    """Torques along a reference, with a feedforward from the tree without its constraints.
 
     Args:
         model: pinocchio.Model.
@@ -273,8 +273,8 @@ class _ConstrainedTracking:
 
     Args:
         model: pinocchio.Model.
-        make: function that returns the reference. It is called before a run or at the first torque, since
-            functions of users are called in runs only.
+        make: function that returns the reference. The function is called before a run or at the first torque,
+            since functions of users are called in runs only.
         kp: stiffness, (nv,).
         kd: damping, (nv,).
     """

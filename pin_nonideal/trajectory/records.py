@@ -81,7 +81,7 @@ class Stats:
         limited_by_rounding: accepted steps whose error exceeds the tolerances because of rounding in the
             accelerations; shorter steps would not reduce it.
         rounding: largest rounding error of an acceleration relative to the largest acceleration; 0 if it was
-            not measured. It is measured in runs of more than 20,000 adaptive steps of the core.
+            not measured. This rounding is measured in runs of more than 20,000 adaptive steps of the core.
     """
 
     steps: int = 0
@@ -126,8 +126,8 @@ class LawRecord:
     def slip_velocity(self) -> Array | None:
         """Slip velocity of the law's element [rad/s or m/s], (nt,), positive in mode +1.
 
-        Laws of several directions, such as contacts in space, have the shape (nt, n). It is None without
-        elements, and for a run without a scene. It is computed at the first access.
+        Laws of several directions, such as contacts in space, have the shape (nt, n). The value is None for a
+        law without elements and for a run without a scene. The first access computes it.
         """
         return self._slip()
 
@@ -208,8 +208,8 @@ class ContactRecord:
             the body of the contact's first frame, or for several points the later joint of the model.
         closed: whether a contact point is closed, (nt,).
         force: resultant of the normal forces and the friction, in world axes [N], (nt, 3).
-        torque: moment of these forces about `center`, in world axes [N m], (nt, 3). It does not include
-            torsional and rolling resistance.
+        torque: moment of these forces about `center`, in world axes [N m], (nt, 3). This moment does not
+            include torsional and rolling resistance.
         normal_force: sum of the normal forces [N], (nt,).
         center: center of pressure, the mean of the contact points weighted by their normal forces, in the
             world [m], (nt, 3); not a number without a normal force.

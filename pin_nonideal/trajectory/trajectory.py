@@ -70,7 +70,8 @@ class Trajectory(RunFields):
             friction, in world axes [N], (nt, 3); record "forces". The force of a pair of shapes with several
             points is the resultant on the later joint of the model; `contact` returns both bodies.
         contact_torques: moment of these forces about the center of pressure by name of the contact, in world
-            axes [N m], (nt, 3); record "forces". It does not include torsional and rolling resistance.
+            axes [N m], (nt, 3); record "forces". This moment does not include torsional and rolling
+            resistance.
         contact_points: points of each contact by name, with gap and force, see `ContactPoints`; record
             "contact_points".
         points: points of pairs of shapes that touch, for replays and `contact`.
@@ -80,8 +81,8 @@ class Trajectory(RunFields):
         user_events: zeros of each function in `simulate(events=[...])`, with times and states.
         events: events in order of time.
         stats: counters of the run.
-        scene: scene of the run. It is None in another process if the scene cannot be pickled, and after
-            `load` if the scene was not created by the function `load`.
+        scene: scene of the run. The scene is None in another process if the scene cannot be pickled, and
+            after `load` if the scene was not created by the function `load`.
         element_names: names of the columns of `modes`.
         element_laws: index of the law of each element.
         law_names: names of the laws.
@@ -218,9 +219,9 @@ class Trajectory(RunFields):
         own axes are those of the other joint.
 
         The wrench through a fixed joint, or through a link, is exerted on the part beyond it, about its
-        origin: the rate of momentum of that part minus its weight and minus all other forces on it.  It is
-        computed from the inertias that Pinocchio keeps in the frames of fixed joints.  A fixed joint whose
-        link has no inertia there is massless.  The name of a link stands for the joint that carries it.
+        origin: the rate of momentum of that part minus its weight and minus all other forces on it. The load
+        is computed from the inertias that Pinocchio keeps in the frames of fixed joints. A fixed joint whose
+        link has no inertia there is massless. The name of a link stands for the joint that carries it.
 
         Args:
             name: name of a joint of the model, also of a fixed joint or a link, or of an anchor or contact,

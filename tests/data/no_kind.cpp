@@ -1,4 +1,4 @@
-// A kind of constraint that says nothing of itself must not compile.
+// A kind of constraint without declared properties must not compile.
 #include "constraints/row_completeness.hpp"
 
 struct NoKind {};

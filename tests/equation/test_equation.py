@@ -251,7 +251,7 @@ class TestRowsInAnyForm:
         assert_close(s.lam, np.array([-0.2, -0.4]), ROADS)
 
     def test_units_of_coordinates_change_nothing(self):
-        """Some coordinates in micrometers, some in megameters: q = S q', so M' = S M S and A' = A S."""
+        """With coordinates in micrometers and megameters, q = S q', M' = S M S and A' = A S."""
         M, F, A, b, C = problem(52, 6, 3, 1)
         S = 10.0 ** np.array([-6.0, 6.0, -6.0, 6.0, -6.0, -6.0])
         reference, other = solve(M, F, A, b, C), solve(S[:, None] * M * S, S * F, A * S, b, S * C)

@@ -183,7 +183,7 @@ class TestContactsOfLinks:
         assert run.closed[-1].all()
 
     def test_pairs_of_the_srdf(self, quadruped):
-        """Pairs of the loaded robot are those that its SRDF leaves; links select some of them."""
+        """A loaded robot has all pairs that its SRDF does not disable; names of links select some pairs."""
         model, shapes = quadruped.model, quadruped.collision_model
         pairs = pn.geometry_contacts(model, shapes, mu=0.2)
         assert len(pairs) == len(shapes.collisionPairs) > 0
@@ -200,7 +200,7 @@ class TestContactsOfLinks:
         assert {c.name for c in contacts} == {None}
 
     def test_adjacent_bodies(self):
-        """Three links in a row: only the outer two are not adjacent."""
+        """In three links in a row only the outer two are not adjacent."""
         model, shapes, joint = pin.Model(), pin.GeometryModel(), 0
         for k in range(3):
             joint = model.addJoint(joint, pin.JointModelRY(), pin.SE3(np.eye(3), 0.3 * np.eye(3)[0]), f"j{k}")

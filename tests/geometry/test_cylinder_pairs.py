@@ -54,7 +54,7 @@ def octagons(kind):
 
 
 def stood_back(kind, back, by=0.0):
-    """The solid whose faces lie that much deeper, and its side by some at its widest, and where it is."""
+    """Return the solid with its faces and side moved inward, and the placement of the solid."""
     length, radius = 2.0 * HALF, RADIUS - by
     if kind == "cone":
         return coal.Cone(radius * (1.0 - back / length), length - back), raised(0.5 * back)
@@ -101,7 +101,7 @@ def point(at):
 
 
 def distance(first, at1, second, at2):
-    """Coal's, in both orders: in one it takes some pairs that are apart for touching ones."""
+    """Return Coal's distance, the larger one of both orders: in one order some separate pairs touch."""
     return max(by_coal(first, at1, second, at2)[0], by_coal(second, at2, first, at1)[0])
 
 
@@ -124,7 +124,7 @@ def free(thing, fixed, *, inertia=None, gravity=(0.0, 0.0, -GRAVITY), **more):
 
 
 class Modelled:
-    """The distance of two shapes as their contacts stand for them, part by part, by Coal.
+    """Distance by Coal of the parts of two shapes that their contacts represent.
 
     Each part is one of either shape, where they are, and the radius around both; of a segment and the rims
     that stand back by a search along it.
@@ -174,7 +174,7 @@ def modelled_as(scene, other, kind, rounding=None):
 @pytest.mark.parametrize("rounding", [None, ROUNDING])
 @pytest.mark.parametrize("count", [200, pytest.param(1000, marks=pytest.mark.slow)])
 def test_gaps_beside_coal(kind, other, rounding, count):
-    """At random placements, those included that have entered each other by less than their rounding."""
+    """Gaps agree with Coal at random placements, also if shapes penetrate by less than their rounding."""
     scene, places = pair(kind, other, rounding=rounding)
     oracle = modelled_as(scene, other, kind, rounding)
     compared, worst = 0, 0.0
@@ -246,7 +246,7 @@ def test_what_rests(what):
 @pytest.mark.parametrize("fixed", TABLES, ids=["box", "mesh"])
 @pytest.mark.parametrize("beyond", [-0.02, 0.01])
 def test_a_can_over_an_edge(fixed, beyond):
-    """It stands as long as its weight points at the table, and tips over where it does not."""
+    """A can stands as long as its weight acts inside the table, and tips over otherwise."""
     run = pn.simulate(free(CAN, fixed, mu=0.5), 0.5, q=[0.5 + beyond, 0.1, 0.35, 0, 0, 0, 1])
     if beyond < 0.0:
         assert np.abs(run.v).max() == 0.0
@@ -264,7 +264,7 @@ def test_a_can_lands_on_its_face(fixed):
 
 @pytest.mark.parametrize("fixed", [coal.Box(4.0, 1.0, 0.4), convex(0.5 * CUBE * [4.0, 1.0, 0.4])], ids=type)
 def test_a_can_rolls_down_a_face(fixed):
-    """Lying on it: 2/3 g sin of the slope."""
+    """A lying can rolls with 2/3 g sin of the slope."""
     slope, across = 0.3, (3.0 * 0.1**2 + 0.3**2) / 12.0
     gravity = GRAVITY * np.array([np.sin(slope), 0.0, -np.cos(slope)])
     scene = free(CAN, fixed, mu=0.5, inertia=np.diag([across, across, 0.5 * 0.1**2]), gravity=gravity)
@@ -274,7 +274,7 @@ def test_a_can_rolls_down_a_face(fixed):
 
 
 def test_a_plank_rocks_on_a_lying_cylinder():
-    """Without slipping: the motion of a block on a cylinder, by an integration of its own."""
+    """A plank without slip has the motion of a block on a cylinder, by a separate integration."""
     size, thick, inertia = 0.4, 0.1, 0.03
     radius = size - SIDE_INSET * DEFAULT_ROUNDING * thick  # effective radius of the side for edges
 
@@ -329,7 +329,7 @@ def test_a_can_falls_on_two_rails(mu, turn):
 @pytest.mark.parametrize("length", [0.2, 0.5])
 @pytest.mark.parametrize("turn", [0.0, 1e-4])
 def test_a_capsule_falls_on_a_lying_can(length, turn):
-    """Along it, shorter and longer than it: two places carry it, its ends or the can's rims."""
+    """A capsule along the can rests on two points: its ends if it is shorter, else the can's rims."""
     model, geometry = empty((0.0, 0.0, -GRAVITY)), pin.GeometryModel()
     joint = body(model, 0, pin.JointModelFreeFlyer(), "free", 1.0, inertia=0.02 * np.eye(3))
     lying = pin.SE3(pin.rpy.rpyToMatrix(0.5 * np.pi, 0.0, 0.0), np.zeros(3))
@@ -386,7 +386,7 @@ def test_a_file_with_a_tube_that_falls_on_its_base(tmp_path):
 
 
 def thrown(kind, other, seed):
-    """One at the other, either of them free, and the start."""
+    """Return a scene of two bodies, one thrown at the other, and its start."""
     rng = np.random.default_rng(seed)
     toward = rng.normal(size=3)
     toward /= np.linalg.norm(toward)
@@ -402,7 +402,7 @@ def thrown(kind, other, seed):
 @pytest.mark.parametrize("kind", REVOLVED)
 @pytest.mark.parametrize("seeds", [range(2), pytest.param(range(60), marks=pytest.mark.stress)], ids=len)
 def test_thrown_bodies_do_not_enter(kind, other, seeds):
-    """With spin: by Coal's distance, and the ledger of energy closes; the first is repeated bit by bit."""
+    """Bodies with spin do not penetrate by Coal, and the energy ledger closes; one run is repeated."""
     struck = 0
     for seed in seeds:
         scene, start = thrown(kind, other, seed)

@@ -92,7 +92,7 @@ def pair(one, other, **more):
 
 @pytest.mark.parametrize(("one", "other"), list(combinations_with_replacement(SHAPES, 2)))
 def test_which_pairs_are_known(one, other):
-    """In both orders; the others are refused by name."""
+    """Pairs are known in both orders; unsupported pairs raise an error that names them."""
     for first, second in {(one, other), (other, one)}:
         if (one, other) in KNOWN | IN_PARTS:
             assert pair(first, second)[0].contacts
@@ -102,7 +102,7 @@ def test_which_pairs_are_known(one, other):
 
 
 def placements(rng, count):
-    """Far and near, few of them deep inside each other."""
+    """Yield placements far and near; few are deep inside each other."""
     for _ in range(count):
         toward = rng.normal(size=3)
         at = rng.uniform(0.35, 1.2) * toward / np.linalg.norm(toward)
@@ -118,7 +118,7 @@ def by_coal(first, at1, second, at2):
 
 
 def modelled(scene, q):
-    """The least of the gaps of all places, and the direction from the block to the thing there."""
+    """Return the smallest gap of all contact points, and its direction from the block to the thing."""
     A, _, gaps, _ = scene._compiled.program.runner().rows(q, np.zeros(6), 0.0)
     k = gaps.argmin()
     return gaps[k], pin.XYZQUATToSE3(q).rotation @ A.reshape(-1, 6)[k, :3]
@@ -127,7 +127,7 @@ def modelled(scene, q):
 @pytest.mark.parametrize("count", [300, pytest.param(1000, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(("one", "other"), sorted(KNOWN))
 def test_gaps_and_normals_beside_coal(one, other, count):
-    """At random placements; only those that do not touch can be compared."""
+    """Gaps and normals agree with Coal at random placements of separate shapes."""
     scene, places = pair(one, other)
     edge = max((getattr(c, "radius2", 0.0) for c in points_of(scene)), default=0.0)
     (first, up1, r1), (second, up2, r2) = as_modelled(one, other, edge), as_modelled(other, one, edge)

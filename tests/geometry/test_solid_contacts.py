@@ -40,7 +40,7 @@ def pair(shape, fixed, at=None, inertia=0.02, **more):
     ids=["sphere", "capsule", "box"],
 )
 def test_a_mesh_of_a_box_is_that_box(shape, height):
-    """Thrown on it with spin: the same impacts and motion, though other formulas find them."""
+    """Falling bodies with spin have equal motions on the mesh and the box, by different formulas."""
     size = np.array([1.0, 1.2, 0.4])
     q = [0.05, -0.03, 0.35 + height, *pin.Quaternion(pin.exp3(np.array([0.2, 0.1, 0.0]))).coeffs()]
     v = [0.3, 0.1, 0.0, 1.0, 0.5, -0.3]
@@ -94,7 +94,7 @@ def test_a_ball_leaves_a_lying_cylinder(mu, cosine):
 
 
 def test_a_ball_rolls_down_a_cone():
-    """Along its side, 5/7 g sin of the slope."""
+    """A ball rolls along the side with 5/7 g sin of the slope."""
     r, base, height = 0.05, 1.0, 0.8
     scene = pair(coal.Sphere(r), coal.Cone(base, height), inertia=0.4 * r * r, mu=0.9)
     length = np.hypot(base, height)
@@ -107,7 +107,7 @@ def test_a_ball_rolls_down_a_cone():
 
 
 def test_a_ball_rests_on_a_tip():
-    """Over the tip of a cone it stands in unstable rest, and on the corner of a mesh."""
+    """A ball stands in unstable rest over the tip of a cone and on the corner of a mesh."""
     for fixed in (
         coal.Cone(0.3, 0.4),
         convex([[0, 0, 0.2], [0.3, 0, -0.2], [-0.2, 0.2, -0.2], [-0.2, -0.2, -0.2]]),
@@ -126,7 +126,7 @@ def test_a_ball_rests_on_a_tip():
     ("radius", "speed"), [(1e-2, 1.0), (1e-4, 1.0), (1e-4, 3.0), (1e-5, 1.0), (1e-6, 1.0), (1e-7, 3.0)]
 )
 def test_what_slides_over_an_edge_flies_off(fixed, radius, speed):
-    """Without friction: round the edge v^2/r is 10 to 1e7 times g, so it falls freely from there."""
+    """At the rounded edge v^2/r is 10 to 1e7 times g, so the body falls freely without friction."""
     scene = pair(coal.Sphere(radius), fixed)
     run = pn.simulate(scene, 0.5, q=[0.2, 0.1, 0.2 + radius, 0, 0, 0, 1], v=[speed, 0, 0, 0, 0, 0])
     edge = np.sqrt(0.25 - 0.01) if isinstance(fixed, coal.Cylinder) else 0.5
@@ -151,7 +151,7 @@ def test_what_rolls_over_an_edge_flies_off(fixed, mu):
 
 @pytest.mark.parametrize("seed", [2, 19])
 def test_bricks_that_slide_over_edges(seed):
-    """Thrown at each other so that a corner slides from a face over its edge: the run goes on."""
+    """Bricks collide so that a corner slides from a face over its edge, and the run continues."""
     rng = np.random.default_rng(seed)
     toward = rng.normal(size=3)
     toward /= np.linalg.norm(toward)
@@ -201,7 +201,7 @@ def thrown(kind, seed):
 @pytest.mark.parametrize("kind", THROWN)
 @pytest.mark.parametrize("seeds", [range(4), pytest.param(range(60), marks=pytest.mark.stress)], ids=len)
 def test_thrown_bodies_do_not_enter(kind, seeds):
-    """With spin: by Coal's distance, less the rounding; the first of them is repeated bit by bit."""
+    """Bodies with spin do not penetrate by Coal without rounding; one run is repeated bit by bit."""
     struck = 0
     for seed in seeds:
         scene, (first, second), edge, start = thrown(kind, seed)
@@ -229,7 +229,7 @@ def test_a_corner_comes_to_an_edge(kind, seed):
 
 
 def test_a_corner_lands_beside_one_that_slides():
-    """Slowly, while the other one leaves later in the same step: it is struck before, and does not enter."""
+    """A corner lands slowly before another one leaves in the same step: its impact is found."""
     scene, (first, second), edge, start = thrown("mesh at mesh", 168)
     run = pn.simulate(scene, 0.25, output_dt=1e-4, **start)
     assert closed_points(run).shape[1] > 1
@@ -239,7 +239,7 @@ def test_a_corner_lands_beside_one_that_slides():
 
 
 def test_faces_move_inward():
-    """Each by the same way; corners where more than three faces meet part."""
+    """Each face moves by the same distance; corners of more than three faces split."""
     inner = convex_hull(shrunk(cloud(), 0.01, "mesh"), "inner")
     outer = convex_hull(cloud(), "outer")
     for plane in inner.planes:

@@ -96,7 +96,7 @@ def test_limits_of_the_file_and_of_what_has_none():
 
 
 def test_a_sampled_control_is_cut():
-    """It asks for 10 N until 0.35 s and for 1 N from then on: it is cut at 4 N until the sample at 0.4 s."""
+    """A control demands 10 N until 0.35 s and 1 N afterwards: the force is 4 N until the sample at 0.4 s."""
     control = pn.SampledControl(lambda t, q, v: np.array([10.0 if t < 0.35 else 1.0]), period=0.1)
     run = pn.simulate(pn.Scene(slider(), actuation=pn.EffortLimits(control, 4.0)), 1.0)
     assert run.v[-1, 0] == pytest.approx(0.5 * (4.0 * 0.4 + 1.0 * 0.6), abs=SAME)

@@ -130,7 +130,7 @@ def moves(what: dict[str, Any], **image: Any) -> np.ndarray:
 
 
 def apart(one: np.ndarray, other: np.ndarray) -> float:
-    """By how much two motions differ."""
+    """Return the difference of two motions."""
     turned = np.sign(np.sum(one[:, :, 3:] * other[:, :, 3:], axis=2, keepdims=True))
     return float(
         max(np.abs(one[..., :3] - other[..., :3]).max(), np.abs(one[..., 3:] - turned * other[..., 3:]).max())

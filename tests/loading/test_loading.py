@@ -109,7 +109,7 @@ def test_example_robot_data_couples_mimic_joints():
 
 
 def test_example_robot_data_with_a_loader_of_its_own(monkeypatch):
-    """A robot whose class loads it by itself is the same robot."""
+    """A robot with its own loader class is the same robot."""
     from example_robot_data import robots_loader
 
     class Own(robots_loader.DoublePendulumLoader):
@@ -124,7 +124,7 @@ def test_example_robot_data_with_a_loader_of_its_own(monkeypatch):
 
 
 def test_example_robot_data_that_cannot_be_read(monkeypatch):
-    """Its own errors are named, and a file whose mimic joints cannot be read is a note."""
+    """Errors of example-robot-data are named, and a file with unreadable mimic joints gives a note."""
     from example_robot_data import robots_loader
 
     class Broken(robots_loader.DoublePendulumLoader):

@@ -18,7 +18,7 @@ from ..support.refusals import refuses
 
 ROUNDING = 1e-9  # error of accelerations of order 1 to 100, by two methods
 
-# Every kind of thing that is carried, each with numbers of its own.
+# Every supported element of MJCF, each with different numbers.
 RICH = """<mujoco><compiler angle="radian"/>
 <option gravity="0.3 0.2 -9" density="30" viscosity="0.4" wind="0.3 -0.2 0.1"/>
 <worldbody><site name="ground" pos="0.1 0.2 0.3"/>

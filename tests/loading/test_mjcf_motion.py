@@ -73,7 +73,7 @@ def compare_file(tmp_path_factory, text, seed):
     path.write_text(text)
     try:
         compare(path, seed)
-    except LoopClosureError:  # a loop drawn by lot that closes nowhere
+    except LoopClosureError:  # a random loop that closes at no configuration
         return
 
 

@@ -311,7 +311,7 @@ def test_the_report_says_that_limits_of_joints_play_no_part(name, told):
 
 @pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-8, 1e-10, 1e-12])
 def test_rough_four_bar_coasts_to_rest(rtol):
-    """Through many dead points of its rocker and its coupler, at each of which a rough pin reverses."""
+    """The linkage passes many dead points of rocker and coupler, at each of which slip in a pin reverses."""
     run = pn.simulate(pn.load("rough_four_bar"), 5.0, rtol=rtol)
     finest = pn.simulate(pn.load("rough_four_bar"), 5.0, rtol=1e-13)
     assert {event.kind for event in run.events[:-4]} == {"reverse"}

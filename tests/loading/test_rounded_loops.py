@@ -118,7 +118,7 @@ def linkage(path, tilt=0.0):
 
 @pytest.mark.parametrize("tilt", [0.0, 1e-15, ROUNDED])
 def test_rows_out_of_the_plane_decide_nothing(tmp_path, tilt):
-    """They have no length, or that of rounding: at unit length they would point anywhere."""
+    """Such rows are zero or rounding, and would have a random direction at unit length."""
     scenes = [pn.load(linkage(tmp_path / f"{t}.xml", t), q0={"crank": 0.3}) for t in (0.0, tilt)]
     flat, scene = scenes
     assert not any("beyond the tolerance" in note for note in scene.notes)

@@ -142,7 +142,7 @@ class TestWorm:
         assert not run.events
 
     def test_needs_torque_to_lower(self):
-        """It gives way downwards when the motor pushes with -back ratio load, not before."""
+        """The load moves down when the motor pushes with -back ratio load, not earlier."""
         back = np.tan(self.LEAD - np.arctan(self.MU)) / np.tan(self.LEAD)
         least = -back * self.RATIO * self.LOAD
         assert least > 0.0
@@ -161,7 +161,7 @@ class TestWorm:
         assert run.v[-1, 1] > 0.0
 
     def test_stops_when_the_motor_stops(self):
-        """Turning on, it is slowed by load and friction until it sticks, at a constant rate."""
+        """Load and friction slow the turning screw at a constant rate until it sticks."""
         thread = Screw(0.01, 0.1, self.RATIO / np.tan(self.LEAD), self.LEAD, 0.0, self.MU)
         for rate in (30.0, -30.0):
             ((a, _),) = thread.sliding(-self.LOAD, 0.0, np.sign(rate))

@@ -305,7 +305,7 @@ def test_meshes_are_found_in_package_folders(tmp_path):
 
 
 def test_the_next_robot_of_the_same_files_is_read_no_more(tmp_path, monkeypatch):
-    """Its model and shapes are its own all the same, and other content is read anew."""
+    """The second robot has a separate model and separate shapes, and changed content is read again."""
     (tmp_path / "t.stl").write_text(TRIANGLE)
     inside = '<visual><geometry><mesh filename="t.stl"/></geometry></visual>'
     text = robot(*ARM, link("x", inside=inside), joint("j", "base", "x"))
@@ -559,7 +559,7 @@ def test_xacro_is_expanded(tmp_path):
 
 @pytest.mark.parametrize("place", ["arm_parts", "arm", "x/arm_parts"])
 def test_xacro_finds_packages_without_ros(tmp_path, place):
-    """Beside the robot's package, around the robot's file, or in `package_dirs`; includes within includes."""
+    """Packages are found beside the robot, above its file and in `package_dirs`, also nested."""
     home, parts = tmp_path / "arm" / "urdf", tmp_path / place
     head, tail = XACRO.split('  <link name="ground"/>')
     home.mkdir(parents=True)

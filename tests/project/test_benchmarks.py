@@ -363,7 +363,7 @@ def test_the_report_keeps_full_runs_only(
 
 
 def test_series_that_coincide_are_told_apart_in_the_pictures() -> None:
-    """Two equal series over N: the color of each is seen along the line, and no two looks are alike."""
+    """Two equal series over N: the color of each is visible along the line, and all styles differ."""
     import io
 
     from PIL import Image

@@ -39,7 +39,7 @@ def path_of(name: str) -> Path:
 
 
 def imports_of(name: str, known: list[str]) -> set[str]:
-    """Modules of the package that a module imports anywhere: in functions and for type checkers too."""
+    """Return the modules of the package that a module imports, also in functions and for type checkers."""
     home = ["pin_nonideal", *name.split(".")] if name else ["pin_nonideal"]
     home = home if path_of(name).name == "__init__.py" else home[:-1]
     found = set()

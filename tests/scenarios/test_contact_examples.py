@@ -38,7 +38,7 @@ def test_the_pads_lift_only_with_enough_pressure(press: float, lifted: bool) -> 
 
 
 def test_a_weak_push_overturns_no_domino() -> None:
-    """The center of the first one stays below the top of its arc: it rocks back, and the others rest."""
+    """The center of the first domino stays below the top of its arc, so that all dominoes stand."""
     names = scene_of("dominoes", ("spin = 0.02, 0.16, 0.08, 3.0", "spin = 0.02, 0.16, 0.08, 0.5"))
     run = moved(names["scene"], 1.0)
     turned = [2.0 * np.arctan2(run.joint(name).q[:, 4], run.joint(name).q[:, 6]) for name in names["names"]]

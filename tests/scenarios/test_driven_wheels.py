@@ -79,7 +79,7 @@ def test_fixed_steps_have_their_order(kind, seed):
 
 @pytest.mark.parametrize("seed", seeds(range(300)))
 def test_a_car_that_coasts_or_is_driven_by_a_motor_goes_round(seed):
-    """A circle at constant speed, or with the acceleration that the torque gives all its inertia."""
+    """The car moves in a circle, at constant speed or with the torque over its total inertia."""
     rng = np.random.default_rng(seed)
     robot, angle, length = wheeled_robots.ackermann(rng, FUNCTIONS, drives=False)
     torque = np.zeros(robot.model.nv)

@@ -85,12 +85,12 @@ def test_falls(seed: int, mu: float, rtol: float) -> None:
 @pytest.mark.parametrize("rtol", [1e-4, 1e-8])
 @pytest.mark.parametrize("seed", [2, 3, 9, 11, 19])
 def test_a_corner_that_others_hold_hides_no_landing(seed: int, rtol: float) -> None:
-    """Its gap is zero but for rounding, and so is its rate: the instant of its touch is any."""
+    """Gap and gap rate of the corner are rounding, so any instant may be that of its touch."""
     check(seed, 0.0, rtol, 0.3, kp=20.0, kd=0.4)
 
 
 def test_a_corner_slides_under_hardly_any_load() -> None:
-    """Talos leans until a corner of an edge lifts: its load is 1e-5 of the other's at last."""
+    """Talos leans until a corner of an edge lifts: its load falls to 1e-5 of the load of the other corner."""
     talos = pn.load("talos")
     model, contacts = talos.model, []
     for sole in ("left_sole_link", "right_sole_link"):

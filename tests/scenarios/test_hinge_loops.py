@@ -144,7 +144,7 @@ def closed(case: Case, closing: str = "hinge", length: float = 1.0, factor: floa
 def test_overconstrained_loops_move_by_their_one_freedom(
     family: Callable[..., Any], seed: int, request: pytest.FixtureRequest
 ) -> None:
-    """However they are closed, in any unit, by any method."""
+    """The motion has one freedom for every kind of closure, unit and method."""
     case = Case(family, seed, damping=0.02 * (seed % 2))
     for closing in CLOSINGS:
         assert case.missed(closed(case, closing), rtol=RTOL) < NEAR, closing
@@ -171,7 +171,7 @@ def test_overconstrained_loops_by_scipy(family: Callable[..., Any], method: str)
 @pytest.mark.parametrize("seed", seeds(range(300), count=1))
 @pytest.mark.parametrize("family", DRIVEN, ids=lambda family: family.__name__)
 def test_driven_loops_follow_their_drive(family: Callable[..., Any], seed: int) -> None:
-    """The first hinge swings as told: no freedom is left, and all other hinges follow at every sample."""
+    """A drive prescribes the first hinge: no freedom is left, and all other hinges follow at every sample."""
     times = np.linspace(0.0, DURATION, 16)
 
     def swing(t: float) -> tuple[float, float]:

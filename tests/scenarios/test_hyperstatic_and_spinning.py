@@ -47,7 +47,7 @@ def minimum_norm_loads(legs, x, y):
 
 @each_draw
 def test_a_load_moves_over_a_table(draw):
-    """From its middle past the edge within which least-norm loads all press: nothing happens there."""
+    """The load moves past the region in which all least-norm loads press, without an event."""
     rng = np.random.default_rng([21, draw])
     a, b, mass = decades(rng, 0.1, 2.0), decades(rng, 0.1, 2.0), decades(rng, 0.1, 1e3)
     legs = [(u, v) for u in (a, -a) for v in (b, -b)]

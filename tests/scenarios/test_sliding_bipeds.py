@@ -60,9 +60,9 @@ def test_slides_on(mu, v0):
 
 
 def test_straight_legs_go_on_by_time_stepping():
-    """There the rows of the feet lose their rank, and the loads beside it are as large as one likes.
+    """Rows of the feet lose their rank at straight legs, and loads grow without bound nearby.
 
-    Steps of 1 ms are too long for these loads: the impacts that follow differ.
+    Steps of 1 ms are too long for these loads: other impacts follow.
     """
     scene = biped(0.1, (1.0, 0.5, 0.0), 0.0)
     run = pn.simulate(scene, 0.5)

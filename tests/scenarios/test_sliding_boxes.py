@@ -28,7 +28,7 @@ def thrown(size, mass, mu, v0, q0=None, restitution=0.0):
 
 
 def loads(size, mass, mu, state):
-    """Normal forces of the corners, the least-norm ones for their sum and their moments; and their slips."""
+    """Return the corners, the directions of their slips, and their normal forces of least norm."""
     x, y, turn = state[:3]
     del x, y
     R = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
@@ -37,7 +37,7 @@ def loads(size, mass, mu, state):
     ways = slips / np.linalg.norm(slips, axis=1)[:, None]
     E = np.column_stack([np.ones(4), corners]).T
     lever = 0.5 * size[2] * mu
-    G = np.column_stack([np.zeros(4), lever * ways]).T  # moments that friction asks the loads for
+    G = np.column_stack([np.zeros(4), lever * ways]).T  # moments of friction, which the loads balance
     least = np.linalg.pinv(E)
     N = np.linalg.solve(np.eye(4) - least @ G, least @ [mass * GRAVITY, 0.0, 0.0])
     return corners, ways, N
@@ -54,7 +54,7 @@ def rates(t, state, size, mass, mu):
 
 @pytest.mark.parametrize("seed", range(8))
 def test_slides_and_spins(seed):
-    """Place, turn and velocities on the way, as long as all corners press and slip."""
+    """Positions, angle and velocities follow the oracle as long as all corners press and slip."""
     draw = np.random.default_rng(seed)
     size, mass = np.append(draw.uniform(0.2, 0.5, 2), draw.uniform(0.02, 0.08)), draw.uniform(0.5, 3.0)
     mu, v0 = draw.uniform(0.1, 0.8), np.zeros(6)
@@ -87,14 +87,14 @@ def any_box(seed):
 
 
 def test_four_corners_that_stop_at_once_come_to_rest():
-    """The last step passes the rest of all corners, whose directions are rounding then."""
+    """The last step passes the rest of all corners, after which slip directions are rounding."""
     run = pn.simulate(any_box(324)[0], 10.0, max_steps=5000)
     assert np.abs(run.v[-1]).max() == 0.0
 
 
 @pytest.mark.parametrize("seeds", ranges(10, 40, 1000))
 def test_boxes_come_to_rest(seeds):
-    """None fails or hangs, none sinks, and all lie still in the end."""
+    """No run fails or hangs, no box penetrates, and all boxes come to rest."""
     for seed in seeds:
         scene, size = any_box(seed)
         run = pn.simulate(scene, 10.0, max_steps=5000)

@@ -41,7 +41,7 @@ def table(places, mu, pushed, push):
 
 
 def drawn(seed):
-    """Feet about a circle, some all but in line, pushed to slip, tip, lift or rest."""
+    """Random feet about a circle, some nearly in line, pushed to slip, tip, lift or rest."""
     rng = np.random.default_rng(seed)
     feet = int(rng.integers(3, 9))
     turn = 2.0 * np.pi * (np.arange(feet) / feet + rng.uniform(-0.05, 0.05, feet))

@@ -76,7 +76,7 @@ MOREAU = {"method": "moreau", "dt": 1e-3}
 
 
 def test_time_stepping_stands_still() -> None:
-    """Once all is held no step changes a bit; a callback, which might push, has each one taken: the same."""
+    """At rest no step changes a bit of the state, also with a callback, which takes each step."""
     scene = standing(40.0, 500.0, 20.0)
     bent = np.concatenate([np.zeros(6), 0.02 * np.random.default_rng(1).standard_normal(scene.model.nv - 6)])
     q, v = scene.project(pin.integrate(scene.model, scene.q0, bent), np.zeros(scene.model.nv))
@@ -115,7 +115,8 @@ def test_what_stands_is_moved_by_what_begins_to_push(late: str) -> None:
 
 @pytest.mark.parametrize("seed", [1, 2, 5, 6])
 def test_sinks_as_friction_lets_it(seed: int) -> None:
-    """From rest, by Gauss's principle: the least |R^T a|^2 over friction within its limits.
+    """The acceleration from rest follows Gauss's principle: the least |R^T a|^2 over friction within its
+    limits.
 
     Sticking in a leg depends on accelerations of legs, not on those of a much lighter wrist.
     """

@@ -207,7 +207,7 @@ def test_a_ball_slides_to_rolling(draw):
 
 @each_draw
 def test_a_cylinder_spins_in_a_groove(draw):
-    """Both walls slow it by friction until it stands; its axis stays where it is."""
+    """Friction at both walls stops the cylinder, and its axis does not move."""
     rng = np.random.default_rng([17, draw])
     wall, R, mass = rng.uniform(0.5, 1.0), decades(rng, 0.01, 1.0), decades(rng, 0.1, 100.0)
     spin = decades(rng, 1.0, 100.0)

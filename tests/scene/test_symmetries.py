@@ -109,7 +109,7 @@ def test_images_of_random_mechanisms_answer_as_they_do(name: str) -> None:
     ],
 )
 def test_known_defects(known: Known) -> None:
-    """Each entry of the list shows itself; one that is mended must leave the list."""
+    """Each listed defect still occurs; an entry without a defect must be removed."""
     assert not found(*known.example)
 
 

@@ -300,7 +300,7 @@ def test_damaged_files(written):
 
 
 def test_a_damaged_header(written):
-    """A bracket left open in the header of an array, which NumPy refuses in words of Python's tokenizer."""
+    """An open bracket in the header of an array, which NumPy reports with an error of Python's tokenizer."""
     written.write_bytes(written.read_bytes().replace(b"'shape': ()", b"'shape': (("))
     with pytest.raises(LoadingError, match="cannot read a checkpoint from"):
         pn.resume(written, cart())

@@ -33,7 +33,7 @@ def drives(first, second, joint="j0"):
 
 
 def test_drives_that_ask_for_two_places():
-    """The nearest place is between them."""
+    """The projection returns the place between both demands."""
     message = (
         'loop "one" does not close: gap 0.5; loop "two" does not close: gap 0.5 after several starts; '
         "check the lengths and frames, or start nearer"
@@ -95,7 +95,7 @@ def test_small_steps_end_where_a_mechanism_locks(method):
 
 @pytest.mark.parametrize("method", ["dop853", "Radau"])
 def test_a_run_off_its_constraints_is_refused(method, monkeypatch):
-    """With no room for rounding, the first sample of a closed loop that is not exact counts as open."""
+    """With a tolerance of zero, the first sample of a closed loop with rounding counts as open."""
     scene = pn.load("four_bar")
     residual = pn.simulate(scene, 0.2, method=method).violation
     first = int((residual > 0.0).argmax())
@@ -229,7 +229,7 @@ def test_a_velocity_that_grows_beyond_all_bounds():
     model = pin.Model()
     add(model, "p", "prismatic x", 0, np.random.default_rng(0))
     model.gravity = pin.Motion.Zero()
-    # Trial steps may overshoot far; a user's function that overflows there would be an error of its own.
+    # Trial steps may overshoot far, and a user's function that overflows would raise another error.
     scene = pn.Scene(model, forces=[pn.UserForce(lambda t, q, v: np.minimum(v, 1e100) ** 3)], v0=[1.0])
     with pytest.raises(StepSizeError, match=r"the step size fell below rounding at t = 0\.") as caught:
         pn.simulate(scene, 10.0)

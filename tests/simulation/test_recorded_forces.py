@@ -188,7 +188,7 @@ def name_of(thing):
 
 
 def test_a_joint_carries_the_same_wherever_the_loop_is_cut():
-    """A four-bar closed at its coupler, and closed at the ground: one wrench in each of its hinges."""
+    """Hinges of a four-bar have the same wrenches if the loop is cut at the coupler or at the ground."""
     lengths, ground = (0.3, 0.8, 0.6), 0.7
     ahead, back = closed_at_ground(lengths, ground), closed_at_coupler(lengths, ground)
     run = pn.simulate(ahead, 0.5, rtol=1e-12, output_dt=0.1, record="reactions")
@@ -265,7 +265,7 @@ def closed_at_coupler(lengths, ground):
     return pn.Scene(model, constraints=[hinge], laws=friction("crank", "pin", "close", "rocker"))
 
 
-# --- Recorded, saved and asked for --------------------------------------------------------------------------
+# --- Recorded, saved and requested --------------------------------------------------------------------------
 
 
 def test_nothing_is_recorded_that_was_not_asked_for():

@@ -102,7 +102,7 @@ def test_units_mount_and_copies_of_rows_change_nothing(seed, changed):
 @pytest.mark.parametrize("speed", [1e-6, 1.0, 1e6])
 @pytest.mark.parametrize("seed", range(6))
 def test_too_many_named_are_refused_in_any_unit(seed, speed, length):
-    """All joints of a chain with a freedom to spare, at velocities drawn by lot."""
+    """Random velocities of all joints are named, which no velocity on the constraints has."""
     scene, _ = chain(seed, length=length)
     draw = np.random.default_rng(seed)
     named = {f"j{k}": speed * float(draw.normal()) for k in range(scene.model.nv)}
@@ -122,7 +122,7 @@ def pinned(scene):
 
 @pytest.mark.parametrize("seed", seeds(range(60)))
 def test_bodies_that_are_held_still_change_nothing(seed):
-    """Their rows see no velocity at all, but for rounding."""
+    """Rows of such bodies have no velocity except for rounding."""
     scene, named = chain(seed)
     heavier = scene.model.copy()
     Y = pin.Inertia(0.3, np.zeros(3), 0.01 * np.eye(3))
@@ -134,7 +134,7 @@ def test_bodies_that_are_held_still_change_nothing(seed):
 
 @pytest.mark.parametrize("seed", range(6))
 def test_a_disk_rolls_on_any_mount(seed):
-    """Rows of its point on the ground see little of it where it stands upright, whatever their axes."""
+    """Rows of the disk's contact point have small entries for an upright disk, for any axes."""
     scene = pn.load("rolling_disk")
     turn = pin.SE3(pin.exp3(np.random.default_rng(seed).normal(size=3)), np.zeros(3))
     model = scene.model.copy()

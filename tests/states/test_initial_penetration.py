@@ -207,7 +207,7 @@ def test_what_finds_no_way_out_is_named() -> None:
 @pytest.mark.parametrize("depth", [0.0, 7e-18, 1e-12, 1e-7, 1e-4])
 @pytest.mark.parametrize(("radius", "inertia"), [(0.02, 2e-4), (0.4, 0.06), (0.1, 0.0)])
 def test_a_body_at_the_origin_is_moved_out_of_a_plane(radius: float, inertia: float, depth: float) -> None:
-    """Neither joints nor coordinates tell the length of this scene, and its residual is the depth itself."""
+    """Neither joints nor coordinates define a length of this scene, and its residual is the depth."""
     model = empty()
     root = pin.JointModelFreeFlyer() if inertia else pin.JointModelPZ()
     joint = body(model, 0, root, "ball", 1.0, inertia=inertia * np.eye(3))

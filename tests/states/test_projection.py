@@ -16,7 +16,7 @@ from ..support.seeds import seeds
 
 # Two distances of the same closure: the optimizer's own tolerance.
 SAME_DISTANCE = 1e-6
-# The same closure in another unit, or with rows said twice [rad, or part of the length].
+# The same closure in another unit, or with duplicate rows [rad, or part of the length].
 SAME = 1e-9
 
 
@@ -218,7 +218,7 @@ def test_a_loop_that_does_not_close_by_a_hair_of_a_small_mechanism():
 
 @pytest.mark.parametrize("seed", range(6))
 def test_a_slide_that_a_row_hardly_moves_changes_no_search(seed):
-    """A slider-crank on a turned mount: one row of its loop sees the slide by rounding alone."""
+    """A slider-crank on a turned mount: one row of the loop depends on the slide by rounding only."""
 
     def slider_crank(turn):
         model = empty()

@@ -44,7 +44,7 @@ def arm():
 
 
 def holding_arm():
-    """The arm under torques that all but balance it."""
+    """Return the arm and torques that nearly balance its weight."""
     scene = arm()
     tau = pn.inverse_dynamics(scene, scene.q0, np.zeros(3), np.zeros(3)).tau
     return scene, tau + np.array([0.2, -0.1, 0.15])
@@ -177,7 +177,8 @@ def test_a_screw_jack_as_textbooks_say():
 
 @pytest.mark.parametrize("name", ["arm", "four-bar", "jack", "pressed"])
 def test_slow_motion_has_no_acceleration(name):
-    """Under the raising torque a slow motion goes on; with more it speeds up, with less it slows down."""
+    """A slow motion continues under the raising torque; a larger torque accelerates it, a smaller one slows
+    it."""
     scene, tau = SCENES[name]()
     q = scene.project(None)[0]
     checked = 0

@@ -16,7 +16,7 @@ from ..support.random_loaded_trees import loaded_tree
 from ..support.seeds import seeds
 from ..support.standing import plate, star
 
-# A fold of the equation of rest costs half the digits of a force near it.
+# Near a fold of the solutions at rest, forces have half of the digits.
 MOTION = 1e-7
 # Error of the time of slip onset, and residual of the optimizer's conditions [N or N^2].
 GIVE_WAY = 1e-6
@@ -111,7 +111,8 @@ def random_stance(seed, static_ratio):
 
 
 def check_stance(seed, static_ratio, beyond):
-    """It gives way at the optimum, and nothing fails `beyond` seconds later; None where a foot would lift.
+    """Check that slip begins at the optimal load, and that the run continues; return None if a foot would
+    lift.
 
     A foot that is kept and pulls rubs as if it pressed: with it the optimum is another, and several motions
     are possible.
@@ -158,7 +159,7 @@ def test_many_stances(static_ratio):
 
 
 def pulse(seed):
-    """Feet under a push of 5 to 63 ms that they do not hold, when they let go, and a time after it."""
+    """Feet under a push of 5 to 63 ms beyond their limits, with the time of slip onset and a later time."""
     rng = np.random.default_rng(seed)
     feet, mu = star(int(rng.integers(3, 6)), 0.1), 0.5
     peak, length, part = rng.uniform(0.3, 2.0), 10.0 ** rng.uniform(-2.3, -1.2), rng.uniform(1.02, 2.0)
@@ -183,7 +184,7 @@ def test_a_push_within_a_step_at_rest(seed):
 
 
 def test_four_feet_give_way_together():
-    """A star of feet, pulled at one of them: until they let go all of them stick."""
+    """A star of feet is pulled at one foot: all feet stick until slip onset."""
     star = [(0.3 * np.cos(x), 0.3 * np.sin(x), -0.3) for x in np.arange(4) * np.pi / 2]
     scene = block_on_feet(star, lambda t: [0.0, 60.0 * t, 0.0, 0.0, 0.0, 0.0], star[0], 0.5)
     run = pn.simulate(scene, 0.6)

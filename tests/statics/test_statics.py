@@ -270,7 +270,7 @@ def test_margins_of_rest_do_not_depend_on_the_mount(seed):
 
 
 def test_a_drive_that_accelerates_stands_still_in_statics():
-    """A drive moves a joint that rubs: the scene is asked at the place of that time, and is not moved on."""
+    """A drive moves a joint with friction: statics use the position at the given time, without velocity."""
     model = pin.Model()
     bar(model, 0, pin.SE3.Identity(), "swing", 1.0)
     rubs = pn.JointFriction("swing", mu=0.2, radius=0.1)

@@ -61,7 +61,7 @@ GAINS = {"kp": 40.0, "kd": 4.0}
 
 
 def torque(drive, model, t, q, v):
-    """Torques of a drive as the sum of forces of a scene sees them."""
+    """Return the torques of a drive, as the core receives them."""
     with_drive = pn.Scene(model, actuation=drive).solve(q, v, t).a
     M, b = pn.Scene(model).mass_matrix(q), pn.Scene(model).bias_forces(q, v)
     return M @ with_drive + b

@@ -45,7 +45,7 @@ def result_or_named_error(call):
 
 
 class Odd:
-    """An object that is nothing in particular."""
+    """An object without a meaning for any argument."""
 
     def __repr__(self):
         return "Odd()"

@@ -24,7 +24,7 @@ def ledger(run):
 
 
 def finite(run):
-    """Nothing that is no number came out."""
+    """Check that all results are finite."""
     assert all(np.isfinite(x).all() for x in (run.t, run.q, run.v, run.violation, run.violation_rate))
 
 

@@ -1,4 +1,4 @@
-"""Trees of any joints that Pinocchio can build, drawn by lot: both providers move them as Pinocchio does.
+"""Random trees of all joints of Pinocchio: both providers give Pinocchio's accelerations.
 
 Composites are nested, hold free flyers, and have more than six freedoms; bodies may be massless.  The seed of
 each is its number; `check(1234)` looks at one again.
@@ -27,7 +27,7 @@ SOLVED = 1e-9
 KNOWN = 1e5
 # Rows whose singular values all lie outside this band are dependent or not, and no tolerance decides.
 DEPENDENT, INDEPENDENT = 1e-11, 1e-3
-# A singular M that rounding lets pass for a definite one: no answer is right or wrong.
+# A singular M that is definite by rounding: no result can be checked.
 SINGULAR = 1e13
 
 
@@ -44,7 +44,7 @@ def mechanism(seed):
 
 
 def check(seed):
-    """Both providers against pin.aba, or a dense system of all constraints; returns how often it could."""
+    """Compare both providers with pin.aba or a dense system of constraints; return the number of cases."""
     model, q, v, constraints, tau = mechanism(seed)
     M = mass_matrix(model, q)
     condition = (

@@ -1,4 +1,4 @@
-"""Numbers at the ends of the range: every call ends with finite numbers or an error by name."""
+"""Numbers at the ends of the range of floats: calls return finite numbers or raise a named error."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def test_negative_zero_is_zero():
 
 @pytest.mark.parametrize("scale", [5e-324, 1e-310, 1e-200, 1e-100, 1e-30, 1e30, 1e100, 1e150, 1e300])
 def test_bodies_of_any_mass(scale):
-    """A double pendulum does not know its mass; where M under- or overflows, the error says so."""
+    """The motion of a double pendulum does not depend on its mass; an error reports overflow of M."""
     model = empty()
     for k, place in enumerate((pin.SE3.Identity(), pin.SE3(np.eye(3), np.array([1.0, 0.0, 0.0])))):
         about = 0.1 * scale * np.eye(3)

@@ -1,4 +1,4 @@
-"""Arguments drawn by lot: every public function takes them, or refuses them by name."""
+"""Random arguments: every public function accepts them, or raises an error that names the argument."""
 
 from __future__ import annotations
 
@@ -148,7 +148,7 @@ def test_functions_of_time(kind, examples):
 
 
 def without(values, *unwanted):
-    """Values drawn by lot that are not a length of time beyond a short run."""
+    """Random values, except durations beyond a short run."""
     return values.filter(
         lambda x: not (isinstance(x, (int, float)) and x > 1e-2) and not isinstance(x, unwanted)
     )
@@ -279,7 +279,7 @@ def test_load(examples):
 @few_and_many
 @pytest.mark.parametrize("function", [pn.resume, pn.replay, pn.plot, pn.sweep], ids=lambda f: f.__name__)
 def test_the_other_functions(function, scene, examples, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)  # a file that comes of a name drawn by lot lands here
+    monkeypatch.chdir(tmp_path)  # a file with a random name is written here
     run = pn.simulate(scene, 1e-3)
     good = {
         "scene": [scene],

@@ -1,4 +1,4 @@
-"""Files drawn by lot from good ones: each loads, or is refused by name."""
+"""Random changes of valid files: each file loads, or raises an error that names the fault."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def loads_and_runs(folder):
 
 @pytest.fixture
 def robot(tmp_path):
-    """Writes the two files of a robot into a folder."""
+    """Write the two files of a robot into a folder."""
 
     def write(table, urdf):
         (tmp_path / "robot.yaml").write_bytes(table if isinstance(table, bytes) else table.encode())

@@ -1,4 +1,4 @@
-"""Mechanisms drawn by lot: every one runs with its books in order, or stops with an error by name.
+"""Random mechanisms: each run closes its energy ledger, or stops with a named error.
 
 The seed of each is its number, printed with the measurements; `check(1234)` repeats a seed.
 """
@@ -93,7 +93,7 @@ def mechanism(seed):
 
 
 def check(seed):
-    """Runs one mechanism and looks at its books."""
+    """Run one mechanism and check its energy ledger."""
     try:
         scene, options = mechanism(seed)
         run = pn.simulate(scene, 0.2, **options)

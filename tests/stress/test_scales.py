@@ -46,7 +46,7 @@ def test_a_light_pendulum_on_a_heavy_one_moves_as_on_a_wall(ratio):
 
 @pytest.mark.parametrize("speed", [1e8, 1e12, 1e16])
 def test_a_joint_driven_slowly_beside_fast_ones_asks_for_no_more_steps(speed):
-    """Its velocity is known to the rounding of the others, far above its own tolerance."""
+    """The velocity of the slow joint has the rounding of the fast joints, far above its tolerance."""
     scene = pn.load("five_bar")
     one = np.ones(scene.model.nv)
     slow, fast = (pn.simulate(scene, 0.5 / s, v=s * one) for s in (1e7, speed))
@@ -80,7 +80,7 @@ def test_lengths_from_a_tenth_of_a_millimeter_to_ten_kilometers():
 
 
 def test_each_size_moves_as_it_does_alone():
-    """Sizes do not see each other: a window of 0.1 mm beside one of 10 km moves as without it."""
+    """Mechanisms of different size are independent: a window of 0.1 mm beside one of 10 km moves as alone."""
     alone, together = windows([1e-4]), windows([1e-4, 1e4])
     options = {"output_dt": 1e-3, **TIGHT}
     gap = pn.simulate(together, 0.02, **options).q[:, :3] - pn.simulate(alone, 0.02, **options).q
@@ -185,7 +185,7 @@ def test_scaled_copies_beside_the_loop_itself(plain):
 
 
 def test_copies_that_are_found_only_in_the_run_leave_friction_a_load():
-    """Copies given as functions are found at the first step: the laws are asked after that, not before."""
+    """Copies given as functions are found at the first step, before the evaluation of the laws."""
     robot = pn.load("four_bar")
     names = [f"own {k}" for k in range(3)]
     frames = [robot.model.getFrameId(n) for n in ("coupler_tip", "rocker_tip")]

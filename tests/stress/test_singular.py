@@ -21,7 +21,7 @@ long = pytest.mark.stress
 
 
 def half_turns(q):
-    """How often an angle goes on by pi."""
+    """Return the number of half turns of an angle."""
     return int(np.ptp(q) / np.pi)
 
 

@@ -1,4 +1,4 @@
-"""Random stances to the instant at which they give way and beyond; chains of ball joints."""
+"""Random stances up to slip onset and beyond; chains of ball joints."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .measure import at_most, ledger
 long = pytest.mark.stress
 
 LATEST = 200.0  # loads grow until then [s]
-GIVES_WAY = 1e-6  # [s]: the optimum is found by a program of its own, to 1e-9 of the limits
+GIVES_WAY = 1e-6  # [s]: a separate program finds the optimum, to 1e-9 of the limits
 WITHIN = 1e-4  # part of mu: a run ends where another motion comes in from infinite loads, before it is there
 crawls = pytest.mark.xfail(reason="sliding feet that share loads find no motion, see limits.md", run=False)
 STEPS = {"stance": 2000, "balls": 3000}
@@ -94,7 +94,7 @@ def test_feet_that_cannot_pull_give_way_in_time(seed):
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [463, 484])
 def test_feet_rest_as_long_as_any_forces_hold_them(seed):
-    """Feet that are relieved while all rest: some could slip long before they must."""
+    """Feet lose their load while all feet rest: some could slip long before they must."""
     scene, oracle = stance(seed, unilateral=True)
     instant = oracle.give_way(LATEST)
     run = pn.simulate(scene, instant - GIVES_WAY)
@@ -114,7 +114,7 @@ def test_feet_rest_as_long_as_any_forces_hold_them(seed):
     ],
 )
 def test_feet_that_cannot_pull_slide_on(seeds):
-    """One that passes by the center of rotation sticks again where its share allows it, and nowhere else."""
+    """A foot that passes the center of rotation sticks again only if its share of the load allows it."""
     steps = []
     for seed in seeds:
         scene, oracle = stance(seed, unilateral=True)

@@ -125,7 +125,7 @@ def test_time_far_from_zero():
     at_most("difference [rad]", np.abs(here.q - there.q).max(), 1e4 * np.spacing(shift))
 
 
-# --- Tolerances and times at the door ----------------------------------------------------------------------
+# --- Invalid tolerances and times ------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -49,7 +49,7 @@ INTERRUPTED = """
     ],
 )
 def test_ctrl_c_in_the_middle_keeps_the_samples(robot, options):
-    """In a process of its own, at no chosen place of the loop."""
+    """Ctrl-C stops a separate process at an arbitrary place of the loop."""
     wait = f"{np.random.default_rng().uniform(0.05, 0.6):.3f}"
     code = textwrap.dedent(INTERRUPTED)
     done = subprocess.run(

@@ -1,4 +1,4 @@
-"""Wrong inputs: each is refused by name, in a short message, before any work and without a file."""
+"""Invalid inputs: each raises a short error with its name, before any work and without a file."""
 
 from __future__ import annotations
 

@@ -222,7 +222,7 @@ def test_what_a_store_refuses(tmp_path):
 
 
 class Damped:
-    """Makes pendulums with a damping of its own."""
+    """Factory of pendulums with its own damping."""
 
     def __init__(self, damping):
         self.damping = damping

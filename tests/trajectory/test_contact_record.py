@@ -98,7 +98,7 @@ def test_errors_name_the_pair_and_the_record() -> None:
 
 
 def test_numbered_contacts_of_the_user_are_no_pair() -> None:
-    """Their forces would cancel or add without a meaning."""
+    """The forces of different contacts would cancel or add without a meaning."""
     scene = stack(2)
     feet = [pn.PointContact(f"box {k}", height=-1.0, name=f"foot {k}") for k in range(2)]
     run = pn.simulate(scene.replace(add_contacts=feet), 0.01, record="forces")

@@ -106,7 +106,7 @@ def height_of(model, name):
 
 
 def groove(model):
-    """The tip slides on a plane that does not let it go, and the camera turns above a wheel on it."""
+    """The tip slides on a plane as a bilateral contact, and the camera turns above a wheel on it."""
     contact = {"mu": 0.2, "torsional": 0.01, "unilateral": False}
     return {"contacts": [pn.PointContact("tip", height=height_of(model, "tip"), name="stylus", **contact)]}
 
@@ -365,7 +365,8 @@ def test_runs_with_other_masses_are_refused():
 
 
 def test_joints_that_were_locked():
-    """A locked joint keeps the inertia of all of its links; frames on its body before it cannot be told."""
+    """A locked joint keeps the inertia of all of its links; frames on its body before the locked joint cannot
+    be identified."""
     whole = pn.load("panda").model
     q = pin.neutral(whole)
     model = pin.buildReducedModel(whole, [whole.getJointId("panda_joint7")], q)
@@ -430,7 +431,7 @@ def test_a_turned_mount_carries_the_weight():
 
 
 def test_shapes_know_their_links():
-    """Contacts of collision shapes name the moving joint; the shape tells on which link it is."""
+    """Contacts of collision shapes name the moving joint; the shape has the name of its link."""
     import coal
 
     model = robot()

@@ -1,4 +1,4 @@
-"""Archives made in one go are those of NumPy."""
+"""Archives that are written in one pass equal NumPy's archives."""
 
 from __future__ import annotations
 

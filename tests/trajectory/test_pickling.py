@@ -19,7 +19,7 @@ from ..support.small_robots import ARM, folder, robot
 
 
 def push(t, q, v):
-    """A controller that pickle knows by its name."""
+    """A controller that pickle finds by its name."""
     return -0.1 * v
 
 

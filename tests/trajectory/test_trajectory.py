@@ -1,4 +1,4 @@
-"""Trajectories: their fields, their words, and files of them, good and bad."""
+"""Trajectories: fields, printed texts, and valid and damaged files."""
 
 from __future__ import annotations
 
@@ -248,7 +248,7 @@ def cannot_read(path, reason):
 
 
 def cannot_read_because(path):
-    """The whole message on a file whose content cannot be read, in words of this package."""
+    """Return the whole message of this package on an unreadable file."""
     advice = "; it must be an .npz file written by Trajectory.save"
     reason = "its content is damaged or of another kind"
     return pytest.raises(

@@ -25,7 +25,7 @@ def browser() -> Iterator[Any]:
 
 @pytest.fixture(scope="module")
 def page(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
-    """Two pendulums of which the second is ahead and goes on longer."""
+    """Page of two pendulums; the second one is ahead and runs longer."""
     model = jointed(pin.JointModelRY())
     runs = [
         run_of(model, np.linspace(0.0, 1.0, 50), lambda t: np.array([np.sin(t)])),

@@ -303,7 +303,7 @@ def test_torques_of_the_actuation_are_drawn_at_their_joints() -> None:
 
 
 def test_stops_of_joints_and_bounces_are_drawn() -> None:
-    """A pendulum against its stops: the force of the upper one turns back; each stop has rows of its own."""
+    """A pendulum against its stops: the force of the upper stop turns back; each stop has separate rows."""
     model = jointed(pin.JointModelRY())
     stop = pn.JointLimit("j0", lower=-0.5, upper=0.5, name="stop")
     run = pn.simulate(pn.Scene(model, contacts=[stop]), 2.0, record="forces")

@@ -36,7 +36,7 @@ def browser() -> Iterator[Any]:
 
 @pytest.fixture
 def opened(browser: Any, tmp_path: Path) -> Iterator[Any]:
-    """Opens replays of runs, and hears that none complains."""
+    """Open replays of runs, and check that no page reports an error."""
     pages = []
 
     def open_run(run: Any, **options: Any) -> Watched:

@@ -9,7 +9,7 @@ namespace pn {
 
 namespace {
 
-// Compute the Cholesky factor of A, scaled to a unit diagonal, by rows, with the inverse pivots. Returns false if A is
+// Compute the Cholesky factor of A, scaled to a unit diagonal, by rows, with the inverse pivots. Return false if A is
 // nearly singular.
 PN_WIDE bool factor_scaled(int n, const double* A, const double* scale, double* L, double* inverse) {
     for (int i = 0; i < n; ++i) {
@@ -35,7 +35,7 @@ PN_WIDE void substitute_scaled(int n, const double* L, const double* inverse, do
 
 }  // namespace
 
-// Solve W_FF x = r_F into part_. Returns false if W_FF, scaled to a unit diagonal, is nearly singular.
+// Solve W_FF x = r_F into part_. Return false if W_FF, scaled to a unit diagonal, is nearly singular.
 bool BoxProgram::solve_regular(int n) {
     auto A = A_.matrix(n, n), L = L_.matrix(n, n);
     auto scale = scale_.vector(n), inverse = inverse_.vector(n), rhs = rhs_.vector(n), x = part_.vector(n),
@@ -140,7 +140,7 @@ void BoxProgram::descend(const MatX& W, const VecX& alpha0, const VecX& s) {
     }
 }
 
-// Block principal pivoting, with single pivots (largest index) once it makes no progress. Returns false if the free
+// Block principal pivoting, with single pivots (largest index) once it makes no progress. Return false if the free
 // elements cannot all stick, or if pivoting does not end.
 bool BoxProgram::pivot_blocks(const MatX& W, const VecX& alpha0, const VecX& s) {
     const int n = static_cast<int>(s.size());

@@ -35,11 +35,11 @@ bool DenseSolver::eliminate(const Eigen::Ref<const MatX>& A) {
     auto L = factors_.matrix(n_, n_);
     L = A;
     order_.resize(std::max<size_t>(order_.size(), n_));
-    const double least = min_elimination_pivot * (n_ > 0 ? A.cwiseAbs().maxCoeff() : 0.0);
+    const double min_pivot = min_elimination_pivot * (n_ > 0 ? A.cwiseAbs().maxCoeff() : 0.0);
     for (int k = 0; k < n_; ++k) {
         int pivot = 0;
         const double size = L.col(k).tail(n_ - k).cwiseAbs().maxCoeff(&pivot);
-        if (!(size > least)) return false;
+        if (!(size > min_pivot)) return false;
         order_[k] = pivot += k;
         if (pivot != k) L.row(k).swap(L.row(pivot));
         const int below = n_ - k - 1;

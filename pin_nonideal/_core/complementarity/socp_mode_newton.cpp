@@ -11,9 +11,9 @@ namespace pn {
 namespace {
 
 // With f = s x and slip accelerations alpha, the pairs z_e = (1, x_e) and y_e = (u_e, alpha_e) lie in the cone
-// |tail| <= head. They are complementary at the solution: x_e = -alpha_e / |alpha_e| or alpha_e = 0. A primal-dual
+// |tail| <= head. The pairs are complementary at the solution: x_e = -alpha_e / |alpha_e| or alpha_e = 0. A primal-dual
 // interior-point method in Nesterov and Todd's scaling (Vandenberghe, "The CVXOPT linear and quadratic cone program
-// solvers", 2010) needs some fifteen steps however singular W is. It ends at the most even distribution of an
+// solvers", 2010) needs some fifteen steps however singular W is. The method ends at the most even distribution of an
 // undetermined load. Newton's method then solves the equations of the resulting modes to rounding.
 
 using Eigen::Matrix3d;
@@ -172,7 +172,7 @@ struct ConeProgram {
 
     // Find the modes from the end of the path. An element slips if its acceleration exceeds the distance of its force
     // to the limit. If both are small, the solution decides: modes that contradict the solution are changed until all
-    // modes agree. Returns false if the modes do not settle.
+    // modes agree. Return false if the modes do not settle.
     bool find_modes() {
         std::vector<char> slides(elements);
         for (int e = 0; e < elements; ++e) slides[e] = y[e].head > 1.0 - tail(x, e).norm();

@@ -13,7 +13,7 @@ namespace pn {
 struct SocpParameters {
     int max_steps = 60;        // maximum steps of the interior-point method
     int max_mode_newton = 12;  // maximum Newton steps for fixed modes
-    // Largest z . y of a solution, relative to the acceleration scale. Rounding may end the iteration before.
+    // Largest z . y of a solution, relative to the acceleration scale. Rounding may end the iteration earlier.
     double gap_tolerance = 1e-17;
     double mode_newton_tolerance = 4e-16;  // relative error of the forces: two units of roundoff
     double condition_slack = 1e-12;        // violation of a mode's condition that is rounding, relative to a limit
@@ -26,8 +26,8 @@ VecX ball_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dim
 VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& s,
                       const VecX* initial = nullptr);
 VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const FrictionLimits& limits);
-// Return slip accelerations slightly beyond the load of slip onset. At onset they are rounding. If elements share a
-// load, their forces give the directions of a common slip only to the square root of rounding.
+// Return slip accelerations slightly beyond the load of slip onset. At onset the slip accelerations are rounding. If
+// elements share a load, their forces give the directions of a common slip only to the square root of rounding.
 VecX onset_accelerations(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const FrictionLimits& limits);
 
 }  // namespace pn

@@ -18,7 +18,7 @@ Block::Block(std::string its_name, Kind what)
         joint1 = frame1->joint;
         joint2 = frame2->joint;
     }
-    if (const auto* own = std::get_if<DofSlipRows>(&kind)) dof = own->dof;
+    if (const auto* dof_slip = std::get_if<DofSlipRows>(&kind)) dof = dof_slip->dof;
     for (int k = 0; k < total; ++k) kept.push_back(k);
 }
 

@@ -113,10 +113,10 @@ RowLayout layout_rows(const std::vector<Block>& blocks, int nv) {
     layout.group_count = count(group);
     layout.groups.resize(with_support.size());
     for (size_t s = 0; s < with_support.size(); ++s) {
-        std::vector<int>& own = layout.groups[s];
-        for (int dof : blocks[with_support[s].front()].support) own.push_back(group[dof]);
-        std::sort(own.begin(), own.end());
-        own.erase(std::unique(own.begin(), own.end()), own.end());
+        std::vector<int>& dof_groups = layout.groups[s];
+        for (int dof : blocks[with_support[s].front()].support) dof_groups.push_back(group[dof]);
+        std::sort(dof_groups.begin(), dof_groups.end());
+        dof_groups.erase(std::unique(dof_groups.begin(), dof_groups.end()), dof_groups.end());
     }
     Neighbors near(layout, with_support);
     const std::vector<int> order = elimination_order(layout, near);

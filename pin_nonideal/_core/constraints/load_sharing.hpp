@@ -1,5 +1,5 @@
-// Matrices by which redundant rows share their load. They depend on the rows in use only, not on the forces, and stay
-// valid until the rows change.
+// Matrices by which redundant rows share their load. The matrices depend on the rows in use only, not on the forces, and
+// stay valid until the rows change.
 #pragma once
 
 #include <vector>

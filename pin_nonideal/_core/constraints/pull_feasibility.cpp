@@ -71,12 +71,12 @@ std::vector<int> sharing_with(int index, const MatX& Z) {
 
 PullMargin press(const std::vector<Block>& blocks, const std::vector<double>& B,
             const DescribedRows& all, const std::vector<int>& pressing, RowSystem& s, const VecX& shared, int index) {
-    const double own = all.share(pressing[index], shared);
-    const PullMargin alone{own, {index}, {index}, own < 0.0};
+    const double multiplier = all.share(pressing[index], shared);
+    const PullMargin alone{multiplier, {index}, {index}, multiplier < 0.0};
     if (!s.redundant && !all.copied) return alone;
     const MatX of_all = of_pressing(pressing, free_described(blocks, B, all, s));
     if (of_all.row(index).isZero(0.0)) return alone;
-    PullMargin found{own, sharing_with(index, of_all), {}, false};
+    PullMargin found{multiplier, sharing_with(index, of_all), {}, false};
     const int n = static_cast<int>(found.sharing.size());
     MatX Z(n, of_all.cols());
     VecX N(n);

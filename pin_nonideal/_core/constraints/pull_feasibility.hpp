@@ -1,5 +1,5 @@
 // Rows that must pull although their multipliers should not be negative. If rows share a load, single multipliers are
-// not unique. A row must pull only if no distribution of the load lets all of them press.
+// not unique. A row must pull only if no distribution of the load has all rows in compression.
 #pragma once
 
 #include "constraints/redundancy.hpp"

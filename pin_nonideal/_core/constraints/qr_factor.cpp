@@ -28,7 +28,7 @@ void dense_columns(const std::vector<Block>& blocks, const std::vector<double>& 
     }
 }
 
-// Factorize the first n columns of Q in place by Householder reflectors, with column pivoting if `pivot`. Returns the rank.
+// Factorize the first n columns of Q in place by Householder reflectors, with column pivoting if `pivot`. Return the rank.
 int householder(RowSystem& s, int n, bool pivot, double tolerance) {
     const int m = static_cast<int>(s.Q.rows());
     for (int k = 0; k < n; ++k) {

@@ -51,11 +51,11 @@ bool is_choice_due(RowSystem& s) {
     if (!s.redundant) return false;
     bool due = s.min_pivot < rank_parameters.faded_part * s.chosen_pivot;
     s.chosen_pivot = std::max(s.chosen_pivot, s.min_pivot);
-    const Envelope& at = s.envelope;
-    for (int i = 0; i < at.size(); ++i) {
-        const int row = at.row_at[i];
+    const Envelope& envelope = s.envelope;
+    for (int i = 0; i < envelope.size(); ++i) {
+        const int row = envelope.row_at[i];
         if (!s.required[row]) continue;
-        const double square = s.G[at.start[i] + i];
+        const double square = s.G[envelope.start[i] + i];
         s.longest[row] = std::max(s.longest[row], square);
         if (!s.active[row]) continue;
         due |= square < rank_parameters.faded_part * s.longest_chosen[row];

@@ -33,11 +33,11 @@ MatX dependence(const std::vector<Block>& blocks, const std::vector<double>& B, 
     const std::vector<int>& rows = s.envelope.row_at;
     const MatX used = columns_of(blocks, B, s, rows);
     MatX rest = columns_of(blocks, B, s, dependent);
-    const VecX least = redundancy_parameters.rounding * rest.colwise().norm().transpose();
+    const VecX min_size = redundancy_parameters.rounding * rest.colwise().norm().transpose();
     MatX W = MatX::Zero(rest.cols(), used.cols()), weights(used.cols(), rest.cols());
     VecX product = VecX::Zero(s.scale.size()), weight = product;
     for (int pass = 0; pass < redundancy_parameters.max_passes; ++pass) {
-        if ((rest.colwise().norm().transpose().array() <= least.array()).all()) break;
+        if ((rest.colwise().norm().transpose().array() <= min_size.array()).all()) break;
         weights.noalias() = used.transpose() * rest;
         for (Eigen::Index k = 0; k < rest.cols(); ++k) {
             for (size_t l = 0; l < rows.size(); ++l) product[rows[l]] = weights(l, k);
@@ -92,11 +92,11 @@ void share_multipliers(const std::vector<Block>& blocks, const std::vector<doubl
     if (!s.redundant) return;
     const LoadSharing& sharing = load_sharing(blocks, B, all, s);
     const std::vector<int>& rows = s.envelope.row_at;
-    VecX own(rows.size());
-    for (size_t l = 0; l < rows.size(); ++l) own[l] = lam[rows[l]];
-    const VecX y = sharing.taken * own;
-    own.noalias() -= sharing.W.transpose() * y;
-    for (size_t l = 0; l < rows.size(); ++l) shared[rows[l]] = own[l];
+    VecX multipliers(rows.size());
+    for (size_t l = 0; l < rows.size(); ++l) multipliers[l] = lam[rows[l]];
+    const VecX y = sharing.taken * multipliers;
+    multipliers.noalias() -= sharing.W.transpose() * y;
+    for (size_t l = 0; l < rows.size(); ++l) shared[rows[l]] = multipliers[l];
     for (size_t k = 0; k < sharing.dependent.size(); ++k) shared[sharing.dependent[k]] = y[k];
 }
 

@@ -47,7 +47,7 @@ MatX dependence(const std::vector<Block>& blocks, const std::vector<double>& B, 
 void share_multipliers(const std::vector<Block>& blocks, const std::vector<double>& B,
                        const DescribedRows& all, RowSystem& s, const VecX& lam, VecX& shared);
 
-// Return a basis of the multipliers by kept row that together exert no force. It is orthonormal in the norm of the
+// Return a basis of the multipliers by kept row that together exert no force. The basis is orthonormal in the norm of the
 // described rows.
 const MatX& free_multipliers(const std::vector<Block>& blocks, const std::vector<double>& B,
                              const DescribedRows& all, RowSystem& s);

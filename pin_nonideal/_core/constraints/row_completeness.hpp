@@ -27,14 +27,14 @@ template <class K> using ComparableRows = std::bool_constant<std::decay_t<K>::co
 template <class K> using ShownAs = std::integral_constant<DisplayKind, std::decay_t<K>::shown>;
 template <class K> using Called = decltype(std::string(std::decay_t<K>::name));
 template <class K> using RoleOf = std::integral_constant<Role, std::decay_t<K>::role>;
-// A value of type T for unevaluated expressions. It has no definition.
+// A value of type T for unevaluated expressions. The function has no definition.
 template <class T> T given();
 
 // Check if K has `place`, which computes residual and rows at once from the same nearest points.
 template <class K, class At, class Out = RowValues>
 constexpr bool places = answers<K>([](const auto& k) -> decltype(k.place(given<At>(), given<Out&>())) {});
 
-// Check at compile time that K has all members of a kind.
+// Check at compile time that K has all members of a kind of constraint.
 template <class K>
 constexpr bool is_complete() {
     using At = std::conditional_t<is_geometric<K>, const Sides<Pose>&, const State&>;

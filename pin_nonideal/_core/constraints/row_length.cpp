@@ -82,8 +82,8 @@ void greatest_lengths(const Mechanism& m, Terms& terms, const Block& block, cons
         length[k] = std::sqrt((force > 0.0 ? force * forces : 0.0) + (couple > 0.0 ? couple * couples : 0.0));
     }
     if (values.geometric || rows.empty()) return;
-    const double least = rank_parameters.min_function_length_part * *std::max_element(length, length + rows.size());
-    std::transform(length, length + rows.size(), length, [&](double own) { return std::max(own, least); });
+    const double min_length = rank_parameters.min_function_length_part * *std::max_element(length, length + rows.size());
+    std::transform(length, length + rows.size(), length, [&](double value) { return std::max(value, min_length); });
 }
 
 void own_lengths(const Mechanism& m, Terms& terms, const Block& block, const std::vector<int>& rows,

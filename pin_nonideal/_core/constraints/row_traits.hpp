@@ -3,7 +3,7 @@
 
 namespace pn {
 
-// Role of the rows of a kind in a scene.
+// Role of the rows of a constraint in a scene.
 enum class Role {
     constraint,
     contact,   // a constraint with a multiplier that should not be negative
@@ -19,7 +19,7 @@ struct Field {
 template <class Kind, class Value>
 Field(const char*, Value Kind::*) -> Field<Kind, Value>;
 
-// Display of a kind in a replay.
+// Display of a constraint in a replay.
 enum class DisplayKind {
     nothing,
     anchor,   // two tied frames, and the force on frame 1 by components in the axes of frame 2
@@ -31,7 +31,8 @@ enum class DisplayKind {
     gear      // the generalized forces on two joints
 };
 
-// Base of friction directions between two frames. Their rates are slip velocities, and they hold no position.
+// Base of friction directions between two frames. The rates of these rows are slip velocities, and the rows hold no
+// position.
 struct SlipDirections {
     static constexpr Role role = Role::direction;
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;

@@ -40,7 +40,7 @@ bool has_comparable_rows(const Kind& kind) {
 
 int pressing_row(const Kind& kind) {
     return std::visit([](const auto& k) {
-        if constexpr (answers<std::decay_t<decltype(k)>>([](const auto& own) -> decltype(own.pressing) { return {}; }))
+        if constexpr (answers<std::decay_t<decltype(k)>>([](const auto& row) -> decltype(row.pressing) { return {}; }))
             return k.pressing;
         else
             return -1;
@@ -123,7 +123,7 @@ static PN_INLINE void evaluate_kind(const K& kind, const State& s, RowValues& ou
     }
 }
 
-// Like std::visit but inlined into the caller, for the first kinds.
+// Like std::visit but inlined into the caller, for the first kinds of constraint.
 template <Part part, size_t... k>
 static PN_INLINE void evaluate_some(const Kind& kind, const State& s, RowValues& out, std::index_sequence<k...>) {
     (void)((kind.index() == k && (evaluate_kind<part>(*std::get_if<k>(&kind), s, out), true)) || ...);
@@ -142,8 +142,8 @@ static constexpr size_t index_of(const std::variant<K...>*) {
 }
 
 // Three wide functions evaluate the first kinds. The last kinds are gaps between shapes, which search for nearest points.
-// Each has functions of its own, compiled once: wide functions for all of them take 20 s more to compile
-// (GCC 12) and no less to run.
+// Each other kind has separate functions, compiled once: wide functions for all kinds take 20 s more to compile (GCC 12) and
+// run no faster.
 constexpr size_t shapes = index_of<PlaneEllipsoidRow>(static_cast<const Kind*>(nullptr));
 static PN_WIDE void residual(const Kind& kind, const State& s, RowValues& out) {
     evaluate_until<Part::residual, shapes>(kind, s, out);

@@ -65,7 +65,7 @@ struct RowValues {
     void resize(const Kind& kind, int nv);
 };
 
-// Quantities that the evaluation of a kind may read.
+// Quantities that the evaluation of a constraint may read.
 struct State {
     const Mechanism& mechanism;
     const Terms& terms;
@@ -73,7 +73,7 @@ struct State {
     const VecX &q, &v;
 };
 
-// Properties of a kind.
+// Properties of a kind of constraint.
 int size(const Kind& kind);
 bool is_holonomic(const Kind& kind, int row);
 bool moves_in_time(const Kind& kind);
@@ -84,15 +84,16 @@ bool has_comparable_rows(const Kind& kind);
 int pressing_row(const Kind& kind);
 Role role(const Kind& kind);
 DisplayKind shown(const Kind& kind);
-// Return both frames of a kind between bodies, else null pointers.
+// Return both frames of a constraint between bodies, or null pointers for other constraints.
 std::pair<const Frame*, const Frame*> frames(const Kind& kind);
-// Return the functions of time among the data of a kind.
+// Return the functions of time among the data of a constraint.
 std::vector<const TimeFunction*> time_functions(const Kind& kind);
 // Return the dofs on which A may differ from zero.
 std::vector<int> dofs(const Kind& kind, const Mechanism& m);
 
-// Parts of the evaluation of all rows of a kind: `residual` for the residuals alone, `place` for residuals and wrenches or A
-// of placed bodies, and `motion` for rates and biases. `motion` needs velocities of the bodies, and `place` before.
+// Parts of the evaluation of all rows of a constraint: `residual` for the residuals alone, `place` for residuals and
+// wrenches or A of placed bodies, and `motion` for rates and biases. `motion` needs velocities of the bodies, and the part
+// `place` in advance.
 enum class Part { residual, place, motion };
 void evaluate(const Kind& kind, const State& s, Part part, RowValues& out);
 

@@ -14,7 +14,7 @@ namespace pn {
 // another, from p2. The sum runs over their common dofs.
 template <int n1, int n2>
 static void multiply_tile(const double* X, int r1, const double* Y, int r2, const CommonDofs& common,
-                          const Envelope& at, int p1, int p2, double* G) {
+                          const Envelope& envelope, int p1, int p2, double* G) {
     double sum[n1][n2] = {};
     for (const auto& [l, k] : common) {
         const double *x = X + l * r1, *y = Y + k * r2;
@@ -22,7 +22,7 @@ static void multiply_tile(const double* X, int r1, const double* Y, int r2, cons
             for (int j = 0; j < n2; ++j) sum[i][j] += x[i] * y[j];
     }
     for (int i = 0; i < n1; ++i) {
-        double* row = G + at.start[p1 + i] + p2;
+        double* row = G + envelope.start[p1 + i] + p2;
         const int end = p1 + i - p2;  // the diagonal
         for (int j = 0; j < n2; ++j)
             if (j <= end) row[j] = sum[i][j];
@@ -52,11 +52,11 @@ void delassus(const std::vector<Block>& blocks, const std::vector<double>& B, Ro
 }
 
 void scale_to_unit_length(const std::vector<char>& use, RowSystem& s) {
-    const Envelope& at = s.envelope;
-    for (int i = 0; i < at.size(); ++i) {
-        const int row = at.row_at[i];
+    const Envelope& envelope = s.envelope;
+    for (int i = 0; i < envelope.size(); ++i) {
+        const int row = envelope.row_at[i];
         if (!use[row]) continue;
-        const double square = s.G[at.start[i] + i];
+        const double square = s.G[envelope.start[i] + i];
         s.scale[row] = square > 0.0 ? 1.0 / std::sqrt(square) : 1.0;
     }
 }
@@ -84,33 +84,33 @@ static PN_INLINE double shortest_row(const std::vector<Block>& blocks, const Row
 // Return the least square of an active row's length over its greatest length in these modes. Used if other rows depend
 // on the active ones.
 static double shortest_passing(const RowSystem& s) {
-    const Envelope& at = s.envelope;
+    const Envelope& envelope = s.envelope;
     double shortest = 1.0;
-    for (int i = 0; i < at.size(); ++i) {
-        const int row = at.row_at[i];
-        const double square = s.G[at.start[i] + i];
+    for (int i = 0; i < envelope.size(); ++i) {
+        const int row = envelope.row_at[i];
+        const double square = s.G[envelope.start[i] + i];
         if (s.active[row] && square < shortest * s.longest[row]) shortest = square / s.longest[row];
     }
     return shortest;
 }
 
-// Compute the Cholesky factor of the unit-diagonal B B^T inside the envelope. Returns true if its pivots are safe.
+// Compute the Cholesky factor of the unit-diagonal B B^T inside the envelope. Return true if its pivots are safe.
 static PN_INLINE bool factor_cholesky(RowSystem& s) {
-    const Envelope& at = s.envelope;
+    const Envelope& envelope = s.envelope;
     double* L = s.factor.data();
-    for (int i = 0; i < at.size(); ++i) {
-        const int row = at.row_at[i];
+    for (int i = 0; i < envelope.size(); ++i) {
+        const int row = envelope.row_at[i];
         if (!s.active[row]) continue;
-        double* Li = L + at.start[i];
-        const double* Gi = s.G.data() + at.start[i];
-        const int first = at.first[i];
+        double* Li = L + envelope.start[i];
+        const double* Gi = s.G.data() + envelope.start[i];
+        const int first = envelope.first[i];
         const double scale = s.scale[row];
         double pivot = Gi[i] > 0.0 ? 1.0 : 0.0;  // zero row: its dofs are locked
         for (int j = first; j < i; ++j) {
-            const int column = at.row_at[j];
+            const int column = envelope.row_at[j];
             if (!s.active[column]) { Li[j] = 0.0; continue; }
-            const double* Lj = L + at.start[j];
-            const int common = std::max(first, at.first[j]);
+            const double* Lj = L + envelope.start[j];
+            const int common = std::max(first, envelope.first[j]);
             const double sum = Gi[j] * scale * s.scale[column] - dot(Li + common, Lj + common, j - common);
             Li[j] = sum * Lj[j];  // the diagonal holds inverse roots of pivots
             pivot -= Li[j] * Li[j];
@@ -137,21 +137,21 @@ PN_WIDE void factor_rows(const std::vector<Block>& blocks, const std::vector<dou
 PN_WIDE void solve_rows(RowSystem& s, const VecX& r, VecX& lam) {
     lam.setZero();
     if (s.orthogonal) return solve_orthogonally(s, r, lam);
-    const Envelope& at = s.envelope;
+    const Envelope& envelope = s.envelope;
     const double* L = s.factor.data();
     double* __restrict y = s.work.data();
-    for (int i = 0; i < at.size(); ++i) {
-        const int row = at.row_at[i], first = at.first[i];
-        const double* Li = L + at.start[i];
+    for (int i = 0; i < envelope.size(); ++i) {
+        const int row = envelope.row_at[i], first = envelope.first[i];
+        const double* Li = L + envelope.start[i];
         y[i] = 0.0;
         if (s.active[row]) y[i] = (r[row] * s.scale[row] - dot(Li + first, y + first, i - first)) * Li[i];
     }
-    for (int i = at.size() - 1; i >= 0; --i) {
-        const int row = at.row_at[i];
+    for (int i = envelope.size() - 1; i >= 0; --i) {
+        const int row = envelope.row_at[i];
         if (!s.active[row]) continue;
-        const double* Li = L + at.start[i];
+        const double* Li = L + envelope.start[i];
         const double yi = y[i] * Li[i];
-        for (int j = at.first[i]; j < i; ++j) y[j] -= Li[j] * yi;
+        for (int j = envelope.first[i]; j < i; ++j) y[j] -= Li[j] * yi;
         lam[row] = yi * s.scale[row];
     }
 }

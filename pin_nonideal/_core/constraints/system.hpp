@@ -32,9 +32,9 @@ struct RowSystem : RowChoice {
     bool orthogonal = false;        // B^T = Q T in use instead of the Cholesky factor
     bool refine = false;            // very unequal pivots of M: solutions are refined
     double min_pivot = 1.0;
-    // Distance from a singular position, small near it. It is the minimum of three squares: (a) sine of the angle
-    // between a row and the others, (b) length of a row relative to the longest row of its block (a singular position
-    // turns a row into zero), (c) length of a row relative to its greatest length, if other rows depend on it.
+    // Distance from a singular position, small near it. The distance is the minimum of three squares: (a) sine of the angle
+    // between a row and the others, (b) length of a row relative to the longest row of its block (a singular position turns
+    // a row into zero), (c) length of a row relative to its greatest length, if other rows depend on it.
     double distance = 1.0;
     int rank = 0;
     // Orthogonal factorization of the scaled active rows, one column per row. Columns are allocated on first use,

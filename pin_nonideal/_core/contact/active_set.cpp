@@ -21,7 +21,7 @@ using Choice = std::vector<char>;  // closed flag by gap
 }  // namespace
 
 bool slip_opposes_friction(const Program& p, Workspace& w, const VecX& v) {
-    const double least =
+    const double min_size =
         active_set_parameters.min_direction_acceleration * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
     for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e) {
         if (!slips(w.state.mode[e])) continue;
@@ -30,7 +30,7 @@ bool slip_opposes_friction(const Program& p, Workspace& w, const VecX& v) {
         const Vec3 begins = slip_acceleration(p, w, f);
         const double size = begins.norm();
         const double max_deviation = active_set_parameters.max_direction_deviation;
-        if (size > least && begins.dot(w.state.slip_direction[e]) < (1.0 - max_deviation) * size) return false;
+        if (size > min_size && begins.dot(w.state.slip_direction[e]) < (1.0 - max_deviation) * size) return false;
     }
     return true;
 }

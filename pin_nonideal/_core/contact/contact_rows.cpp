@@ -59,15 +59,15 @@ void ContactRows::respond() {
     const int nv = p.mechanism.nv;
     const VecX no_bias = VecX::Zero(p.layout.rows);
     VecX unit = no_bias, lam = no_bias, force(nv), motion(nv);
-    each_row([&](int at, int block, int k) {
-        const Block& own = p.blocks[block];
-        velocity[at] = w.now.values[block].rate[own.kept[k]];
+    each_row([&](int row, int block, int k) {
+        const Block& row_block = p.blocks[block];
+        velocity[row] = w.now.values[block].rate[row_block.kept[k]];
         force.setZero();
-        unit[own.row + k] = 1.0;
-        add_transpose(own, w.now.A, unit, force);
-        unit[own.row + k] = 0.0;
+        unit[row_block.row + k] = 1.0;
+        add_transpose(row_block, w.now.A, unit, force);
+        unit[row_block.row + k] = 0.0;
         solve_acceleration(p, w, force, no_bias, motion, lam);
-        response.col(at) = motion;
+        response.col(row) = motion;
     });
     for (int column = 0; column < W.cols(); ++column) W.col(column) = change(response.col(column));
     W = (0.5 * (W + W.transpose())).eval();
@@ -75,9 +75,9 @@ void ContactRows::respond() {
 
 VecX ContactRows::change(const VecX& dv) const {
     VecX out(velocity.size());
-    each_row([&](int at, int block, int k) {
+    each_row([&](int row, int block, int k) {
         multiply(p.blocks[block], w.now.A, dv, w.scratch.r);
-        out[at] = w.scratch.r[p.blocks[block].row + k];
+        out[row] = w.scratch.r[p.blocks[block].row + k];
     });
     return out;
 }

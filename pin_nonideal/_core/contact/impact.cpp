@@ -44,25 +44,25 @@ VecX newton(const ContactRows& rows, double t, VecX w0) {
 }
 
 // Poisson's law of restitution. After the impulses that stop the approach, each contact gives e times its own impulse.
-// It gives more only to prevent penetration. Friction of the restitution impulse has a known limit: a box along the
+// A contact gives more only to prevent penetration. Friction of the restitution impulse has a known limit: a box along the
 // directions of the cone for the additional impulse.
 VecX poisson(const ContactRows& rows, double t, const VecX& velocity) {
     VecX P = percussions(rows, t, rows.W, velocity, rows.cones);
     std::vector<ConeElement> elements = rows.cones;
     std::vector<int> row(P.size());
     std::iota(row.begin(), row.end(), 0);
-    VecX given = VecX::Zero(P.size());
-    const double least = impulse_rounding * P.cwiseAbs().maxCoeff();
+    VecX restitution = VecX::Zero(P.size());
+    const double min_impulse = impulse_rounding * P.cwiseAbs().maxCoeff();
     for (size_t i = 0; i < rows.gaps.size(); ++i) {
-        const double again = rows.p.gaps[rows.gaps[i]].restitution * P[rows.first[i]];
-        if (!(again > least)) continue;
-        given[rows.first[i]] = again;
+        const double impulse = rows.p.gaps[rows.gaps[i]].restitution * P[rows.first[i]];
+        if (!(impulse > min_impulse)) continue;
+        restitution[rows.first[i]] = impulse;
         if (!rows.cones[i].slides() || rows.cones[i].bound == 0.0) continue;
-        elements.push_back(ConeElement::box(rows.cones[i].dim - 1, rows.cones[i].bound * again));
+        elements.push_back(ConeElement::box(rows.cones[i].dim - 1, rows.cones[i].bound * impulse));
         for (int k = 1; k < rows.cones[i].dim; ++k) row.push_back(rows.first[i] + k);
     }
-    if (given.isZero(0.0)) return P;
-    P += given;
+    if (restitution.isZero(0.0)) return P;
+    P += restitution;
     const int n = static_cast<int>(row.size());
     const VecX after = velocity + rows.W * P;
     MatX W(n, n);
@@ -71,8 +71,8 @@ VecX poisson(const ContactRows& rows, double t, const VecX& velocity) {
         w0[i] = after[row[i]];
         for (int j = 0; j < n; ++j) W(i, j) = rows.W(row[i], row[j]);
     }
-    const VecX more = percussions(rows, t, W, w0, elements);
-    for (int i = 0; i < n; ++i) P[row[i]] += more[i];
+    const VecX extra_impulse = percussions(rows, t, W, w0, elements);
+    for (int i = 0; i < n; ++i) P[row[i]] += extra_impulse[i];
     return P;
 }
 
@@ -82,8 +82,9 @@ void clean(const ContactRows& rows, double speed, VecX& w0) {
     const Spectrum modes = symmetric_spectrum(rows.W);
     const VecX& response = modes.values;
     for (int i = 0; i < w0.size() && response[i] <= impact_parameters.min_response * response[w0.size() - 1]; ++i) {
-        const double held = modes.vectors.col(i).dot(w0);
-        if (std::abs(held) <= impact_parameters.velocity_rounding * (1.0 + speed)) w0 -= held * modes.vectors.col(i);
+        const double component = modes.vectors.col(i).dot(w0);
+        if (std::abs(component) <= impact_parameters.velocity_rounding * (1.0 + speed))
+            w0 -= component * modes.vectors.col(i);
     }
 }
 

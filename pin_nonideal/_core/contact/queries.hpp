@@ -35,14 +35,14 @@ double acceleration_rounding(const Program& p, const Workspace& w, int gap);
 bool same_bodies(const Program& p, int gap, int other);
 // Check if two gaps are duplicate declarations.
 bool are_duplicates(const Program& p, int gap, int other);
-// Check if two gaps coincide up to rounding: same bodies, same line of action, same friction point and same laws. Their
-// rows and the rows of their sliding must be evaluated.
+// Check if two gaps coincide up to rounding: same bodies, same line of action, same friction point and same laws. The rows
+// of the gaps and of their slip directions must be evaluated.
 bool coincide(const Program& p, const Workspace& w, int gap, int other);
 // Reduce a list of touching gaps to one gap per place: the one that precedes the others, in sorted order.
 using Precedence = std::function<bool(int gap, int other)>;
 void remove_coincident(const Program& p, const Workspace& w, std::vector<int>& list, const Precedence& precedes);
-// Check if a gap has a lower bias than another gap, which coincides with it. Their accelerations differ by their biases
-// only, so that a load on the first gap keeps the other open.
+// Check if a gap has a lower bias than another gap, which coincides with it. The accelerations of such gaps differ by their
+// biases only, so that a load on the first gap keeps the other open.
 bool opens_later(const Program& p, const Workspace& w, int gap, int other);
 
 // Normal force of a closed contact in the current motion. Redundant contacts have their minimum-norm compressive loads.

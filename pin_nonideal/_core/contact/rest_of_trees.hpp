@@ -18,7 +18,7 @@ struct RestOfTreesParameters {
 inline constexpr RestOfTreesParameters rest_of_trees_parameters{};
 
 // Check if contacts and friction elements at rest hold a scene at rest. The workspace is evaluated without their forces,
-// with v = 0. `cones`: laws of the contacts, then of the other elements. Returns false if the laws allow a motion, if no
+// with v = 0. `cones`: laws of the contacts, then of the other elements. Return false if the laws allow a motion, if no
 // solution was found, or if constraints join the trees: other solvers then decide.
 bool rest_on_trees(const Program& p, Workspace& w, const std::vector<int>& gaps, const std::vector<int>& others,
                    const std::vector<ConeElement>& cones);

@@ -98,9 +98,9 @@ double RestingProblem::limit(int e) const {
 // Accelerations of the rows without contact forces.
 VecX RestingProblem::accelerations() {
     VecX out = VecX::Zero(rows.W.rows());
-    rows.each_row([&](int at, int block, int k) {
+    rows.each_row([&](int row, int block, int k) {
         multiply(p.blocks[block], w.now.A, w.now.a, w.scratch.r);
-        out[at] = w.scratch.r[p.blocks[block].row + k] + w.now.values[block].bias[p.blocks[block].kept[k]];
+        out[row] = w.scratch.r[p.blocks[block].row + k] + w.now.values[block].bias[p.blocks[block].kept[k]];
     });
     return out;
 }

@@ -1,6 +1,6 @@
 // Cone problem of contacts at rest. With normal and friction forces f as unknowns, the accelerations of gaps and slips
-// are w = w0 + W f. The laws of Signorini and Coulomb give a cone problem (complementarity/cone/problem.hpp). Its solution
-// shows the lifting contacts and the slip directions, even for shared loads.
+// are w = w0 + W f. The laws of Signorini and Coulomb give a cone problem (complementarity/cone/problem.hpp). The solution
+// of this problem shows the lifting contacts and the slip directions, even for shared loads.
 #pragma once
 
 #include <vector>

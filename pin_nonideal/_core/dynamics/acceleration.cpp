@@ -112,15 +112,15 @@ void solve_motion(const Program& p, Workspace& w, bool with_laws) {
 
 bool is_immobile(const Program& p, const Workspace& w) {
     if (p.moves_in_time || (p.frictions.empty() && p.gaps.empty())) return false;
-    int held = 0;
-    for (char locked : w.now.terms.locked) held += locked;
-    bool sticks = held > 0;
+    int held_count = 0;
+    for (char locked : w.now.terms.locked) held_count += locked;
+    bool sticks = held_count > 0;
     for (int i : w.now.rows.blocks) {
         const Block& block = p.blocks[i];
-        for (size_t k = 0; k < block.kept.size(); ++k) held += w.now.rows.active[block.row + k];
+        for (size_t k = 0; k < block.kept.size(); ++k) held_count += w.now.rows.active[block.row + k];
         sticks |= i >= p.first_gap;
     }
-    return sticks && held >= p.mechanism.nv;
+    return sticks && held_count >= p.mechanism.nv;
 }
 
 const VecX& holding_forces(const Program& p, Workspace& w) {

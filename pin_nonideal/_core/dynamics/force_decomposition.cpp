@@ -13,10 +13,11 @@ IdealMotion::IdealMotion(const Program& program, Workspace& workspace) : p(progr
         w.now.terms.locked.swap(w.scratch.ideal_locked);
         factorize(p.mechanism, w.now.terms);
         std::swap(w.now.rows, w.now.ideal_rows);
-        const RowSystem& own = w.now.ideal_rows;
-        w.now.rows.refine = own.refine;
+        const RowSystem& ideal_system = w.now.ideal_rows;
+        w.now.rows.refine = ideal_system.refine;
         if (!w.state.has_ideal_row_choice) {
-            for (int r = 0; r < p.layout.rows; ++r) w.now.rows.required[r] = own.required[r] && r < p.constraint_rows();
+            for (int r = 0; r < p.layout.rows; ++r)
+                w.now.rows.required[r] = ideal_system.required[r] && r < p.constraint_rows();
             w.now.rows.use_required(p.layout, p.blocks, w.now.active_blocks);
         }
         if (!w.now.rows.blocks.empty()) {

@@ -1,4 +1,4 @@
-// Friction elements in the current motion: slip, load and force.
+// Friction elements in the current motion: slip, load, friction limit and force.
 #pragma once
 
 #include <array>
@@ -20,8 +20,8 @@ double slip_rate_along_mode(const Program& p, Workspace& w, int element);
 std::pair<double, double> slip_toward_rest(const Program& p, Workspace& w, int element);
 // Friction limit under a load at the current slip speed. A sticking element has slip speed zero.
 double limit_under(const Program& p, const Workspace& w, int element, double load);
-// Load vectors of an element in the current motion, linear in the reactions. Their lengths add up to the load-dependent
-// part of the limit. Vectors that a bearing type does not use are zero, and all are zero for a user's limit.
+// Load vectors of an element in the current motion, linear in the reactions. The lengths of these vectors add up to the
+// load-dependent part of the limit. Vectors that a bearing type does not use are zero, and all are zero for a user's limit.
 using LoadVectors = std::array<Vec3, 3>;
 LoadVectors load_vectors(const Program& p, Workspace& w, const Friction& f);
 // Friction limits of an element at rest due to its load, without the static ratio, for the motion in the workspace.

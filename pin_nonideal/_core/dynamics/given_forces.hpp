@@ -1,4 +1,4 @@
-// Given forces F besides the bias, and actuation torques, at one state.
+// Evaluation of the forces of forces/given_forces.hpp and of actuation torques at one state.
 #pragma once
 
 #include "dynamics/workspace.hpp"

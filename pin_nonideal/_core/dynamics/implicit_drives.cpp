@@ -21,11 +21,11 @@ void ImplicitDrives::add_inertia(const Mechanism& m, Terms& terms) {
         theta[dof] = 0.5;
         inertia[dof] = 0.0;
         if (stiffness[dof] == 0.0 && damping[dof] == 0.0) continue;
-        double& own = terms.M[m.row_offset[dof]];
-        theta[dof] = implicit_part(h, own, stiffness[dof], damping[dof]);
+        double& diagonal = terms.M[m.row_offset[dof]];
+        theta[dof] = implicit_part(h, diagonal, stiffness[dof], damping[dof]);
         const double step = theta[dof] * h;
         inertia[dof] = step * (damping[dof] + step * stiffness[dof]);
-        own += inertia[dof];
+        diagonal += inertia[dof];
     }
 }
 

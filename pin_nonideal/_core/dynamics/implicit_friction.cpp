@@ -81,9 +81,9 @@ struct Implicit : Unknowns {
         for (double part = 1.0; part >= implicit_friction_parameters.min_zero_load_step; part *= 0.5) {
             y = from + part * step;
             image(y, g);
-            const double there = (g - y).norm();
-            if (!(there < (1.0 - implicit_friction_parameters.min_error_gain * part) * error)) continue;
-            error = there;
+            const double new_error = (g - y).norm();
+            if (!(new_error < (1.0 - implicit_friction_parameters.min_error_gain * part) * error)) continue;
+            error = new_error;
             return true;
         }
         return false;

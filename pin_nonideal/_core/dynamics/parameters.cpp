@@ -22,7 +22,7 @@ NumberLocation member(T& of, const NumberName& name, Members<T> members) {
     refuse(name);
 }
 
-// Return item number `index` of a kind. Sorting by kind keeps the order of insertion.
+// Return item number `index` of a kind of description. Sorting by kind keeps the order of insertion.
 template <class Kind, class Several>
 Kind& nth(Several& several, const NumberName& name) {
     int k = name.index;

@@ -15,7 +15,7 @@ constexpr int constraint_power = 2;
 constexpr int first_law_power = std::size(scene_powers);
 int power_count(const Program& p);
 std::vector<std::string> power_names(const Program& p);
-// Compute C of each law, sticking forces included. Their sum is C of the decomposition.
+// Compute C of each law, sticking forces included. The sum over the laws is C of the decomposition.
 void law_forces(const Program& p, Workspace& w, const VecX& v, std::vector<VecX>& force);
 void powers(const Program& p, Workspace& w, const VecX& v, double* out);
 

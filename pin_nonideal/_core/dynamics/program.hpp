@@ -86,7 +86,7 @@ struct Program {
 
     // Maximum size of the implicit reaction equation: a limit for each element, a force for each user law.
     size_t unknowns() const { return frictions.size() + static_cast<size_t>(user_laws) * mechanism.nv; }
-    // Number of rows of constraints and gaps. Rows of friction directions follow them.
+    // Number of rows of constraints and gaps. Rows of friction directions follow the rows of constraints and contacts.
     int constraint_rows() const {
         return constraints < static_cast<int>(blocks.size()) ? blocks[constraints].row : layout.rows;
     }

@@ -42,8 +42,7 @@ double gather_residuals(const Program& p, Workspace& w, const std::vector<char>&
 
 double gather_residuals(const Program& p, Workspace& w) { return gather_residuals(p, w, w.now.rows.active); }
 
-// Compute A v + phi_t from the rows in the workspace without motion of the bodies. A user's rate is a function of its
-// own.
+// Compute A v + phi_t from the rows in the workspace without motion of the bodies. A user's rate is a separate function.
 double gather_rates(const Program& p, Workspace& w, double t, const VecX& v, const std::vector<char>& counts) {
     const State state{p.mechanism, w.now.terms, w.now.row_time(t), w.now.terms.q, v};
     for (int i : w.now.rows.blocks) {
@@ -103,7 +102,7 @@ void move_position(const Program& p, Workspace& w, VecX& q, const Dofs&... dofs)
     retract(p.mechanism, w.scratch.position_start.data(), w.scratch.scaled.data(), q.data());
 }
 
-// Rounding level of residuals. It is zero near a singular position, which magnifies rounding.
+// Rounding level of residuals. The level is zero near a singular position, which magnifies rounding.
 double rounding_part(const Workspace& w) { return w.now.rows.distance < near_singular_pivot ? 0.0 : projection_floor; }
 
 }  // namespace
@@ -117,7 +116,8 @@ void follow_constraints(const Program& p, Workspace& w, double h, VecX& move) {
             if (block.holonomic[k]) w.scratch.r[block.row + k] = -0.5 * h * h * w.now.b[block.row + k];
     }
     solve_rows(w.now.rows, w.scratch.r, w.scratch.position_lam);
-    // The terms of the series do not decrease close to a singular position or at high speed. Drop the third order then.
+    // The terms of the series do not decrease close to a singular position or at high speed. Skip the third order for such
+    // rows.
     const double cube = h * h * h, second = product(w, w.scratch.position_lam, w.scratch.position_lam);
     const double third = product(w, w.state.third_order_lam, w.state.third_order_lam);
     if (cube * cube * third < projection_parameters.falling_square * second)

@@ -49,7 +49,7 @@ static void sweep_tree(const Mechanism& m, const Evaluation& now, Reactions& r) 
     for (int i = n - 1; i > 0; --i) {
         const Joint& j = m.joints[i];
         if (j.deep) {  // body by body: differences of subtree sums would cancel
-            r.momentum[i] += now.terms.body[i].own * r.motion[i];
+            r.momentum[i] += now.terms.body[i].inertia * r.motion[i];
             r.momentum[i] += now.terms.deep.bias[i];
             r.momentum[i] -= r.body[i];
             if (j.parent != 0) r.momentum[j.parent] += before(r.momentum[i], now.terms.deep.shift[i]);
@@ -86,16 +86,16 @@ static void press_all(const Program& p, Workspace& w, Reactions& r) {
     const MatX& free = free_multipliers(p.blocks, now.B, p.described, w.now.rows);
     MatX Z(gaps.size(), free.cols());
     VecX N(gaps.size());
-    std::vector<char> held(gaps.size());
+    std::vector<char> has_zero_load(gaps.size());
     for (size_t k = 0; k < gaps.size(); ++k) {
         const int row = p.blocks[p.gaps[gaps[k]].block].row;
         Z.row(k) = free.row(row);
         if (!(Z.row(k).norm() > min_null_space_entry)) Z.row(k).setZero();
         N[k] = r.lam[row];
-        held[k] = r.has_zero_load[gaps[k]];
+        has_zero_load[k] = r.has_zero_load[gaps[k]];
     }
     if (r.is_zero_load_set_frozen) {
-        r.lam += free * shortest_with_zeros(Z, N, held);
+        r.lam += free * shortest_with_zeros(Z, N, has_zero_load);
         return;
     }
     const NonnegativeSum found = shortest_nonnegative(Z, N);
@@ -204,11 +204,11 @@ struct WrenchAbout {
 Force carried_wrench(const Program& p, Workspace& w, int index) {
     const Reactions& r = reactions(p, w);
     const Evaluation& now = w.now;
-    const Block& own = p.blocks[index];
-    const Frame& frame = *frames(own.kind).first;
+    const Block& block = p.blocks[index];
+    const Frame& frame = *frames(block.kind).first;
     const Body& body = now.terms.body[frame.joint];
     WrenchAbout wrench{now, body.ref + body.p + body.R * frame.p};
-    for (int k = 0; k < own.total; ++k) wrench.add(index, k, p.share(own, k, r.lam));
+    for (int k = 0; k < block.total; ++k) wrench.add(index, k, p.share(block, k, r.lam));
     for (int e : now.loaded_elements) {
         const Friction& f = p.frictions[e];
         if (f.anchor != index) continue;

@@ -1,4 +1,4 @@
-// Reactions: loads of joints, anchors and contacts in the current motion, including ideal and nonideal forces. They are
+// Reactions: loads of joints, anchors and contacts in the current motion, including ideal and nonideal forces. Reactions are
 // computed on first access and cached until the next motion.
 #pragma once
 

@@ -11,8 +11,8 @@ namespace pn {
 
 namespace {
 
-// Rows of the sticking contacts as a cone problem. Its w is zero for all multipliers that exert the same force as the
-// current multipliers.
+// Rows of the sticking contacts as a cone problem. The w of this problem is zero for all multipliers that exert the same
+// force as the current multipliers.
 struct StickingShares {
     std::vector<int> rows;
     std::vector<ConeElement> cones;

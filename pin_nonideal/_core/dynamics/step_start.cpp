@@ -32,7 +32,7 @@ static double fastest_turn(const Workspace& w) {
 }
 
 // Residual allowed to a dependent row of unit length besides its own terms. The first part is a fraction of the
-// rotational accelerations, which may cancel in each term. The second part applies while elements stick. It is the
+// rotational accelerations, which may cancel in each term. The second part applies while elements stick. This part is the
 // effect of the motion on the row's independent component, which is below the rank tolerance.
 static double unseen(const Program& p, Workspace& w, const VecX& v) {
     const double speed = scaled_length(p, w, v);

@@ -36,7 +36,8 @@ bool begin_step_on_rates(const Program& p, Workspace& w, double t, VecX& v);
 // `evaluates`.
 bool begin_step_on_rates(const Program& p, Workspace& w, double t, VecX& v, bool chosen, bool evaluates);
 // Keep bodies moving after a change of modes. If newly chosen rows would stop the motion, rows that sticking elements
-// hold with negligible forces count as dependent from now on. The workspace is evaluated at (q, v) before and after.
+// hold with negligible forces count as dependent from now on. The workspace is evaluated at (q, v) before and after the
+// call.
 void restore_motion(const Program& p, Workspace& w, double t, const VecX& v);
 // Project a state onto the rows of newly set modes, with independent rows at this state.
 void project_into_modes(const Program& p, Workspace& w, double t, VecX& q, VecX& v);

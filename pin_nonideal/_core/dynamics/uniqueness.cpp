@@ -56,7 +56,8 @@ std::vector<VecX> motions_of(Unknowns& u, const std::vector<VecX>& roots) {
     return list;
 }
 
-// Check if all sticking elements hold in the motion of a solution. If one of them slips, the motion has other modes.
+// Check if all sticking elements hold in the motion of a solution. If one of these elements slips, the motion has other
+// modes.
 bool holds(Unknowns& u, const VecX& y) {
     const ReleasedZeroLoads free(u.w);
     u.set(y);
@@ -74,7 +75,7 @@ bool only_opening(const Unknowns& u) {
     return std::all_of(list.begin(), list.end(), [&](int e) { return u.p.frictions[e].gap >= 0; });
 }
 
-// Check if a unilateral contact has tension. It is then about to open.
+// Check if a unilateral contact has tension. Such a contact is about to open.
 bool pulls(const Unknowns& u, const VecX& y) {
     const std::vector<int> list = u.elements();
     for (size_t i = 0; i < list.size(); ++i)
@@ -146,8 +147,8 @@ void decide(Unknowns& u, const ReactionEquation& equation, const VecX& start, Ve
     if (found.empty() && !roots.complete) throw Failure(Failure::Kind::not_converged, u.t, u.elements());
     if (found.empty()) throw paradox(u, edge, roots.at_edge ? Solutions::unproven : Solutions::none);
     sort_by_distance(equation, start, found);
-    double least = HUGE_VAL;
-    for (const VecX& root : found) least = std::min(least, determinant_at(equation, root));
+    double min_root_determinant = HUGE_VAL;
+    for (const VecX& root : found) min_root_determinant = std::min(min_root_determinant, determinant_at(equation, root));
     y = found.front();
     if (found.size() == 1 && !roots.at_edge) {
         if (roots.complete && !in_pieces) state.unique = Uniqueness::shown;
@@ -163,8 +164,8 @@ void decide(Unknowns& u, const ReactionEquation& equation, const VecX& start, Ve
     (found.back() - y).cwiseQuotient((found.back() + y).cwiseMax(min_scale)).cwiseAbs().maxCoeff(&widest);
     u.w.now.several_element = u.elements()[widest];
     if (u.w.continues && determinant_at(equation, y) > uniqueness_parameters.min_determinant) return;
-    if (found.size() == 1) throw paradox(u, std::min(least, edge));
-    throw two_motions(u, least, found[0], found[1]);
+    if (found.size() == 1) throw paradox(u, std::min(min_root_determinant, edge));
+    throw two_motions(u, min_root_determinant, found[0], found[1]);
 }
 
 void differentiate(Unknowns& u, const VecX& y, const VecX& g, double size, MatX& J) {
@@ -245,35 +246,35 @@ bool leads_elsewhere(Unknowns& u, const VecX& y, VecX& start, double size) {
 
 double min_determinant(const Unknowns& u, const MatX& J) {
     const MatX I = MatX::Identity(u.n, u.n);
-    double least = determinant(I - J);
-    each_mixture(u, J, [&](const MatX& other, const VecX&) { least = std::min(least, determinant(I - other)); });
-    return least;
+    double minimum = determinant(I - J);
+    each_mixture(u, J, [&](const MatX& other, const VecX&) { minimum = std::min(minimum, determinant(I - other)); });
+    return minimum;
 }
 
 void search_other_solutions(Unknowns& u, VecX& y, const MatX& J, double size) {
     RunState& state = u.w.state;
     const MatX I = MatX::Identity(u.n, u.n);
-    const double here = determinant(I - J);
-    const bool regular = here > uniqueness_parameters.min_determinant;
-    u.w.now.determinant = here;
+    const double determinant_at_y = determinant(I - J);
+    const bool regular = determinant_at_y > uniqueness_parameters.min_determinant;
+    u.w.now.determinant = determinant_at_y;
     state.unique = Uniqueness::not_shown;
-    if (std::abs(here) <= uniqueness_parameters.min_determinant)
-        throw paradox(u, std::min(here, 0.0));  // counts as zero
+    if (std::abs(determinant_at_y) <= uniqueness_parameters.min_determinant)
+        throw paradox(u, std::min(determinant_at_y, 0.0));  // counts as zero
     const VecX bound = solve(I - J.cwiseAbs(), VecX::Ones(u.n));
     if ((bound.array() > 0.0).all()) return;
     const VecX c = constants(u), solution = y;
     each_mixture(u, J, [&](const MatX& other, const VecX& mirrored) {
-        const double there = determinant(I - other);
-        if ((regular && there > 0.0) || state.unique == Uniqueness::several) return;
-        if (there == 0.0) throw paradox(u, there);
+        const double other_determinant = determinant(I - other);
+        if ((regular && other_determinant > 0.0) || state.unique == Uniqueness::several) return;
+        if (other_determinant == 0.0) throw paradox(u, other_determinant);
         VecX elsewhere = solution + solve(I - other, 2.0 * mirrored.cwiseProduct(c - solution));
         if (!leads_elsewhere(u, solution, elsewhere, size)) return;
-        if (!u.w.continues) throw two_motions(u, std::min(here, there), solution, elsewhere);
+        if (!u.w.continues) throw two_motions(u, std::min(determinant_at_y, other_determinant), solution, elsewhere);
         state.unique = Uniqueness::several;
         if (!u.elements().empty()) u.w.now.several_element = u.elements().front();
         if (!regular) y = elsewhere;
     });
-    if (!regular && state.unique != Uniqueness::several) throw paradox(u, here);
+    if (!regular && state.unique != Uniqueness::several) throw paradox(u, determinant_at_y);
 }
 
 }  // namespace pn

@@ -94,7 +94,7 @@ static void set_active(const Program& p, Workspace& w, int gap, char closed) {
     for (int e : p.gaps[gap].elements) w.now.is_inactive[p.frictions[e].block] = !closed;
 }
 
-// Thousands of contacts may be open. They cost a comparison of bytes each.
+// Thousands of contacts may be open. Each open contact costs a comparison of bytes.
 static void select_contacts(const Program& p, Workspace& w) {
     const std::vector<char>& closed = w.state.closed;
     if (same_bytes(closed, w.now.selected)) return;
@@ -142,12 +142,12 @@ void select_rows(const Program& p, Workspace& w) {
 }
 
 void set_modes(const Program& p, Workspace& w, const std::vector<Mode>& modes) {
-    std::vector<Mode>& own = w.state.mode.values_;
-    own = modes;
-    for (size_t e = next_other(own, 0, unloaded); e < own.size(); e = next_other(own, e + 1, unloaded))
-        if (is_open(p, w, static_cast<int>(e))) own[e] = unloaded;
-    for (size_t e = 0; e < own.size(); ++e) {
-        const size_t end = next_other(own, e, unloaded);
+    std::vector<Mode>& values = w.state.mode.values_;
+    values = modes;
+    for (size_t e = next_other(values, 0, unloaded); e < values.size(); e = next_other(values, e + 1, unloaded))
+        if (is_open(p, w, static_cast<int>(e))) values[e] = unloaded;
+    for (size_t e = 0; e < values.size(); ++e) {
+        const size_t end = next_other(values, e, unloaded);
         std::fill(w.now.slip_force.begin() + e, w.now.slip_force.begin() + end, Vec3::Zero());
         e = end;
     }

@@ -32,7 +32,7 @@ struct Counters {
     double motion = 0.0, signorini = 0.0, coulomb = 0.0, dissipation = 0.0;
 };
 
-// Uniqueness of the motion under the laws. It is never proven if user functions are among the laws.
+// Uniqueness of the motion under the laws. Uniqueness is never proven if user functions are among the laws.
 enum class Uniqueness : signed char { shown, not_shown, several };
 constexpr int undecided_steps = 1 << 30;
 

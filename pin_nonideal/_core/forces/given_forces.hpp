@@ -48,7 +48,7 @@ struct SampledTorque {
     double period;
 };
 struct HoldPosition { VecX kp, kd, q; };
-// Torques at increasing times, one column per time. They are linear in between and constant outside.
+// Torques at increasing times, one column per time. The torques are linear between these times and constant outside.
 struct TorqueTable {
     std::vector<double> times;
     MatX values;

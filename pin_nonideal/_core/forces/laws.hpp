@@ -1,7 +1,7 @@
 // Nonideal laws, which form C(q, v, t, reactions) of Eq. (9), w^T F^c = w^T C.
 //
-// Each smooth law is one struct. Its function `act` exerts forces on dofs, on bodies or along the rows of a block, and
-// sets the rates of its states. The same function computes C and, if joints carry the forces, the reactions. Dry
+// Each smooth law is one struct. The function `act` of a law exerts forces on dofs, on bodies or along the rows of a block,
+// and sets the rates of its states. The same function computes C and, if joints carry the forces, the reactions. Dry
 // friction, with sticking and slipping elements, is in friction.hpp.
 #pragma once
 

@@ -15,7 +15,7 @@ struct Program;
 struct Workspace;
 class Archive;
 
-// Modes of all elements. Every reader may access them, but only set_modes and archives change them.
+// Modes of all elements. Every function may read the modes, but only set_modes and archives change the modes.
 class Modes {
 public:
     explicit Modes(size_t elements = 0) : values_(elements, slip_plus) {}

@@ -1,5 +1,5 @@
-// Load-dependent friction problem at one state. It couples elements at rest with each other and with slipping elements
-// of load-dependent limits.
+// Load-dependent friction problem at one state. The problem couples elements at rest with each other and with slipping
+// elements of load-dependent limits.
 #pragma once
 
 #include "dynamics/reactions.hpp"

@@ -83,30 +83,30 @@ VecX FrictionProblem::along(const Program& p, Workspace& w, const VecX& x) const
 }
 
 void FrictionProblem::along(const Program& p, Workspace& w, const VecX& x, VecX& out) const {
-    int at = 0;
+    int row = 0;
     for (int e : elements) {
         const Block& block = block_of(p, e);
         multiply(block, w.now.A, x, w.scratch.r);
-        for (size_t k = 0; k < block.kept.size(); ++k) out[at++] = w.scratch.r[block.row + k];
+        for (size_t k = 0; k < block.kept.size(); ++k) out[row++] = w.scratch.r[block.row + k];
     }
 }
 
 VecX FrictionProblem::slip_accelerations(const Program& p, Workspace& w) const {
     VecX alpha = along(p, w, w.now.a);
-    int at = 0;
+    int row = 0;
     for (int e : elements) {
         const Block& block = block_of(p, e);
-        for (size_t k = 0; k < block.kept.size(); ++k) alpha[at++] -= w.now.b[block.row + k];
+        for (size_t k = 0; k < block.kept.size(); ++k) alpha[row++] -= w.now.b[block.row + k];
     }
     return alpha;
 }
 
 void FrictionProblem::add_forces(const Program& p, Workspace& w, const VecX& f, VecX& C) const {
     VecX by_row = VecX::Zero(p.layout.rows);
-    int at = 0;
+    int row = 0;
     for (int e : elements) {
         const Block& block = block_of(p, e);
-        for (size_t k = 0; k < block.kept.size(); ++k, ++at) by_row[block.row + k] = w.now.slip_force[e][k] = f[at];
+        for (size_t k = 0; k < block.kept.size(); ++k, ++row) by_row[block.row + k] = w.now.slip_force[e][k] = f[row];
         add_transpose(block, w.now.A, by_row, C);
     }
     w.now.reactions.current = false;

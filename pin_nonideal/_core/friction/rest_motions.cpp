@@ -31,9 +31,9 @@ bool RestMotions::find_in_zero_load_set(RestProblem& problem, VecX& x) {
         // If a contact has tension in all motions, it is about to open.
         return choose(problem, motions.empty() ? all.forces : motions, x);
     }
-    VecX held = equation.holding_forces();
-    if (!refine_rest(equation, held) || !all_stick(equation, held)) return solve_rest(equation, x);
-    x = held;
+    VecX holding = equation.holding_forces();
+    if (!refine_rest(equation, holding) || !all_stick(equation, holding)) return solve_rest(equation, x);
+    x = holding;
     return true;
 }
 

@@ -63,9 +63,9 @@ std::vector<Mode> modes_of(Workspace& w, const ModeQuery& query, const FrictionP
     const double min_onset = slip_onset_parameters.max_acceleration * problem.alpha0.cwiseAbs().maxCoeff();
     std::vector<Onset> all;
     VecX onset;
-    for (size_t i = 0, at = 0; i < query.at_rest.size(); at += problem.dims[i], ++i) {
+    for (size_t i = 0, row = 0; i < query.at_rest.size(); row += problem.dims[i], ++i) {
         const int dim = problem.dims[i];
-        const VecX force = from_middle.segment(at, dim), slip = alpha.segment(at, dim);
+        const VecX force = from_middle.segment(row, dim), slip = alpha.segment(row, dim);
         const bool broken = breaks(query, query.at_rest[i], force, limits[i]);
         const bool slides =
             force.norm() >= limits[i] * (1.0 - slip_onset_parameters.limit_rounding) && slip.norm() > noise;
@@ -74,9 +74,9 @@ std::vector<Mode> modes_of(Workspace& w, const ModeQuery& query, const FrictionP
                     : broken && !slides;
         if (is_slow && onset.size() == 0)
             onset = onset_accelerations(problem.W, problem.alpha0, problem.dims, limits);
-        const double response = problem.W.diagonal().segment(at, dim).sum() / dim;
+        const double response = problem.W.diagonal().segment(row, dim).sum() / dim;
         const bool by_force = slides && force.norm() * response > slip.norm();
-        const VecX begins = is_slow ? VecX(onset.segment(at, dim)) : by_force ? VecX(-force) : slip;
+        const VecX begins = is_slow ? VecX(onset.segment(row, dim)) : by_force ? VecX(-force) : slip;
         all.push_back({force, begins, slides, (slides || is_slow) && begins.norm() > noise, broken});
     }
     return modes_of(w, query, all);

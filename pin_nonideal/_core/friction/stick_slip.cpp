@@ -33,7 +33,7 @@ struct Search {
     const ModeQuery& query;
     const std::vector<int>& list;  // elements at rest
     std::vector<int> slipping;     // slipping elements with load-dependent limits
-    RestMotions motions;           // those of load-dependent limits
+    RestMotions motions;           // motions of the elements with load-dependent limits
     bool loads_are_feasible = true;           // the motion of the iteration has no contact in tension
 
     Search(const Program& program, Workspace& workspace, double time, const VecX& q_, const VecX& v_,
@@ -92,18 +92,18 @@ struct Search {
         problem.alpha0 = problem.slip_accelerations(p, w) - problem.W * f;
         for (int i = 0; i < problem.rows; ++i)
             if (problem.W(i, i) == 0.0) problem.alpha0[i] = driven[i];
-        const double least = stick_slip_parameters.limit_force_rounding / stick_slip_parameters.limit_tolerance *
-                             w.now.F.cwiseAbs().maxCoeff();
+        const double min_limit = stick_slip_parameters.limit_force_rounding / stick_slip_parameters.limit_tolerance *
+                                 w.now.F.cwiseAbs().maxCoeff();
         double change = 0.0;
-        for (size_t i = 0, at = 0; i < list.size(); at += problem.dims[i], ++i) {
+        for (size_t i = 0, row = 0; i < list.size(); row += problem.dims[i], ++i) {
             const Friction& friction = p.frictions[list[i]];
             SlipLimits now = static_limits(p, w, list[i], t, q, v);
             if (modes[list[i]] != sticking) now = w.now.load[list[i]] * friction.speed_factor(0.0);
             const double limit_change =
-                std::max(std::abs(now.reach() - limits[i]), std::abs(now.middle() - limits.middle[at]));
-            change = std::max(change, limit_change / std::max({now.reach(), least, min_scale}));
+                std::max(std::abs(now.reach() - limits[i]), std::abs(now.middle() - limits.middle[row]));
+            change = std::max(change, limit_change / std::max({now.reach(), min_limit, min_scale}));
             limits.size[i] = now.reach();
-            limits.middle[at] = now.middle();
+            limits.middle[row] = now.middle();
         }
         return change;
     }
@@ -118,10 +118,10 @@ struct Search {
         for (int i = 0; i < problem.rows; ++i)  // rows held by the constraints have no slip acceleration
             if (problem.W(i, i) == 0.0 && std::abs(problem.alpha0[i]) <= noise) problem.alpha0[i] = 0.0;
         FrictionLimits limits(static_cast<int>(list.size()), problem.rows);
-        for (size_t i = 0, at = 0; i < list.size(); at += problem.dims[i], ++i) {
+        for (size_t i = 0, row = 0; i < list.size(); row += problem.dims[i], ++i) {
             const SlipLimits now = static_limits(p, w, list[i], t, q, v);
             limits.size[i] = now.reach();
-            limits.middle[at] = now.middle();
+            limits.middle[row] = now.middle();
         }
         double change = 0.0;
         for (int turn = 0; turn < stick_slip_parameters.max_limit_iterations; ++turn) {

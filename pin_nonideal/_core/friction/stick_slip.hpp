@@ -20,8 +20,8 @@ struct StickSlipParameters {
 
 inline constexpr StickSlipParameters stick_slip_parameters{};
 
-// Decide if each element at rest sticks or slips, and in which direction. Elements that have just come to rest are
-// among them. On return the workspace is evaluated with the new modes.
+// Decide if each element at rest sticks or slips, and in which direction. The elements at rest include elements that have
+// just come to rest. On return the workspace is evaluated with the new modes.
 void resolve_modes(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, const ModeQuery& query);
 
 }  // namespace pn

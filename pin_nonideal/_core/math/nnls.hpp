@@ -13,7 +13,7 @@ struct NnlsParameters {
     double rounding = 1e-13;
     // Relative pivot below which a column counts as spanned by the others.
     double min_column_pivot = 1e-11;
-    // Slack for the search of binding numbers if no z is feasible, relative to max |N|. It must exceed rounding.
+    // Slack for the search of binding numbers if no z is feasible, relative to max |N|. The slack must exceed rounding.
     double binding_slack = 1e-9;
     // Rounding of a zero in a least-squares solution, relative to the numbers that it sums.
     double met_rounding = 1e-11;

@@ -57,8 +57,8 @@ double root_after_start(double high, double margin_high, double least, const Mar
     return 0.0;
 }
 
-// Return a lower bound on [0, 1] of the cubic with values u0, u1 and slopes a0, a1 at 0 and 1. It is the minimum of the
-// Bernstein coefficients.
+// Return a lower bound on [0, 1] of the cubic with values u0, u1 and slopes a0, a1 at 0 and 1. The bound is the minimum of
+// the Bernstein coefficients.
 inline double lower_bound_inside(double u0, double a0, double u1, double a1) {
     constexpr double third = 1.0 / 3.0;
     return std::min({u0, u0 + third * a0, u1 - third * a1, u1});
@@ -87,7 +87,7 @@ inline double rise_between(double t0, double u0, double t1, double u1, double t2
 }
 
 // Return a point between a and b at which the margin is negative, by golden sections toward its minimum. `value` is the
-// margin at this point. Returns b if no such point is found.
+// margin at this point. Return b if no such point is found.
 template <class Margin>
 double dip_between(double a, double b, const Margin& margin, double& value) {
     constexpr double golden = 0.3819660112501051;

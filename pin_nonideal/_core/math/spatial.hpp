@@ -171,7 +171,8 @@ struct Inertia {
     }
 };
 
-// Articulated inertia of a body and the bodies that hang on it by free joints. Its mass depends on the direction.
+// Articulated inertia of a body and the bodies that hang on it by free joints. The mass in an articulated inertia depends on
+// the direction.
 struct ArticulatedInertia {
     Mat3 lin, couple, ang;  // force (lin a + couple w, couple^T a + ang w) for the motion (a, w)
 

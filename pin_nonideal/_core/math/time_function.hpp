@@ -54,8 +54,8 @@ inline bool is_constant(const TimeFunction& f) {
     return polynomial && polynomial->coefficients.size() <= 1;
 }
 
-// Return the times at which the pieces of a function meet. Its derivatives may jump there. None are known for a user's
-// function.
+// Return the times at which the pieces of a function meet. The derivatives of the function may jump at these times. None are
+// known for a user's function.
 inline std::vector<double> breaks(const TimeFunction& f) {
     const auto* spline = std::get_if<Spline>(&f);
     return spline ? spline->breaks : std::vector<double>();

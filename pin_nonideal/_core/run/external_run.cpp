@@ -10,15 +10,15 @@
 
 namespace pn {
 
-void ExternalRun::derivative(double at, const VecX& y_outside, VecX& rate_outside) {
+void ExternalRun::derivative(double time, const VecX& y_outside, VecX& rate_outside) {
     inside_ = inside_rate_ = VecX::Zero(system.ny);
     inside_.head(system.ns) = y_outside;
-    system.derivative(at, inside_, inside_rate_);
+    system.derivative(time, inside_, inside_rate_);
     rate_outside = inside_rate_.head(system.ns);
 }
 
 // Positions use an absolute step, which stays small after many turns of a joint.
-MatX ExternalRun::jacobian(double at, const VecX& y_outside) {
+MatX ExternalRun::jacobian(double time, const VecX& y_outside) {
     const int n = system.ns;
     MatX out = MatX::Zero(n, n);
     VecX ahead = y_outside, back = y_outside, rate_ahead(n), rate_back(n);
@@ -26,8 +26,8 @@ MatX ExternalRun::jacobian(double at, const VecX& y_outside) {
         const double step = parameters.derivative_step * (k < system.nq ? 1.0 : std::max(1.0, std::abs(y_outside[k])));
         ahead[k] += step;
         back[k] -= step;
-        derivative(at, ahead, rate_ahead);
-        derivative(at, back, rate_back);
+        derivative(time, ahead, rate_ahead);
+        derivative(time, back, rate_back);
         out.col(k) = (rate_ahead - rate_back) / (ahead[k] - back[k]);
         ahead[k] = back[k] = y_outside[k];
     }

@@ -1,5 +1,5 @@
 // Run whose steps are taken by an integrator outside the core. The integrator evaluates rates under the modes of the
-// current step. The core then treats each step like its own. It projects the step's end onto the constraints, ends the
+// current step. The core then treats each step like its own. The core projects the step's end onto the constraints, ends the
 // step at the first event inside, and records samples.
 #pragma once
 
@@ -29,8 +29,8 @@ public:
 
     // Compute dy/dt of y = (q, v, law states, work of the ledger's columns), and its Jacobian by y with central
     // differences.
-    void derivative(double at, const VecX& y_outside, VecX& rate_outside);
-    MatX jacobian(double at, const VecX& y_outside);
+    void derivative(double time, const VecX& y_outside, VecX& rate_outside);
+    MatX jacobian(double time, const VecX& y_outside);
     // Follow a step from the current state to one at time `end`. Return true if the integrator must restart from the
     // current state.
     bool follow(double end, const OutsideStep::Interpolant& interpolant);

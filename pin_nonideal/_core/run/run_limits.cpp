@@ -6,8 +6,8 @@ namespace pn {
 
 void RunLimits::watch_evaluations() {
     if (!options_.tick && !(options_.max_wall > 0.0)) return;
-    w.watch = [this](double at) {
-        if (options_.tick) options_.tick(at);
+    w.watch = [this](double time) {
+        if (options_.tick) options_.tick(time);
         if (is_late()) throw EndOfRun{Failure(Failure::Kind::wall, progress_.t, {}, options_.max_wall)};
     };
 }

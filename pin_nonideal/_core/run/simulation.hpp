@@ -46,7 +46,7 @@ public:
     void restore(const std::string& state);
     // Integrate to the end, from the start or from a restored state.
     void run();
-    // Report progress and check the wall time at evaluations too. A step may take many of them.
+    // Report progress and check the wall time at evaluations too. A step may take many evaluations.
     void watch_evaluations() { run_limits.watch_evaluations(); }
 
 protected:
@@ -56,7 +56,7 @@ protected:
         bool last = false;  // the step ends at `stop`
     };
 
-    // Six phases of a step. `integrate` returns the error norm, 1 at the tolerance. It returns nothing if the step
+    // Six phases of a step. `integrate` returns the error norm, 1 at the tolerance. `integrate` returns nothing if the step
     // would pass too near a singular position. A step is proposed again if its error is rejected or if an event inside
     // cannot be located.
     Proposal propose();
@@ -93,7 +93,7 @@ protected:
 
     Progress progress;  // state from step to step, with the current time, state and step size
 
-    // Parts of the run. They read and change `progress`.
+    // Parts of the run. The parts read and change `progress`.
     RunLimits run_limits;
     System system;
     ErrorNorm norm;

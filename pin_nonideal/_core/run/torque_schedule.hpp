@@ -7,7 +7,7 @@
 namespace pn {
 
 struct TorqueScheduleParameters {
-    // Rounding tolerance of the quotient: relative, and absolute.
+    // Rounding tolerance of the number of periods, which is a quotient of times: relative, and absolute.
     double quotient_rounding = 1e-14, count_rounding = 1e-9;
 };
 
@@ -19,15 +19,15 @@ public:
     Torques(System& system, Progress& progress, const Options& options, Output& output, Breaks& breaks);
 
     // Pass the breaks of time functions up to a time. Time stepping computes velocity jumps itself.
-    void enter(double at) { if (breaks_.next() <= at) breaks_.enter(at); }
-    // Sample the sampled control if its next period begins now.
+    void enter(double time) { if (breaks_.next() <= time) breaks_.enter(time); }
+    // Sample the sampled control if the next period of this control begins at the time of the run.
     void sample();
     // Call the user's callback, and set the torques that it returns. Return false if the callback ends the run.
     bool call_callback();
     // Replace the actuation torques from now on.
     void set(const VecX& torque);
-    // Return the next time after the given one at which the actuation jumps or kinks or a time function breaks. It is at
-    // most `t_end`.
+    // Return the next time after the given one at which the actuation jumps or kinks or a time function breaks. The returned
+    // time is at most `t_end`.
     double next_stop(double after, double t_end) const;
 
 private:

@@ -6,7 +6,7 @@ namespace pn {
 
 PN_WIDE int factorize_articulated(const Mechanism& m, BodyTerms& terms) {
     Articulation& deep = terms.deep;
-    for (int i : m.deep_joints) deep.inertia[i] = articulated(terms.body[i].own);
+    for (int i : m.deep_joints) deep.inertia[i] = articulated(terms.body[i].inertia);
     for (size_t n = m.deep_joints.size(); n-- > 0;) {
         const int i = m.deep_joints[n];
         const Joint& j = m.joints[i];
@@ -88,7 +88,7 @@ PN_WIDE void move_articulated(const Mechanism& m, BodyTerms& terms, const VecX& 
 PN_WIDE void multiply_M_articulated(const Mechanism& m, BodyTerms& terms, const VecX& x, Force* body, VecX& y) {
     move_articulated(m, terms, x);
     Force* f = body ? body : terms.deep.forces.data();
-    for (int i : m.deep_joints) f[i] = terms.body[i].own * terms.deep.motions[i];
+    for (int i : m.deep_joints) f[i] = terms.body[i].inertia * terms.deep.motions[i];
     for (int dof : m.deep_dofs) y[dof] = m.armature[dof] * x[dof];
     if (body) return;
     for (size_t n = m.deep_dofs.size(); n-- > 0;) {

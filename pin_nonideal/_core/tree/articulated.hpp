@@ -2,8 +2,8 @@
 // grows with the fourth power of the depth. The innovations factor of M^-1 = (1 - H psi K)^T D^-1 (1 - H psi K)
 // [Rodriguez, Jain, Kreutz-Delgado, 1992] is the same R = L^T D^1/2 as that of the rows (tree/mass_factor.hpp). R^-1 is
 // a sweep toward the roots and R^-T a sweep toward the leaves. The time of a sweep is linear in the number of dofs.
-// Forces known as wrenches enter on the bodies. As generalized forces they would be long sums, which the sweep would
-// decompose again.
+// Forces known as wrenches enter on the bodies. As generalized forces such wrenches would be long sums, which the sweep
+// would decompose again.
 #pragma once
 
 #include <vector>
@@ -12,7 +12,7 @@
 
 namespace pn {
 
-// Compute gains and pivots of the dofs of deep trees. Returns -1, or the dof with a pivot that is not positive.
+// Compute gains and pivots of the dofs of deep trees. Return -1, or the dof with a pivot that is not positive.
 int factorize_articulated(const Mechanism& m, BodyTerms& terms);
 
 // Sweeps of mass_factor.hpp for the dofs of deep trees. Forces `body` on bodies, about their reference points, are

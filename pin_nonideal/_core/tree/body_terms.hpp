@@ -1,9 +1,9 @@
 // Results of a pass over the tree: placements and motions of the bodies, M(q) and the bias forces.
 //
-// All quantities are in world axes about one reference point per kinematic tree. It is the origin of the first joint
-// that turns, frozen for the instant of the evaluation. Numbers stay small for a robot far from the world's origin, on
-// a floating base or on sliding joints. In a deep tree each body has its own reference point, the origin of its joint.
-// About a point a hundred links away, the inertia of the body would lose most digits.
+// All quantities are in world axes about one reference point per kinematic tree. The reference point is the origin of the
+// first joint that turns, frozen for the instant of the evaluation. Numbers stay small for a robot far from the world's
+// origin, on a floating base or on sliding joints. In a deep tree each body has its own reference point, the origin of its
+// joint. About a point a hundred links away, the inertia of the body would lose most digits.
 #pragma once
 
 #include <vector>
@@ -19,7 +19,7 @@ struct Body {
     Motion v{Vec3::Zero(), Vec3::Zero()};
     Motion a{Vec3::Zero(), Vec3::Zero()};  // acceleration at zero qdd, minus gravity
     Force f{Vec3::Zero(), Vec3::Zero()};   // bias force of the subtree
-    Inertia own, Y;                        // inertia of the body (own: native pass), and of its subtree (Y)
+    Inertia inertia, Y;                    // inertia of the body (native pass only), and of its subtree (Y)
 };
 
 // Quantities of a deep tree that replace the rows of M.
@@ -67,8 +67,8 @@ PN_INLINE Inertia in_world(const Body& b, double mass, const Vec3& com, const Ma
 
 // Return the bias force of one body without its subtree.
 PN_INLINE Force bias_force(const Body& b) {
-    Force f = b.own * b.a;
-    f += cross(b.v, b.own * b.v);
+    Force f = b.inertia * b.a;
+    f += cross(b.v, b.inertia * b.v);
     return f;
 }
 

@@ -1,5 +1,5 @@
-// Configurations that are not vectors: unit quaternions (x, y, z, w) and (cos, sin) pairs. A step treats them as plain
-// numbers and restores unit length at its end.
+// Configurations that are not vectors: unit quaternions (x, y, z, w) and (cos, sin) pairs. A step treats such configurations
+// as plain numbers and restores unit length at its end.
 #pragma once
 
 #include "tree/mechanism.hpp"

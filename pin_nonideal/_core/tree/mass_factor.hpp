@@ -8,7 +8,7 @@
 
 namespace pn {
 
-// Factorize M = L^T D L. Returns -1, or the dof with a pivot that is not positive.
+// Factorize M = L^T D L. Return -1, or the dof with a pivot that is not positive.
 int factorize(const Mechanism& m, Terms& terms);
 
 // x := R^-1 x = D^-1/2 L^-T x, and x := R^-T x = L^-1 D^-1/2 x. Forces `body` on the bodies of deep trees are added to

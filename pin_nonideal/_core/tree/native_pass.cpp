@@ -178,7 +178,7 @@ static PN_INLINE void place_body(const Mechanism& m, NativePass& pass, BodyTerms
 }
 
 // Compute the inertia of a placed body.
-static PN_INLINE void weigh_body(const Joint& j, Body& b) { b.Y = b.own = in_world(b, j.mass, j.com, j.inertia); }
+static PN_INLINE void weigh_body(const Joint& j, Body& b) { b.Y = b.inertia = in_world(b, j.mass, j.com, j.inertia); }
 
 // Compute cosines and sines of angles, four at a time. The last group is padded with the last angle.
 static PN_INLINE void find_cos_sin(NativePass& pass, const BodyTerms& terms, const std::vector<Angle>& angles) {

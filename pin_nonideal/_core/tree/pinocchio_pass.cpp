@@ -67,7 +67,7 @@ void each_column(const Model::JointData& joint, const Act& act) {
 void place_deep(const pinocchio::Data& data, BodyTerms& terms, const Joint& j, size_t i) {
     Body& b = terms.body[i];
     terms.deep.shift[i] = terms.body[j.parent].R * Vec3(data.liMi[i].translation());
-    b.own = in_world(b, j.mass, j.com, j.inertia);
+    b.inertia = in_world(b, j.mass, j.com, j.inertia);
     each_column(data.joints[i], [&](int k, const Motion& column) { terms.J[j.iv + k] = in_world(b, column); });
 }
 

@@ -7,7 +7,7 @@ struct _object;
 
 namespace pn {
 
-// Return the address of the `pinocchio::Model` in a Python object. Throws std::invalid_argument for any other object.
+// Return the address of the `pinocchio::Model` in a Python object. Throw std::invalid_argument for any other object.
 const void* model_pointer(_object* python_object);
 
 // Check if two models are equal in all data that a scene reads: tree, joints, inertias, frames, gravity, armature and
@@ -15,7 +15,7 @@ const void* model_pointer(_object* python_object);
 // fast as Pinocchio's own comparison.
 bool same_model(const void* one, const void* other);
 
-// Read a Pinocchio model (passed as `const pinocchio::Model*`). Throws std::invalid_argument for an unsupported joint,
+// Read a Pinocchio model (passed as `const pinocchio::Model*`). Throw std::invalid_argument for an unsupported joint,
 // or for joint numbers that Provider::pinocchio does not support.
 Mechanism read_mechanism(const void* model, Provider provider);
 

@@ -67,7 +67,7 @@ void inertia(const Mechanism& m, Terms& terms) {
 double kinetic_energy(const Mechanism& m, Terms& terms, const VecX& v) {
     double twice = 0.0;
     move_articulated(m, terms, v);
-    for (int i : m.deep_joints) twice += dot(terms.deep.motions[i], terms.body[i].own * terms.deep.motions[i]);
+    for (int i : m.deep_joints) twice += dot(terms.deep.motions[i], terms.body[i].inertia * terms.deep.motions[i]);
     for (int dof : m.deep_dofs) twice += m.armature[dof] * v[dof] * v[dof];
     for (int k = 0; k < m.nv; ++k) {
         if (m.is_deep[k]) continue;

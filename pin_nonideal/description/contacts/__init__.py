@@ -153,8 +153,8 @@ class UserContact:
     Gap: g(t, q) [m or rad], never negative; A a = b is its second derivative, d^2 g/dt^2 = A a - b.
     d gap/dt = rate and d rate/dt = A a - b are checked once by differences.
     Rows: 1 while closed. lam: force on the gap [N or N m], in the scale of A; zero while open.
-    Sliding friction opposes the slip velocities `directions` v. It is at most mu lam while slipping and
-    static_ratio mu lam while sticking. Rates of the directions are differences along the motion.
+    Sliding friction opposes the slip velocities `directions` v. This friction is at most mu lam while
+    slipping and static_ratio mu lam while sticking. Rates of the directions are differences along the motion.
     The curvature of the gap between two steps has no bound. The step is searched for a contact unless the
     cubic interpolant of the gap, with twice its curvature, excludes one.
 

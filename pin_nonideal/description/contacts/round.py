@@ -29,8 +29,8 @@ class SphereContact:
     like a `PointContact`.
     Rows: 1 while closed. lam: normal force on the body of frame1 [N], away from the other body; zero while
     open.
-    Sliding friction opposes the slip of the two bodies at the contact point. It is at most mu lam while
-    slipping and static_ratio mu lam while sticking.
+    Sliding friction opposes the slip of the two bodies at the contact point. This friction is at most mu lam
+    while slipping and static_ratio mu lam while sticking.
 
     Args:
         frame1: name of the frame at the center of the first sphere.

@@ -50,8 +50,8 @@ class BallBound:
     """Gap between the rotation angle of a ball joint and its largest value.
 
     The angle theta of a rotation with the unit quaternion (x, w) is 2 arccos |w|, where w is the scalar. The
-    gap is 2 (|w| - cos(bound/2)) / sin(bound/2), which is smooth at theta = 0. Its derivative with respect to
-    theta is -1 at the bound, so the multiplier is the torque of the stop [N m].
+    gap is 2 (|w| - cos(bound/2)) / sin(bound/2), which is smooth at theta = 0. The derivative of the gap with
+    respect to theta is -1 at the bound, so the multiplier is the torque of the stop [N m].
 
     Attributes:
         first: index of the quaternion in q, in the order x, y, z, w.

@@ -188,8 +188,8 @@ def _independent_rows(
 def _unit_rows(model: Model, runner: core.Runner, q: Array, tolerance: float) -> tuple[Array, bool]:
     """Return A(q) with rows of unit length, and whether the length of a row is due to rounding.
 
-    Rows that are shorter than the tolerance relative to the longest one are set to zero. They have no effect;
-    outside the plane of a planar linkage their direction is arbitrary.
+    Rows that are shorter than the tolerance relative to the longest one are set to zero. Such short rows have
+    no effect, and their direction outside the plane of a planar linkage is arbitrary.
     """
     A = rows_at(runner, q, np.zeros(model.nv), 0.0)[0]
     length = np.linalg.norm(A, axis=1)

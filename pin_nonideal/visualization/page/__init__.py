@@ -1,1 +1,1 @@
-"""What a replay page carries: motion, forces, geometry, signals."""
+"""Data of a replay page: motion, forces, geometry and signals."""

@@ -158,7 +158,7 @@ def test_least_norm_under_friction():
 
 @pytest.mark.parametrize(("slope", "mode"), [(0.5 - 1e-9, "stick"), (0.5 + 1e-9, "slip")])
 def test_a_block_on_an_incline(slope, mode):
-    """It slips just beyond tan(angle) = mu, with the acceleration of the closed form."""
+    """A block on an incline slips just beyond tan(angle) = mu, with the acceleration of the closed form."""
     angle = np.arctan(slope)
     w0 = GRAVITY * np.array([-np.cos(angle), np.sin(angle), 0.0])
     found = pn.cone_complementarity(np.eye(3) / 3.0, w0, 0.5)

@@ -69,7 +69,7 @@ def rolls_off(count):
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("make", [bounces_and_rolls, slides_to_rest, stands_on_a_slope, rolls_off])
 def test_copies_move_as_one(make, method):
-    """Declared once, twice and four times."""
+    """Contacts declared once, twice and four times give the same motion."""
     runs = [pn.simulate(make(count), 1.0, output_dt=0.01, **METHODS[method]) for count in (1, 2, 4)]
     for run in runs[1:]:
         assert run.q.shape == runs[0].q.shape

@@ -82,7 +82,7 @@ class TestRolling:
 
     @pytest.mark.parametrize("angle", [0.0, 0.8, 2.2])
     def test_stops_after_its_distance(self, way, angle):
-        """(J + m R^2) w' = -rolling m g, so that it comes v^2 (J/R^2 + m) R/(2 rolling m g) far."""
+        """(J + m R^2) w' = -rolling m g, so that the ball rolls v^2 (J/R^2 + m) R/(2 rolling m g) far."""
         speed, inertia = 1.2, 1.4 * MASS
         scene = ball(rolling_along(angle, speed), **WAYS[way](rolling=self.LEVER))
         run = pn.simulate(scene, 10.0, record="energy", **TIGHTER)
@@ -96,7 +96,7 @@ class TestRolling:
 
     @pytest.mark.parametrize("share", [1.0 - 1e-6, 1.1])
     def test_rests_on_a_slope(self, way, share):
-        """Up to tan(slope) = rolling/radius."""
+        """A ball rests on slopes up to tan(slope) = rolling/radius."""
         slope = np.arctan(share * self.LEVER / RADIUS)
         run = pn.simulate(ball(np.zeros(6), slope=slope, **WAYS[way](rolling=self.LEVER)), 2.0, **TIGHT)
         if share < 1.0:

@@ -163,7 +163,7 @@ class TestLostOnTheWay:
         [{}, {"method": "dopri5"}, {"output_dt": 0.25}, {"method": "rk4", "dt": 0.01}, {"method": "Radau"}],
     )
     def test_the_event_says_when(self, options):
-        """Once, at the instant, and the motion goes on smoothly through it."""
+        """One event has the instant, and the motion is smooth at this instant."""
         run = pn.simulate(rising_load(), 3.0, several="continue", record="energy", **options)
         assert [(e.kind, e.element) for e in run.events] == [("several", "guide")]
         assert run.events[0].time == pytest.approx(2.0, abs=INSTANT)

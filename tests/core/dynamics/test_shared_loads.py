@@ -54,7 +54,7 @@ def by_name(scene, lam):
 
 @pytest.mark.parametrize("places", [(0.2, 1.8), (0.2, 1.0, 1.8), (0.0, 0.0), (0.5, 0.5, 1.5, 1.9)])
 def test_equal_hinges_share_whatever_their_order(places):
-    """Motion, friction of each hinge, and multipliers, for every order of the list."""
+    """Motion, friction of each hinge, and multipliers are the same for every order of the list."""
     orders = list(itertools.permutations(range(len(places))))[:6]
     runs = [
         pn.simulate(door(places, order), 0.3, record=("energy", "forces"), output_dt=0.1) for order in orders
@@ -135,7 +135,7 @@ def geared(seed):
 
 @pytest.mark.parametrize("seed", seeds(range(20)))
 def test_scaled_copies_beside_dense_least_norm(seed):
-    """A gear said backward, a foot below a ceiling: copies of other scales and signs."""
+    """A gear stated from the other side and a foot below a ceiling are copies with other scales and signs."""
     scene = geared(seed)
     q, v = scene.project(scene.q0, 0.3 * np.ones(3))
     s = scene.solve(q, v)

@@ -155,7 +155,7 @@ class TestLuGre:
         first, second = runs
         assert first.z.shape == second.z.shape == (len(first.t), 1)
         assert np.abs(first.v).max() > 0.5
-        # The same arithmetic in the same steps: rounding, which friction does not let grow.
+        # Difference of equal arithmetic in equal steps: rounding, which friction does not amplify.
         assert_close(second.q, first.q, 1e-12)
         assert_close(second.v, first.v, 1e-12)
         assert_close(second.z, first.z, 1e-14)

@@ -70,7 +70,7 @@ class TestLoads:
         assert scene.element_names == ["JointFriction(place) axis 1", "JointFriction(place) axis 2"]
 
     def test_planar(self, seed, terms):
-        """mu (|f_n| + |m_b|/span) against the slide, and radius times that against the turn."""
+        """Friction mu (|f_n| + |m_b|/span) opposes the slide, and radius times that opposes the turn."""
         rng = np.random.default_rng(seed)
         law = {"mu": 0.2, "span": 0.4, "coulomb": 0.3, "viscous": 0.05, "radius": 0.08}
         scene, q, v = random_chain(pin.JointModelPlanar(), rng, **law)
@@ -127,7 +127,7 @@ class TestBallAnchor:
         ],
     )
     def test_is_that_of_the_joint(self, law):
-        """The same motion, friction and events, whichever way the ball is modelled."""
+        """A ball joint and a ball anchor have the same motion, friction and events."""
 
         def laws(name):
             return [pn.JointFriction(name, **law, name="rub")]
@@ -149,7 +149,7 @@ class TestBallAnchor:
         assert joint.energy["rub"][-1] < -1.0
 
     def test_spin_about_the_vertical(self):
-        """|C| = mu radius m g against the angular velocity."""
+        """Friction |C| = mu radius m g opposes the angular velocity."""
         model = empty()
         index = body(
             model,
@@ -279,7 +279,7 @@ class TestPuck:
         assert s.F_nonideal[2] == pytest.approx(-self.MU * self.RADIUS * 2.0 * GRAVITY * factor, rel=FORCE)
 
     def test_table_that_tilts(self):
-        """It holds on a slope until tan(slope) = mu, whichever way the slope falls."""
+        """A body on a tilted table holds until tan(slope) = mu, for every direction of the slope."""
         slope = np.arctan(self.MU)
         for share, mode in ((0.999, 0), (1.001, 1)):
             for way in (0.0, 0.7, 2.0):
@@ -299,7 +299,7 @@ class TestPuck:
 
 
 def test_a_body_that_floats():
-    """Constant friction in 3 + 3 directions: v/(c/m) and w/(c radius/J), whichever way it flies."""
+    """Constant friction in 3 + 3 directions: v/(c/m) and w/(c radius/J), for any direction of flight."""
     model = empty((0.0, 0.0, 0.0))
     body(model, 0, pin.JointModelFreeFlyer(), "float", 2.0, inertia=0.1 * np.eye(3))
     law = pn.JointFriction("float", coulomb=0.5, radius=0.2, name="fluid")

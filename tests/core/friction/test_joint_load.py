@@ -141,7 +141,7 @@ def test_slide(span):
 
 
 def test_ball_joint():
-    """A top that turns about the vertical on its ball joint: mu r m g against the spin."""
+    """A top that turns about the vertical on its ball joint: friction mu r m g opposes the spin."""
     model = empty()
     options = {"lever": (0.0, 0.0, 0.2), "inertia": np.diag([0.2, 0.2, 0.1])}
     body(model, 0, pin.JointModelSpherical(), "ball", MASS, **options)
@@ -289,7 +289,7 @@ class TestOnePinInManyModels:
 
     @pytest.mark.parametrize("other", OTHERS)
     def test_same_rest(self, other):
-        """Heavy friction: at rest in the same place."""
+        """Under heavy friction all models come to rest at the same place."""
         law = {**LAW, "coulomb": 1.5, "static_ratio": 1.2}
         angles = []
         for build in (OnePin.tree, other):
@@ -303,7 +303,7 @@ class TestOnePinInManyModels:
     @pytest.mark.parametrize("other", OTHERS)
     @pytest.mark.parametrize("law", LAWS)
     def test_same_acceleration(self, law, other):
-        """At one instant, turning at 3 rad/s."""
+        """All models have the same acceleration at 3 rad/s."""
         accelerations = []
         for build in (OnePin.tree, other):
             scene, _, rate = build(OnePin(law))

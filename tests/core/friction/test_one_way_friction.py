@@ -26,7 +26,7 @@ def wheel(limit, torque, ratio=1.0):
 
 
 def pulses(t, q, v):
-    """Backward for 1 s, forward for 1 s, backward for 3 s, none for 1 s, forward for 1 s."""
+    """Torque backward for 1 s, forward for 1 s, backward for 3 s, zero for 1 s, forward for 1 s."""
     ends, levels = (1.0, 2.0, 5.0, 6.0), (-2.0, 3.0, -1.0, 0.0, 1.0)
     return [levels[int(np.searchsorted(ends, t, side="right"))]]
 
@@ -168,7 +168,7 @@ def test_a_limit_of_the_load_for_each_way(way):
 
 @pytest.mark.parametrize("tilt", [0.1, 0.18, 0.22, 0.5, 0.58, -0.1, -0.18, -0.22, -0.58, 0.65, -0.65])
 def test_a_bead_that_rests_holds_up_to_the_angle_of_its_way(tilt):
-    """Below the hoop's lowest point, at an angle: it holds as long as |tan| is below mu of the way down."""
+    """A bead at an angle from the lowest point holds while |tan| is below mu of the downward direction."""
     q = np.array([np.sin(tilt), -np.cos(tilt)])
     now = bead(by_load, gravity=10.0).solve(q, [0.0, 0.0])
     forward = tilt < 0.0  # slip down, along the tangent that turns counterclockwise

@@ -113,7 +113,7 @@ class TestRod:
     @pytest.mark.parametrize("angle", ANGLES)
     @pytest.mark.parametrize(("way", "element"), WAYS)
     def test_none_or_two_beyond_it(self, way, element, angle, sense):
-        """Sliding against the lean there is none, the other way there are two."""
+        """A rod that slides against its lean has no motion; in the other direction there are two."""
         rod = Rod(angle)
         none = (
             "no solution" if way is Rod.contact else "no solution or several"
@@ -128,7 +128,7 @@ class TestRod:
 
     @pytest.mark.parametrize("angle", ANGLES)
     def test_a_tip_that_may_open_does_not_pull(self, angle):
-        """The second motion away from the lean would pull: there is one; against it none, as kept."""
+        """A unilateral contact excludes pulling: one motion is left away from the lean, none against it."""
         rod = Rod(angle)
         for share in (0.1, 0.9, 1.0, 1.0 + NEAR, 1.1, 3.0):
             s = rod.contact(share / rod.k, unilateral=True).solve(*rod.state(1))
@@ -141,7 +141,7 @@ class TestRod:
     @pytest.mark.parametrize("angle", ANGLES)
     @pytest.mark.parametrize(("way", "element"), WAYS)
     def test_the_threshold_itself_is_a_paradox(self, way, element, angle):
-        """The unique solution diverges there, within the error of the determinant."""
+        """The unique solution diverges at the threshold, within the error of the determinant."""
         rod = Rod(angle)
         for beyond in (0.0, 1e-16, -1e-16, 1e-13, -1e-13, 1e-10, -1e-10, 1e-9, -1e-9):
             with raises(element) as caught:
@@ -243,7 +243,7 @@ class TestRuns:
 
     @pytest.mark.parametrize("method", ["dop853", "dopri5"])
     def test_at_the_time_of_the_threshold(self, method):
-        """The motion goes smoothly through mu k = 1; a second one appears there."""
+        """The motion is smooth at mu k = 1, where a second motion appears."""
         start, growth = 0.8, 0.4
         threshold = (1.0 - start) / growth
         scene = block_that_grows_rough(start, growth)

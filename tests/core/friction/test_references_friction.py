@@ -294,7 +294,7 @@ class TestBlockOnIncline:
 
     @pytest.mark.parametrize("build", WAYS)
     def test_stays_up_on_a_rougher_plane(self, build):
-        """tan a < mu: it sticks where it turns, and stays."""
+        """With tan a < mu the block sticks at its highest point, and stays."""
         mu = 0.6
         deceleration = GRAVITY * (np.sin(self.SLOPE) + mu * np.cos(self.SLOPE))
         scene, along = build(self, mu)
@@ -400,7 +400,7 @@ class TestBeadOnRoughRing:
 
     @pytest.mark.parametrize("build", WAYS)
     def test_fast_bead(self, build):
-        """Round the loop, where N passes zero: |N| has a kink there, and the speed falls to a third."""
+        """A bead passes the loop with two zeros of N, kinks of |N|, and loses two thirds of its speed."""
         scene, angle_and_rate = build(self, 12.0)
         run = pn.simulate(scene, self.LOOP_TIME, **TIGHT)
         angle, rate = angle_and_rate(run)

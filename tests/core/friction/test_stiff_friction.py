@@ -126,7 +126,7 @@ def test_the_answer_of_dop853(method, name):
 
 
 def test_one_thread_of_blas():
-    """Factors of small matrices are not shared out among threads that wait for each other."""
+    """Factors of small matrices are computed in one thread, since threads would wait for each other."""
     threadpoolctl = pytest.importorskip("threadpoolctl")
     seen = []
 

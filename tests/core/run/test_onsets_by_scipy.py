@@ -75,7 +75,7 @@ def test_an_onset_in_several_directions_names_the_method_that_follows_it(name, m
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("kind", list(KINDS))
 def test_an_onset_that_jumps_is_followed(kind, method):
-    """Static friction a fifth above the kinetic one: slip begins with an acceleration."""
+    """Static friction is a fifth above kinetic friction, so slip begins with an acceleration."""
     scene = pushed(kind, static_ratio=1.2)
     run, core = (pn.simulate(scene, 1.2, method=m, rtol=1e-9, atol=1e-11) for m in (method, "dop853"))
     np.testing.assert_allclose(run.v[-1], core.v[-1], rtol=0.0, atol=1e-5)

@@ -194,7 +194,7 @@ def test_arrays_keep_failures_apart() -> None:
 
 
 def test_arrays_name_runs_off_their_constraints(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With no room for rounding, every closed loop counts as open."""
+    """With a tolerance of zero every closed loop counts as open."""
     monkeypatch.setattr("pin_nonideal.simulation.rollout_arrays.MAX_RESIDUAL", 0.0)
     scene = pn.load("four_bar")
     q, v = scene.initial_state()

@@ -28,7 +28,7 @@ enum class ConeStatus {
     failed,
 };
 
-// Compute a certificate y in the problem's units. Returns the status that y shows, or `failed` without a certificate.
+// Compute a certificate y in the problem's units. Return the status that y shows, or `failed` without a certificate.
 ConeStatus find_certificate(const ConeProblem& problem, VecX& y);
 
 }  // namespace pn

@@ -22,7 +22,7 @@ public:
 
     // Replace f, a solution, by the one of minimum norm in the units before scaling. E is an orthonormal basis of the
     // forces that W distinguishes. The result is f = P(E y) with E^T f unchanged. P projects on the set that the modes
-    // of w allow: a cone if nothing moves, a ray if the contact slips. Returns false and keeps f if y was not found.
+    // of w allow: a cone if nothing moves, a ray if the contact slips. Return false and keeps f if y was not found.
     bool minimize_norm(const ConeProblem& problem, Eigen::Ref<VecX> f);
 
 private:

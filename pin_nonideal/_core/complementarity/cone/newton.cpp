@@ -33,7 +33,7 @@ Disk disk_of(const ConeProblem& p, int e, const Eigen::Ref<const VecX>& f, const
 
 }  // namespace
 
-// Evaluate F of the equations F = 0. Returns its squared length.
+// Evaluate F of the equations F = 0. Return its squared length.
 double ConeNewton::evaluate(const ConeProblem& p, const Eigen::Ref<const VecX>& f) {
     auto w = w_.vector(p.n), F = F_.vector(p.n);
     p.respond(f, w);
@@ -111,16 +111,16 @@ void ConeNewton::differentiate(const ConeProblem& p, const Eigen::Ref<const VecX
     }
 }
 
-// Take the longest step that reduces the error. Returns false if no step reduces the error and no blind steps are left.
+// Take the longest step that reduces the error. Return false if no step reduces the error and no blind steps are left.
 bool ConeNewton::advance(const ConeProblem& p, Eigen::Ref<VecX> f, double& merit) {
     auto step = step_.vector(p.n), ahead = ahead_.vector(p.n);
     double length = 1.0;
     for (int halving = 0; halving < parameters.max_halvings; ++halving, length *= 0.5) {
         ahead = f - length * step;
-        const double there = evaluate(p, ahead);
-        if (there < (1.0 - 2.0 * parameters.decrease * length) * merit) {
+        const double new_merit = evaluate(p, ahead);
+        if (new_merit < (1.0 - 2.0 * parameters.decrease * length) * merit) {
             f = ahead;
-            merit = there;
+            merit = new_merit;
             return true;
         }
     }

@@ -21,7 +21,7 @@ public:
     using Parameters = ConeNewtonParameters;
     static constexpr Parameters parameters{};
 
-    // Iterate from f, and set f to the best point found. Returns the largest relative error of the equations.
+    // Iterate from f, and set f to the best point found. Return the largest relative error of the equations.
     double solve(const ConeProblem& problem, Eigen::Ref<VecX> f, int max_steps);
     // Return the relative error of f.
     double error(const ConeProblem& problem, const Eigen::Ref<const VecX>& f);

@@ -15,8 +15,8 @@ void ConeProblem::pose(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const V
     int row = 0;
     for (const ConeElement& e : elements) {
         at.push_back(row);
-        const double own = W.diagonal().segment(row, e.dim).cwiseAbs().maxCoeff();
-        const double response = own > parameters.min_element_response * largest ? own : largest;
+        const double own_response = W.diagonal().segment(row, e.dim).cwiseAbs().maxCoeff();
+        const double response = own_response > parameters.min_element_response * largest ? own_response : largest;
         scale.segment(row, e.dim).setConstant(response > 0.0 ? 1.0 / std::sqrt(response) : 1.0);
         row += e.dim;
     }
@@ -33,8 +33,8 @@ void ConeProblem::pose(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const V
 void ConeProblem::measure() {
     auto stiffness = stiffness_.vector(size());
     for (int e = 0; e < size(); ++e) {
-        const double own = W().diagonal().segment(at[e], elements[e].dim).cwiseAbs().mean();
-        stiffness[e] = own > parameters.min_element_response ? 1.0 / own : 1.0;
+        const double mean_response = W().diagonal().segment(at[e], elements[e].dim).cwiseAbs().mean();
+        stiffness[e] = mean_response > parameters.min_element_response ? 1.0 / mean_response : 1.0;
     }
 }
 

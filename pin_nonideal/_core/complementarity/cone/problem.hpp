@@ -1,11 +1,10 @@
 // Contact and friction forces f of several elements together, with the velocities or accelerations w = W f + w0.
 //
-// A contact has one to three rows (normal, slip directions). Its force is in the cone |f_t| <= mu f_n, and
-// u = w + (mu |w_t|, 0) is in the dual cone. Both are complementary, f . u = 0. That is w_n >= 0 and f_n >= 0 with f_n
-// w_n = 0, and f_t = -mu f_n w_t / |w_t| if the contact slips (de Saxce, Feng, "The bipotential method", Math. Comput.
-// Modelling 28, 1998). A box is dry friction of a known limit: |f| <= limit, and f = -limit w / |w| if the element
-// slips. Numbers are in the order of the elements. Units are scaled so that the largest w0 and the responses of each
-// element are about 1.
+// A contact has one to three rows (normal, slip directions). The force of a contact is in the cone |f_t| <= mu f_n, and u =
+// w + (mu |w_t|, 0) is in the dual cone. Both are complementary, f . u = 0. That is w_n >= 0 and f_n >= 0 with f_n w_n = 0,
+// and f_t = -mu f_n w_t / |w_t| if the contact slips (de Saxce, Feng, "The bipotential method", Math. Comput. Modelling 28,
+// 1998). A box is dry friction of a known limit: |f| <= limit, and f = -limit w / |w| if the element slips. Numbers are in
+// the order of the elements. Units are scaled so that the largest w0 and the responses of each element are about 1.
 #pragma once
 
 #include <vector>
@@ -64,7 +63,8 @@ public:
         w.noalias() += W() * f;
     }
     // Compute the scale of the errors of each element's equations: the response to the largest w0, plus the rounding of
-    // much larger forces. Forces that only squeeze do not make an error small.
+    // much larger forces. The scale grows only by a small part of the forces, so that forces without a response do not hide
+    // an error.
     void force_scales(const Eigen::Ref<const VecX>& f, Eigen::Ref<VecX> size) const;
 
 private:

@@ -12,8 +12,8 @@ constexpr ConeEnergyParameters energy_parameters{};
 
 }  // namespace
 
-bool add_energy(double conveyed, double free, double own) {
-    return !(conveyed <= energy_parameters.factor * std::max(free, 0.0) + energy_parameters.rounding * own);
+bool add_energy(double conveyed, double free, double uncoupled) {
+    return !(conveyed <= energy_parameters.factor * std::max(free, 0.0) + energy_parameters.rounding * uncoupled);
 }
 
 bool add_energy(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const VecX>& w0, const Eigen::Ref<const VecX>& f) {

@@ -19,9 +19,9 @@ struct ConeEnergyParameters {
 };
 
 // Check if forces add energy. Forces that solve the laws satisfy f . w <= 0, that is, f^T W f <= -f . w0. `conveyed` is
-// f^T W f, `free` is -f . w0, and `own` the first if W were diagonal. Errors relative to the forces do not show this
+// f^T W f, `free` is -f . w0, and `uncoupled` the first if W were diagonal. Errors relative to the forces do not show this
 // where the forces themselves are far too large.
-bool add_energy(double conveyed, double free, double own);
+bool add_energy(double conveyed, double free, double uncoupled);
 // Check if the forces f of a problem add energy.
 bool add_energy(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const VecX>& w0, const Eigen::Ref<const VecX>& f);
 

@@ -1,5 +1,5 @@
-// Solver of contacts with Coulomb friction, for accelerations, impacts and time stepping. It finds f of the problem of
-// cone/problem.hpp for any square W (of any rank, symmetric or not). Newton's method on the modes starts from a warm
+// Solver of contacts with Coulomb friction, for accelerations, impacts and time stepping. The solver finds f of the problem
+// of cone/problem.hpp for any square W (of any rank, symmetric or not). Newton's method on the modes starts from a warm
 // start, or else from zero. If it fails, the fallbacks are Newton's method from the end of the central path, proximal points
 // with decreasing compliance, and random starts unless a certificate shows that a solution may not exist. Buffers grow to
 // the largest problem. A call allocates no memory after that.
@@ -21,7 +21,7 @@ struct ConeComplementarityParameters {
     double minimum_norm_tolerance = 1e-13;  // error of a minimum-norm solution
     // Newton steps from near a solution, from a guess, and from the end of the central path or of a continuation.
     int few_steps = 3, first_steps = 20, more_steps = 30;
-    // Compliance of elements relative to their own response. It halves from the first value to the last.
+    // Compliance of elements relative to their own response. The compliance halves from the first value to the last.
     double first_compliance = 1e-2, min_compliance = 1e-9;
     int max_proximal_steps = 40;    // proximal steps, of which 24 reach the last compliance
     double compliance_ratio = 0.1;  // ratio of successive compliances, if only the limit is needed
@@ -43,7 +43,7 @@ public:
     ConeStatus solve(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const VecX>& w0,
                      const std::vector<ConeElement>& elements, bool warm, Eigen::Ref<VecX> f,
                      bool may_keep_shares = false);
-    // Computes forces within their cones that cancel w0. Returns false if there are none: the convex program of the
+    // Computes forces within their cones that cancel w0. Return false if there are none: the convex program of the
     // associated law has w = 0 as its only solution exactly if such forces exist.
     bool hold(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const VecX>& w0,
               const std::vector<ConeElement>& elements, Eigen::Ref<VecX> f);
@@ -53,8 +53,8 @@ public:
     void accept_residual(double max_residual) { max_residual_ = max_residual; }
 
     // Use a uniform compliance. If friction depends on shares of a load that W does not determine, several motions may
-    // solve the problem. This option selects the motion of equally compliant elements, in the limit of stiff ones. It
-    // does not depend on the order of the elements.
+    // solve the problem. This option selects the motion of equally compliant elements, in the limit of stiff ones. This
+    // motion does not depend on the order of the elements.
     void use_uniform_compliance(bool on) { uniform_compliance_ = on; }
 
     // Limit the search to Newton's method from the guess, from zero and from the end of the central path.

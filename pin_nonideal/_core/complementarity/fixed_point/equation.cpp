@@ -48,9 +48,9 @@ void ReactionEquation::steepest(MatX& L) const {
 }
 
 VecX ReactionEquation::steepest_in_s() const {
-    VecX least = constant;
-    for (int k = 0; k < vectors(); ++k) least[element[k]] += offset.col(k).norm();
-    return least;
+    VecX bound = constant;
+    for (int k = 0; k < vectors(); ++k) bound[element[k]] += offset.col(k).norm();
+    return bound;
 }
 
 double ReactionNewton::factorize(const ReactionEquation& equation, const VecX& y) {

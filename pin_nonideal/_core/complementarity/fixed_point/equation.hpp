@@ -25,7 +25,7 @@ struct ReactionEquation {
     MatX offset;               // b_k, (3, vectors)
     MatX columns;              // stacked P_k, (3 vectors, elements)
     // True for vectors that count by their first component, with its sign: loads of unilateral contacts, at which
-    // friction goes through zero. The search for all solutions treats them as lengths.
+    // friction goes through zero. The search for all solutions treats these vectors as lengths.
     std::vector<char> directed;
 
     // Set the numbers of elements and vectors.
@@ -38,7 +38,7 @@ struct ReactionEquation {
     void slope(const VecX& y, double s, MatX& J) const;
     // Compute L, the largest |dg_i/dy_j| over all y.
     void steepest(MatX& L) const;
-    // Return the same bound for the derivative in s. Its entries are the limits if friction causes no load.
+    // Return the same bound for the derivative in s. The entries of s are the limits if friction causes no load.
     VecX steepest_in_s() const;
     bool finite() const;
 };
@@ -59,9 +59,9 @@ struct ReactionNewton {
     LU factor;
     VecX image, residual, step;
 
-    // Factorize I - dg/dy at y. Returns the determinant.
+    // Factorize I - dg/dy at y. Return the determinant.
     double factorize(const ReactionEquation& equation, const VecX& y);
-    // Iterate from y to a solution. Returns false if the method finds none.
+    // Iterate from y to a solution. Return false if the method finds none.
     bool solve(const ReactionEquation& equation, VecX& y);
 };
 

@@ -57,8 +57,8 @@ Search::Search(const ReactionEquation& given) : eq_(given), n_(given.size()) {
     // Scale the unknowns to the size that loads without friction give them, directly or through each other.
     std::fill(eq_.directed.begin(), eq_.directed.end(), char(0));
     eq_.steepest(L_);
-    const VecX own = eq_.steepest_in_s();
-    scale_ = own + L_ * own;
+    const VecX direct_size = eq_.steepest_in_s();
+    scale_ = direct_size + L_ * direct_size;
     scale_ = scale_.cwiseMax(scale_.maxCoeff() * 1e-12 + 1e-300);
     for (int k = 0; k < eq_.vectors(); ++k) {
         eq_.offset.col(k) /= scale_[eq_.element[k]];
@@ -91,7 +91,7 @@ void Search::divide() {
     spread_ = pn::inverse(MatX::Identity(m, m) - among(L_, following_, following_));
 }
 
-// Compute the following unknowns for the bisected ones in z, starting at z. Returns false if the iteration does not end.
+// Compute the following unknowns for the bisected ones in z, starting at z. Return false if the iteration does not end.
 bool Search::follow(VecX& z, double s) const {
     const int m = static_cast<int>(following_.size());
     if (m == 0) return true;
@@ -120,7 +120,7 @@ bool Search::follow(VecX& z, double s) const {
     return false;
 }
 
-// Compute bounds r on the deviation of the unknowns from their values in the middle of a part. Returns the bound of s.
+// Compute bounds r on the deviation of the unknowns from their values in the middle of a part. Return the bound of s.
 double Search::reach(const Part& part, VecX& r) const {
     const double r_s = part.half[halved()];
     r.setZero(n_);

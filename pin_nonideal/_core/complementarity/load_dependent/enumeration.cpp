@@ -85,11 +85,12 @@ struct Element {
     // Check if the element neither sticks nor begins to slip anywhere in the box.
     bool is_excluded(const Point& x, const Point& radius) const {
         const Interval limit = this->limit(x, radius).size;
-        const VectorInterval own(force, x, radius), accelerated(response, x, radius);
-        if (may_stick && accelerated.length.lower() == 0.0 && own.length.lower() <= limit.upper()) return false;
+        const VectorInterval force_interval(force, x, radius), accelerated(response, x, radius);
+        if (may_stick && accelerated.length.lower() == 0.0 && force_interval.length.lower() <= limit.upper()) return false;
         const Short along = may_stick ? accelerated.along : direction;
         const double turn = may_stick ? accelerated.turn : 0.0;
-        return (own.middle + limit.middle * along).norm() > own.length.radius + limit.radius + turn * limit.upper();
+        return (force_interval.middle + limit.middle * along).norm() >
+               force_interval.length.radius + limit.radius + turn * limit.upper();
     }
 
     // Return the residual of the equation in the middle of a box. `slopes` bounds its derivatives anywhere in the box.
@@ -166,16 +167,16 @@ struct Search {
     }
 
     Element homogeneous(const RestElement& from) const {
-        const double own = 1.0 / unit[from.row];
+        const double inverse_unit = 1.0 / unit[from.row];
         Element e{from.may_stick, from.row, from.dim, Short(from.direction), Rows::Zero(from.dim, n + 1), {}, {},
-                  own * from.factor * from.constant, {}};
+                  inverse_unit * from.factor * from.constant, {}};
         e.force.middleCols(from.row, from.dim).setIdentity();
         e.response = homogeneous(equation.W.middleRows(from.row, from.dim), equation.alpha0.segment(from.row, from.dim),
-                                 own * from.rho);
+                                 inverse_unit * from.rho);
         e.argument = e.force - e.response;
         for (int k = from.vector; k < from.vector + from.vectors; ++k)
             e.vectors.push_back(homogeneous(equation.loads.middleRows(3 * k, 3), equation.still.segment(3 * k, 3),
-                                            own * from.factor));
+                                            inverse_unit * from.factor));
         return e;
     }
 
@@ -192,8 +193,8 @@ struct Search {
     // Return the free coordinates of a point on a face.
     Point free(const Point& x, int face) const {
         Point out(n);
-        for (int k = 0, at = 0; k <= n; ++k)
-            if (k != face) out[at++] = x[k];
+        for (int k = 0, column = 0; k <= n; ++k)
+            if (k != face) out[column++] = x[k];
         return out;
     }
 
@@ -217,7 +218,7 @@ struct Search {
         else ++undecided;
     }
 
-    // Krawczyk's test. Returns true if the box is done. Otherwise the box may have shrunk.
+    // Krawczyk's test. Return true if the box is done. Otherwise the box may have shrunk.
     bool decide(Box& box) {
         const Point radius = (enumeration_parameters.box_overlap * box.radius).array() +
                              enumeration_parameters.radius_rounding * (box.radius.array() > 0.0).cast<double>();
@@ -226,10 +227,10 @@ struct Search {
         for (const Element& e : elements) {
             Slopes slopes;
             residual.segment(e.row, e.dim) = e.residual(box.middle, radius, slopes);
-            for (int k = 0, at = 0; k <= n; ++k) {
+            for (int k = 0, column = 0; k <= n; ++k) {
                 if (k == box.face) continue;
-                J.block(e.row, at, e.dim, 1) = slopes.middle.col(k);
-                J_radius.block(e.row, at++, e.dim, 1) = slopes.radius.col(k);
+                J.block(e.row, column, e.dim, 1) = slopes.middle.col(k);
+                J_radius.block(e.row, column++, e.dim, 1) = slopes.radius.col(k);
             }
         }
         const Eigen::PartialPivLU<Square> lu(J);
@@ -239,17 +240,17 @@ struct Search {
         const Point reach = (inverse.cwiseAbs() * J_radius + (Square::Identity(n, n) - inverse * J).cwiseAbs()) * side;
         if ((shift.cwiseAbs().array() > (side + reach).array()).any()) return true;
         if ((shift.cwiseAbs() + reach).cwiseQuotient(side).maxCoeff() < 1.0) {
-            for (int k = 0, at = 0; k <= n; ++k)
-                if (k != box.face) box.middle[k] += shift[at++];
+            for (int k = 0, column = 0; k <= n; ++k)
+                if (k != box.face) box.middle[k] += shift[column++];
             take(box.middle);
             return true;
         }
         const double before = box.widest();
-        for (int k = 0, at = 0; k <= n; ++k) {
+        for (int k = 0, column = 0; k <= n; ++k) {
             if (k == box.face) continue;
-            const double low = std::max(-radius[k], shift[at] - reach[at]);
-            const double high = std::min(radius[k], shift[at] + reach[at]);
-            ++at;
+            const double low = std::max(-radius[k], shift[column] - reach[column]);
+            const double high = std::min(radius[k], shift[column] + reach[column]);
+            ++column;
             box.middle[k] += 0.5 * (low + high);
             box.radius[k] = std::min(box.radius[k], 0.5 * (high - low));
         }

@@ -29,7 +29,7 @@ struct AllMotions {
     bool complete = false;     // no box was left undecided, so there are no other solutions
 };
 
-// Check if the equation has few forces, which W distinguishes, and loads linear in them.
+// Check if the equation has few forces, a regular W, and loads that are linear in the forces.
 bool is_searched(const RestEquation& equation);
 // Compute all solutions. The result is empty and not complete if the equation cannot be searched.
 AllMotions all_motions(const RestEquation& equation);

@@ -13,7 +13,7 @@ namespace {
 
 auto part(const VecX& x, const RestElement& e) { return x.segment(e.row, e.dim); }
 
-// Compute G with W = G G^T, and the loads' derivatives times G^-T. Returns false if forces that move nothing change a load.
+// Compute G with W = G G^T, and the loads' derivatives times G^-T. Return false if forces that move nothing change a load.
 bool energy_factor(const RestEquation& equation, MatX& G, MatX& loads) {
     const MatX& W = equation.W;
     Cholesky cholesky;
@@ -25,8 +25,8 @@ bool energy_factor(const RestEquation& equation, MatX& G, MatX& loads) {
         }
     }
     const Spectrum spectrum = symmetric_spectrum(W);
-    const double least = RestEquation::parameters.null_response * spectrum.values.cwiseAbs().maxCoeff();
-    const int null = static_cast<int>((spectrum.values.array() <= least).count()), n = equation.n;
+    const double min_response = RestEquation::parameters.null_response * spectrum.values.cwiseAbs().maxCoeff();
+    const int null = static_cast<int>((spectrum.values.array() <= min_response).count()), n = equation.n;
     const MatX along = spectrum.vectors.rightCols(n - null);
     const VecX root = spectrum.values.tail(n - null).cwiseSqrt();
     const MatX unmoving = equation.loads * spectrum.vectors.leftCols(null);
@@ -176,8 +176,8 @@ VecX RestEquation::holding_forces() const {
         for (int k = 0; e.may_stick && k < e.dim; ++k) rows.push_back(e.row + k);
     }
     const VecX driven = alpha0 + W * x;
-    const MatX own = W(rows, rows);
-    x(rows) = minimum_norm_solution(own, -driven(rows));
+    const MatX W_of_rows = W(rows, rows);
+    x(rows) = minimum_norm_solution(W_of_rows, -driven(rows));
     return x;
 }
 

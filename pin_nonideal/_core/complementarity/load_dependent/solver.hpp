@@ -21,13 +21,13 @@ struct LoadDependentParameters {
 
 inline constexpr LoadDependentParameters load_dependent_parameters{};
 
-// Solve for the forces x from the guess in x. Returns false if no solution was found. One may still exist.
+// Solve for the forces x from the guess in x. Return false if no solution was found. One may still exist.
 bool solve_rest(const RestEquation& equation, VecX& x);
 // Refine x near a solution by Newton's method alone.
 bool refine_rest(const RestEquation& equation, VecX& x);
 
 // Find forces x that keep all elements at rest, from a first guess: zero accelerations, and no force beyond its limit.
-// Returns false if none were found. x is then the nearest point found.
+// Return false if none were found. x is then the nearest point found.
 bool hold_at_rest(const RestEquation& equation, VecX& x);
 
 // Return slip accelerations slightly beyond the load of a solution x, with the limits at x.

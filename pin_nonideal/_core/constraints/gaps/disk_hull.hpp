@@ -39,7 +39,7 @@ struct DiskHullRow {
         out.residual[0] = p.distance - radius;
         out.wrench[0] = force_at(p.place, p.n);
     }
-    // Over a face, the rates equal the rates of a disk over a plane. Beside an edge, they equal the rates of the edge
+    // Over a face, the rates equal the rates of a disk over a plane. Beside an edge, these rates equal the rates of the edge
     // over the disk.
     template <class Sides, class Out>
     PN_INLINE void rate_and_bias(const Sides& s, Out& out) const {

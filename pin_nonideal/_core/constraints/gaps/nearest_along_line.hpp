@@ -34,8 +34,9 @@ struct NearestAlongLine {
     Scalar bend;          // curvature of the distance along the segment
     bool free = false;    // the point is inside the segment, at a smooth minimum
 
-    // The distance of a point to a convex solid is convex along the segment. Its slope, the component of the normal
-    // along the segment, only grows. Newton's method finds the zero of the slope between bounds that close in.
+    // The distance of a point to a convex solid is convex along the segment. The slope of the distance, which is the
+    // component of the normal along the segment, only grows. Newton's method finds the zero of the slope between bounds that
+    // close in.
     NearestAlongLine(const Sides& s, const Revolved& solid, const Vec& x, const Vec& along, double half)
         : middle(x), e(along), part(first(s, solid, half)), at(there(s), solid), bend(0.0) {
         if (half == 0.0) return;
@@ -95,7 +96,7 @@ private:
     }
 };
 
-// Motion of the nearest point. It slides along the segment so that the normal stays perpendicular to the segment.
+// Motion of the nearest point. The point slides along the segment so that the normal stays perpendicular to the segment.
 template <class Sides>
 struct AlongLineMotion {
     using Vec = typename Sides::Vec;

@@ -54,8 +54,8 @@ private:
         distance = other.at.distance;
         n = of_second ? Vec(-other.at.n) : other.at.n;
     }
-    void try_rim(const Sides& s, const Revolved& own, double end, const Revolved& other, bool of_second) {
-        const NearestAroundRim<Sides> rim(s, end * own.half, end > 0.0 ? own.above : own.below);
+    void try_rim(const Sides& s, const Revolved& rim_solid, double end, const Revolved& other, bool of_second) {
+        const NearestAroundRim<Sides> rim(s, end * rim_solid.half, end > 0.0 ? rim_solid.above : rim_solid.below);
         const Found there = rim.find(s, other);
         if (there.at.distance < distance) take(there, of_second);
     }
@@ -66,7 +66,8 @@ private:
                                second.support(Scalar(n.dot(e2)), Scalar(n.cross(e2).norm()));
         return between > distance - shown_nearest * (first.reach + second.reach);
     }
-    // Find the nearest points on crossing lines of both sides. Their common normal has a known angle to both axes.
+    // Find the nearest points on crossing lines of both sides. The common normal of these lines has a known angle to both
+    // axes.
     bool find_sides(const Sides& s, const Revolved& first, const Revolved& second) {
         using std::sqrt;
         if (first.half == 0.0 || second.half == 0.0) return false;

@@ -45,7 +45,7 @@ struct NearestOnBox {
         }
     }
 
-    // Return the rate of n relative to the box, for a point with the relative velocity u. It is zero over a face.
+    // Return the rate of n relative to the box, for a point with the relative velocity u. The rate is zero over a face.
     PN_INLINE Vec turning(const Vec& u) const {
         Vec along = Vec();
         int free = 0;

@@ -121,7 +121,7 @@ struct NearestOnHull {
         along = turned(e, along);
     }
 
-    // Return the rate of n relative to the hull, for a point with the relative velocity u. It is zero over a face.
+    // Return the rate of n relative to the hull, for a point with the relative velocity u. The rate is zero over a face.
     Vec turning(const Vec& u) const {
         if (on_face) return Vec();
         const Vec free = on_edge ? Vec(u - along.dot(u) * along) : u;

@@ -1,5 +1,6 @@
-// The point of a cylinder or cone that is nearest to the origin of frame 1. Its axis is z of frame 2, and its middle is
-// the origin. The radii of its faces may differ, and one may be zero. A solid without length is a disk.
+// The point of a cylinder or cone that is nearest to the origin of frame 1. The axis of the solid is z of frame 2, and the
+// middle of the solid is the origin. The radii of its faces may differ, and one may be zero. A solid without length is a
+// disk.
 #pragma once
 
 #include <algorithm>

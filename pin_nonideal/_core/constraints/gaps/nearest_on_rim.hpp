@@ -28,7 +28,7 @@ struct RimSearchParameters {
 inline constexpr RimSearchParameters rim_search_parameters{};
 
 // Point of body 1 and the nearest point of a solid on body 2. As body 1 moves, the point slides along the first `free`
-// directions of `along` and stays the nearest. It slides around a rim (1), on a side (2), or not at all (0). `bend`
+// directions of `along` and stays the nearest. The point slides around a rim (1), on a side (2), or not at all (0). `bend`
 // holds the second derivatives of the distance along these directions.
 template <class Sides>
 struct NearestToRevolved {
@@ -115,7 +115,7 @@ private:
             return dot(sum, sum) > rim_search_parameters.level ? unit(sum) : Direction{-low.y, low.x};
         }
     };
-    // Cut the arc along the chord through a point of the arc. Returns false if a piece would remain at either end.
+    // Cut the arc along the chord through a point of the arc. Return false if a piece would remain at either end.
     static bool cut(Arc& arc, const Direction& now, const Direction& slope) {
         const Direction down = unit({-slope.x, -slope.y});
         const Scalar part = 2.0 * dot(now, down);
@@ -129,7 +129,7 @@ private:
         return true;
     }
     // Return the direction of the nearest point of the whole disk, by bisection over the chords along `direction`. The least
-    // distance of a chord is convex across them.
+    // distance of a chord is convex across the chords.
     Direction of_chords(const Sides& s, const Revolved& solid, const Direction& direction) const {
         const Vec along = out(direction), beside = around(direction);
         Direction found = direction;

@@ -1,4 +1,5 @@
-// The gap between the rim of a wheel, or an ellipsoid, and the plane of frame 2.
+// The gap between the rim of a wheel, or an ellipsoid, and the plane of frame 2. A rim is an ellipsoid with one semiaxis
+// zero, along the axis of the wheel.
 #pragma once
 
 #include <algorithm>

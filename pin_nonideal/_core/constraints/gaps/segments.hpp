@@ -48,7 +48,7 @@ private:
     }
 };
 
-// Motion of the nearest points. They slide so that the line between them stays perpendicular to each segment with a
+// Motion of the nearest points. The points slide so that the line between them stays perpendicular to each segment with a
 // free point.
 template <class Sides>
 struct NearestMotion {
@@ -82,8 +82,8 @@ struct NearestMotion {
     }
 };
 
-// Directions along a contact with a normal n that is free to turn. They are directions of body 2, rotated the shortest
-// way from a direction `pole` of body 2 to n. They jump only at n = -pole.
+// Directions along a contact with a normal n that is free to turn. The directions are fixed in body 2 and rotated the
+// shortest way from a direction `pole` of body 2 to n. The directions jump only at n = -pole.
 template <class Sides>
 struct TurningTangents {
     using Vec = typename Sides::Vec;

@@ -22,9 +22,9 @@ struct DofSlipRows {
     bool is_holonomic(int) const { return false; }
     bool moves_in_time() const { return false; }
     std::vector<int> dofs(const Mechanism&) const {
-        std::vector<int> own;
-        for (int k = 0; k < count; ++k) own.push_back(dof + k);
-        return own;
+        std::vector<int> indices;
+        for (int k = 0; k < count; ++k) indices.push_back(dof + k);
+        return indices;
     }
 
     template <class State, class Out>

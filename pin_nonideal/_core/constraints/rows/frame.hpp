@@ -1,4 +1,4 @@
-// Origins and axes of two frames coincide: a weld.
+// A weld: the origins and all three axes of two frames coincide.
 #pragma once
 
 #include <tuple>

@@ -1,4 +1,4 @@
-// The origins and the axes of two frames coincide.
+// A hinge: the origins of two frames coincide, and so does one axis that is fixed in both frames.
 #pragma once
 
 #include <tuple>

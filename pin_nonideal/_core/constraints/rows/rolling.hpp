@@ -1,4 +1,4 @@
-// A disk (or a sphere, without axle) rolls on the plane of frame 2 without slip and without lifting.
+// A disk or a sphere rolls on the plane of frame 2 without slip and without lifting.
 #pragma once
 
 #include <tuple>
@@ -18,7 +18,7 @@ struct RollingRows {
     Frame frame1, frame2;
     double radius;
     bool sphere;
-    Vec3 axle;
+    Vec3 axle;  // unit vector along the axis of the disk, in frame 1; unused for a sphere
     Vec3 tangent1, tangent2, normal;  // in frame 2
 
     static constexpr auto data() {

@@ -11,7 +11,7 @@
 
 namespace pn {
 
-// Time difference [s] for the rates of the directions. It balances rounding against the truncation error.
+// Time difference [s] for the rates of the directions. This difference balances rounding against the truncation error.
 constexpr double direction_step = 1e-6;
 
 struct UserSlipRows {

@@ -41,9 +41,9 @@ void CurvatureBounds::bound_bodies(const Workspace& w, const VecX& speed, const 
     h_ = h;
     for (int i : joints_) {
         const Joint& joint = p.mechanism.joints[i];
-        const Body &own = w.now.terms.body[i], &parent = w.now.terms.body[joint.parent];
+        const Body &body = w.now.terms.body[i], &parent = w.now.terms.body[joint.parent];
         const Bound base = bodies_[joint.parent], move = joint_bound(joint);
-        const Vec3 from = joint.parent == 0 ? own.ref + own.p : own.ref + own.p - parent.ref - parent.p;
+        const Vec3 from = joint.parent == 0 ? body.ref + body.p : body.ref + body.p - parent.ref - parent.p;
         const double apart = joint.parent == 0 ? 0.0 : from.norm() + h * move.velocity;
         bodies_[i] = {base.velocity + base.spin * apart + move.velocity,
                       base.acceleration + (base.spin_rate + base.spin * base.spin) * apart +

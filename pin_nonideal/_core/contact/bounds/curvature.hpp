@@ -1,4 +1,4 @@
-// Bounds on the second derivative of gaps over a step, from bounds on joint velocities and accelerations. They
+// Bounds on the second derivative of gaps over a step, from bounds on joint velocities and accelerations. The bounds
 // guarantee that steps of any length detect every contact.
 #pragma once
 

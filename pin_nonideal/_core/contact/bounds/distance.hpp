@@ -1,5 +1,5 @@
-// Proof that two round bodies stay apart between two instants. Their corners are beyond a plane at both instants, and
-// accelerations are bounded. Then no points can meet in between, whichever points are nearest.
+// Proof that two round bodies stay apart between two instants. The corners of one body are beyond a plane at both instants,
+// and accelerations are bounded. Then no points can meet in between, whichever points are nearest.
 #pragma once
 
 #include <algorithm>

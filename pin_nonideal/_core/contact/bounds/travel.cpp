@@ -116,8 +116,8 @@ void TravelBound::set_levers(const Terms& terms, TravelState& travel) const {
     for (auto moved = moved_.rbegin(); moved != moved_.rend(); ++moved) {
         const int i = moved->joint, parent = moved->parent;
         if (parent == 0) continue;
-        const Body &own = terms.body[i], &before = terms.body[parent];
-        double distance = (own.ref + own.p - before.ref - before.p).norm();
+        const Body &body = terms.body[i], &parent_body = terms.body[parent];
+        double distance = (body.ref + body.p - parent_body.ref - parent_body.p).norm();
         if (slides(moved->kind)) {
             const double room =
                 parameters.room_ahead * distance + parameters.steps_ahead * (travel.slid_step[i] + travel.turned_step[i]);

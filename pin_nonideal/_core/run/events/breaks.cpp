@@ -44,13 +44,13 @@ double acceleration_change(const Probe& a, const Probe& b) { return std::abs(b.f
 // Return the first point after the jump that causes most of the defect, to neighboring floating-point times. Return
 // nothing if the function is smooth.
 std::optional<Probe> find_jump(const TimeFunction& f, Probe& a, Probe b, double (*defect)(const Probe&, const Probe&)) {
-    const double least = Breaks::parameters.kept_part * defect(a, b);
+    const double min_defect = Breaks::parameters.kept_part * defect(a, b);
     for (;;) {
         const double middle = a.t + 0.5 * (b.t - a.t);
         if (!(a.t < middle && middle < b.t)) return b;
         const Probe m = probe(f, middle);
         const double left = defect(a, m), right = defect(m, b);
-        if (!(std::max(left, right) >= least)) return std::nullopt;
+        if (!(std::max(left, right) >= min_defect)) return std::nullopt;
         (left >= right ? b : a) = m;
     }
 }
@@ -63,12 +63,12 @@ Breaks::Breaks(System& system, Progress& progress, Output& output, Recording& ou
         for (const TimeFunction* f : time_functions(p.blocks[i].kind)) motions_.push_back({i, f});
 }
 
-void Breaks::enter(double at) {
-    const auto after = std::upper_bound(p.breaks.begin(), p.breaks.end(), at);
+void Breaks::enter(double time) {
+    const auto after = std::upper_bound(p.breaks.begin(), p.breaks.end(), time);
     double last = after == p.breaks.begin() ? -HUGE_VAL : *(after - 1);
     next_ = after == p.breaks.end() ? HUGE_VAL : *after;
     double& found = progress_.detected_break;
-    if (found <= at) {
+    if (found <= time) {
         last = std::max(last, found);
         found = HUGE_VAL;
     }

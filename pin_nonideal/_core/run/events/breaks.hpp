@@ -35,7 +35,7 @@ public:
     // Set the stretch between the last break and the next one at the current time, or at another one. Rows are evaluated
     // within this stretch.
     void enter() { enter(progress_.t); }
-    void enter(double at);
+    void enter(double time);
     // Time of the next break after the current time or after another one (infinity if none), and a check if it is
     // reached.
     double next() const { return next_; }

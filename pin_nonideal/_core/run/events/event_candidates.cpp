@@ -26,43 +26,43 @@ double EventCandidates::allowance(int e) const {
 bool EventCandidates::may_reach_limit(int e) {
     const std::vector<Stepper::RateSample>& rate_samples = stepper_.rate_samples();
     const auto share = [&](size_t k) { return system_.share(*rate_samples[k].rate, e); };
-    double least = share(0), most = least, rise = 0.0;
+    double min_share = share(0), max_share = min_share, rise = 0.0;
     for (size_t k = 1; k < rate_samples.size(); ++k) {
-        least = std::min(least, share(k));
-        most = std::max(most, share(k));
+        min_share = std::min(min_share, share(k));
+        max_share = std::max(max_share, share(k));
     }
-    const double range = most - least;
+    const double range = max_share - min_share;
     if (range <= parameters.share_rounding)
-        return most > 1.0 + parameters.share_rounding || least < -1.0 - parameters.share_rounding;
+        return max_share > 1.0 + parameters.share_rounding || min_share < -1.0 - parameters.share_rounding;
     for (size_t k = 2; k < rate_samples.size(); ++k) {
         const double t0 = rate_samples[k - 2].part, t1 = rate_samples[k - 1].part, t2 = rate_samples[k].part;
         rise = std::max({rise, rise_between(t0, share(k - 2), t1, share(k - 1), t2, share(k)),
                          rise_between(t0, -share(k - 2), t1, -share(k - 1), t2, -share(k))});
     }
-    return std::max(most, -least) + parameters.times_parabola * rise + parameters.range_between * range >
+    return std::max(max_share, -min_share) + parameters.times_parabola * rise + parameters.range_between * range >
            1.0 + parameters.limit_rounding;
 }
 
 // Check if a slipping element has reversed at the step's end, or may have done so inside.
 bool EventCandidates::may_stop(int e) const { return slip_along_mode(p, w, e) + allowance(e) < -noise() || dips(e); }
 
-// Check if a slip speed may dip through zero and back. Speeds and their rates are known at the stages and at both ends.
-// The minima of the cubics through them decide.
+// Check if a slip speed may dip through zero and back. Speeds and their rates are known at the stages and at both ends, and
+// give the minima of cubics between them.
 bool EventCandidates::dips(int e) const {
     if (stepper_.method.order < 2) return false;
     const std::vector<Stepper::RateSample>& rate_samples = stepper_.rate_samples();
     const double allowed = allowance(e), below_rest = -noise();
     const auto speed = [&](size_t k) { return system_.slip(*rate_samples[k].rate, e) + allowed; };
-    double least = HUGE_VAL, most = -HUGE_VAL;
+    double min_speed = HUGE_VAL, max_speed = -HUGE_VAL;
     bool below = false;
     for (size_t k = 0; k < rate_samples.size(); ++k) {
-        least = std::min(least, speed(k));
-        most = std::max(most, speed(k));
+        min_speed = std::min(min_speed, speed(k));
+        max_speed = std::max(max_speed, speed(k));
         below |= k > 0 && k + 1 < rate_samples.size() && speed(k) < below_rest;
     }
     if (below) return true;
-    if (most <= allowed - below_rest) return false;  // held by sticking elements, it never left rest
-    const double dip = parameters.dip_part * (most - least);
+    if (max_speed <= allowed - below_rest) return false;  // held by sticking elements, it never left rest
+    const double dip = parameters.dip_part * (max_speed - min_speed);
     for (size_t k = 0; k + 1 < rate_samples.size(); ++k) {
         const double length = (rate_samples[k + 1].part - rate_samples[k].part) * stepper_.h;
         const double from = speed(k), to = speed(k + 1), leaves = length * system_.slip_rate(*rate_samples[k].rate, e),
@@ -94,15 +94,15 @@ void EventCandidates::add_pulls(std::vector<Watch>& list) {
 bool EventCandidates::may_pull(int gap) {
     const std::vector<Stepper::RateSample>& rate_samples = stepper_.rate_samples();
     const auto load = [&](size_t k) { return system_.load(*rate_samples[k].rate, gap); };
-    double least = load(0), most = least, fall = 0.0;
+    double min_load = load(0), max_load = min_load, fall = 0.0;
     for (size_t k = 1; k < rate_samples.size(); ++k) {
-        least = std::min(least, load(k));
-        most = std::max(most, load(k));
+        min_load = std::min(min_load, load(k));
+        max_load = std::max(max_load, load(k));
     }
     for (size_t k = 2; k < rate_samples.size(); ++k)
         fall = std::max(fall, rise_between(rate_samples[k - 2].part, -load(k - 2), rate_samples[k - 1].part, -load(k - 1),
                                            rate_samples[k].part, -load(k)));
-    return least - parameters.times_parabola * fall - parameters.range_between * (most - least) <
+    return min_load - parameters.times_parabola * fall - parameters.range_between * (max_load - min_load) <
            -load_rounding(p, w, gap);
 }
 

@@ -21,7 +21,7 @@ EventLocator::EventLocator(System& system, Stepper& stepper, ErrorNorm& norm, co
       search_(system, stepper, pulls, watch), releases_(system, stepper) {}
 
 double EventLocator::shorten_toward_rest(const VecX& rate, double size) {
-    const double least = parameters.min_shortened_part * size;
+    const double min_size = parameters.min_shortened_part * size;
     for (int e : w.now.slipping) {
         const Friction& f = p.frictions[e];
         if (f.dim == 1) continue;
@@ -35,7 +35,7 @@ double EventLocator::shorten_toward_rest(const VecX& rate, double size) {
             change += along * along;
         }
         if (slip < change * size * size)
-            size = std::min(size, std::max(parameters.part_toward_rest * std::sqrt(slip / change), least));
+            size = std::min(size, std::max(parameters.part_toward_rest * std::sqrt(slip / change), min_size));
     }
     return size;
 }
@@ -107,21 +107,21 @@ void EventLocator::correct_instant(const Crossing& crossing, double full) {
     // Bracket of the instant. Without a bracket Newton's method could run to the step's end, past other events. Two
     // cases cause this: the motion differs from the interpolant, or other contacts hold the gap, so that its rate is
     // only rounding.
-    double size = stepper_.h, here = margin_at_end(watch), low = 0.0, high = full;
-    const double still = of_gap ? rest_speed * (1.0 + system_.velocity(stepper_.y1).cwiseAbs().maxCoeff()) : 0.0;
+    double size = stepper_.h, margin = margin_at_end(watch), low = 0.0, high = full;
+    const double min_rate = of_gap ? rest_speed * (1.0 + system_.velocity(stepper_.y1).cwiseAbs().maxCoeff()) : 0.0;
     for (int it = 0; it < parameters.max_correction_passes; ++it) {
         if (of_gap) rate = gap_rate(p, w, watch.index);
         else if (known_rate) rate = slip_rate_along_mode(p, w, watch.index);
-        if (!(rate < -still)) return;  // the margin grows from here on, and no root lies ahead
-        (here > 0.0 ? low : high) = size;
-        double next = size - here / rate;
+        if (!(rate < -min_rate)) return;  // the margin grows from here on, and no root lies ahead
+        (margin > 0.0 ? low : high) = size;
+        double next = size - margin / rate;
         if (!(next >= low && next <= high)) next = 0.5 * (low + high);
-        const double change = next - size, before = here;
+        const double change = next - size, before = margin;
         if (std::abs(change) <= resolution || (it > 0 && std::abs(change) < parameters.end_tolerance * full)) return;
         correct_end_to(next);
         size = next;
-        here = margin_at_end(watch);
-        if (const double secant = (here - before) / change; secant < 0.0) rate = secant;
+        margin = margin_at_end(watch);
+        if (const double secant = (margin - before) / change; secant < 0.0) rate = secant;
     }
 }
 

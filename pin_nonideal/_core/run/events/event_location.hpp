@@ -2,7 +2,7 @@
 //
 // The search on the interpolant gives a first guess of the instant. The step is then repeated up to that instant, so an
 // event is as accurate as a step. The remaining margin corrects the step's end. A step can miss the rest of slip in
-// several directions by more than the tolerance. It then ends before the rest, and a shorter step follows.
+// several directions by more than the tolerance. Such a step ends before the rest, and a shorter step follows.
 #pragma once
 
 #include <optional>

@@ -37,13 +37,13 @@ double EventSearch::margin(const Watch& watch, double t, const VecX& y) {
 std::optional<Crossing> EventSearch::deepest_penetration(const Watch& touches) {
     std::optional<Crossing> out;
     if (gaps_.candidates().empty()) return out;
-    double least = -touching_width * scene_size(p, w);
+    double lowest_width = -touching_width * scene_size(p, w);
     for (const GapSearch::Candidate& candidate : gaps_.candidates()) {
         const Watch watch{Watch::Kind::gap, candidate.gap};
         if (touches.kind == watch.kind && touches.index == watch.index) continue;
-        const double deep = margin(watch, stepper_.t0 + stepper_.h, stepper_.y1);
-        if (!(deep < least)) continue;
-        least = deep;
+        const double width = margin(watch, stepper_.t0 + stepper_.h, stepper_.y1);
+        if (!(width < lowest_width)) continue;
+        lowest_width = width;
         out = Crossing{watch, 1.0, gap_rate(p, w, candidate.gap) * stepper_.h};
     }
     return out;
@@ -65,9 +65,9 @@ double EventSearch::interpolated_share(int e, double part) const {
     return stepper_.interpolated_rate(part, system_.ns + 2 * e);
 }
 
-// Return the error bound of the interpolated force / limit ratio of a sticking element. It comes from the further
-// stages of the interpolant, which are as accurate as the interpolant. Without further stages it comes from the other
-// stages and from a fraction of the ratio's change.
+// Return the error bound of the interpolated force / limit ratio of a sticking element. The bound comes from the further
+// stages of the interpolant, which are as accurate as the interpolant. Without further stages it comes from the other stages
+// and from a fraction of the ratio's change.
 double EventSearch::share_error(int e) const {
     const Method& method = stepper_.method;
     const bool further = method.further_stages > 0;
@@ -135,8 +135,8 @@ double EventSearch::first_crossing(const Watch& watch, Source source) {
     for (int k = 1; k <= parameters.grid; ++k) {
         g[k] = margin_at(k * parameters.spacing);
         if (begins && g[k] < 0.0) {
-            // Slip in several directions that has just begun may first turn. It has come to rest again only if it rose
-            // before. Slip that decreases from the start came to rest at the end of the last step.
+            // Slip in several directions that has just begun may first turn. The slip speed has fallen to rest again only if
+            // the speed rose before. Slip that decreases from the start came to rest at the end of the last step.
             const bool turns = slips && p.frictions[watch.index].dim > 1 && !slows_down(watch.index, rest);
             const double part = k > 1 ? 0.0 : root_after_start(parameters.spacing, g[1], turns ? rest : 0.0, margin_at);
             if (part > 0.0 || !turns) return part;

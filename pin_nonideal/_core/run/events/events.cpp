@@ -48,7 +48,7 @@ void resolve_together(System& system, double t, ModeQuery& mode_query, bool stri
 
 // Check if the sticking elements share their load in several ways. Then one of them is beyond its limit, or the element
 // that reached its limit still sticks.
-bool shares_load(System& system, double t, const std::vector<int>& resting, int held) {
+bool shares_load(System& system, double t, const std::vector<int>& resting, int limit_element) {
     const Program& p = system.p;
     Workspace& w = system.w;
     bool shares = false;
@@ -56,12 +56,12 @@ bool shares_load(System& system, double t, const std::vector<int>& resting, int 
     for (int e : resting)
         shares |=
             w.state.mode[e] == sticking &&
-            (e == held ||
+            (e == limit_element ||
              !holding_force(p, w, e, t, system.q, system.v).is_within(event_handling_parameters.limit_rounding));
     return shares;
 }
 
-// Request collocation steps if slip in several directions begins from rest. Its velocity does not define a direction
+// Request collocation steps if slip in several directions begins from rest. The slip velocity does not define a direction
 // yet.
 void set_direction_search(System& system, const std::vector<int>& resting, bool sought) {
     const auto begins = [&](int e) { return system.p.frictions[e].dim > 1 && slips(system.w.state.mode[e]); };
@@ -281,8 +281,9 @@ Strike strike_contacts(System& system, double t, VecX& y, bool starts, bool boun
 void remember_directions(System& system, std::vector<double>& slip, int stopped_element) {
     Workspace& w = system.w;
     const auto velocity = [&](int e) { return slip_velocity(w.now, system.p.frictions[e]); };
-    const double least = stopped_element < 0 ? event_handling_parameters.directed_slip
-                                     : std::max(event_handling_parameters.directed_slip, velocity(stopped_element).norm());
+    const double min_speed = stopped_element < 0 ? event_handling_parameters.directed_slip
+                                         : std::max(event_handling_parameters.directed_slip,
+                                                    velocity(stopped_element).norm());
     for (int e : w.now.loaded_elements) {
         const Friction& f = system.p.frictions[e];
         if (w.state.is_sticking_deferred[e] && !has_negligible_speed(system, e)) w.state.is_sticking_deferred[e] = 0;
@@ -291,7 +292,7 @@ void remember_directions(System& system, std::vector<double>& slip, int stopped_
         slip[e] = u.norm();
         const Vec3& n = w.state.last_direction[e];
         if (w.state.solves_directions) w.state.slip_direction[e] = n;
-        else if (slip[e] > least) w.state.slip_direction[e] = w.state.last_direction[e] = u.normalized();
+        else if (slip[e] > min_speed) w.state.slip_direction[e] = w.state.last_direction[e] = u.normalized();
     }
 }
 

@@ -51,8 +51,8 @@ bool has_turning_slip(const System& system);
 Event::Kind kind_of_change(Mode before, Mode after);
 
 // Store the slip directions at a step's end for the next step, and the slip speeds in `slip`. `stopped_element`:
-// element that came to rest at the step's end. Its remaining slip speed is an error of the step, so elements with lower
-// slip speeds keep their directions.
+// element that came to rest at the step's end. The remaining slip speed of this element is an error of the step, so elements
+// with lower slip speeds keep their directions.
 void remember_directions(System& system, std::vector<double>& slip, int stopped_element = -1);
 
 }  // namespace pn

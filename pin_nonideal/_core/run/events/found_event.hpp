@@ -15,7 +15,7 @@ struct FoundEvent {
     } kind;
     int index;  // index of the friction element, the contact in tension or the gap, -1 for several gaps
     double time;
-    bool in_vain = false;  // touch of a gap that had no load when its contact was let go
+    bool in_vain = false;  // touch of a gap without load, whose contact had been opened
     bool of_hand_over = false;  // lift at which closed contacts pass to other features
 
     bool changes_modes() const { return kind != Kind::reversal && kind != Kind::pull && kind != Kind::user; }

@@ -28,7 +28,7 @@ void GapSearch::bound_rates() {
     }
 }
 
-// Return bounds of the second derivative of a gap between the step's ends. For a user's gap they are estimates:
+// Return bounds of the second derivative of a gap between the step's ends. For a user's gap the bounds are estimates:
 // multiples of the second derivatives of the cubic between the ends, and of the acceleration at the end.
 GapSearch::Bends GapSearch::bends(int gap, const GapSample& end) const {
     if (CurvatureBounds::has_bounds(p, gap)) return {curvature_.lower_bound(w, gap), curvature_.upper_bound(w, gap)};
@@ -81,28 +81,28 @@ const std::vector<GapSearch::Candidate>& GapSearch::find_candidates() {
 // Check if a gap stays open between two samples. The two parabolas of the bound through both samples lie below the gap.
 // The gap is open if the larger of them is positive at its lowest point.
 bool GapSearch::stays_open(int gap, const GapSample& a, const GapSample& b, double bound) const {
-    const double length = (b.part - a.part) * stepper_.h, least = -rounding_;
-    if (!(a.width > least) || !(b.width > least)) return false;
+    const double length = (b.part - a.part) * stepper_.h, min_width = -rounding_;
+    if (!(a.width > min_width) || !(b.width > min_width)) return false;
     if (a.separation) {
         const Kind& kind = p.blocks[p.gaps[gap].block].kind;
-        return stays_apart(kind, *a.separation, *b.separation, bound, curvature_.speed(gap), length, least);
+        return stays_apart(kind, *a.separation, *b.separation, bound, curvature_.speed(gap), length, min_width);
     }
-    if (has_lowest_point(p, gap)) return stays_above(a.width, b.width, 0.5 * bound * length * length, least);
+    if (has_lowest_point(p, gap)) return stays_above(a.width, b.width, 0.5 * bound * length * length, min_width);
     const double change = b.rate - a.rate + bound * length;  // negative: no valid bound
     if (change <= 0.0) return change >= -parameters.rate_rounding * (std::abs(a.rate) + std::abs(b.rate));
     const double meet = (a.width - b.width + b.rate * length + 0.5 * bound * length * length) / change;
     if (!(meet > 0.0 && meet < length)) return true;
-    return a.width + meet * (a.rate - 0.5 * bound * meet) > least;
+    return a.width + meet * (a.rate - 0.5 * bound * meet) > min_width;
 }
 
 // Check if a duplicate of the gap is closed. The gap follows the duplicate.
 bool GapSearch::has_closed_copy(int gap) const {
     const std::vector<int>& closed_gaps = w.now.closed_gaps;
-    return std::any_of(closed_gaps.begin(), closed_gaps.end(), [&](int held) { return are_duplicates(p, held, gap); });
+    return std::any_of(closed_gaps.begin(), closed_gaps.end(), [&](int closed) { return are_duplicates(p, closed, gap); });
 }
 
 bool GapSearch::slides_on(int gap) const {
-    return std::any_of(closed_round_.begin(), closed_round_.end(), [&](int held) { return same_bodies(p, gap, held); });
+    return std::any_of(closed_round_.begin(), closed_round_.end(), [&](int closed) { return same_bodies(p, gap, closed); });
 }
 
 GapSample GapSearch::above(GapSample sample, double level) const {
@@ -114,10 +114,10 @@ GapSample GapSearch::above(GapSample sample, double level) const {
 double GapSearch::level_here(int gap, double part) const {
     double level = plane(gap);
     if (!Separation::has(p, gap)) return level;
-    for (int held : closed_round_) {
-        if (!same_bodies(p, gap, held)) continue;
-        measure_gap(p, w, stepper_.t0 + part * stepper_.h, system_.v, held);
-        level = std::min(level, gap_width(p, w, held));
+    for (int closed : closed_round_) {
+        if (!same_bodies(p, gap, closed)) continue;
+        measure_gap(p, w, stepper_.t0 + part * stepper_.h, system_.v, closed);
+        level = std::min(level, gap_width(p, w, closed));
     }
     return level;
 }
@@ -151,7 +151,7 @@ GapSearch::Touch GapSearch::between(int gap, const GapSample& a, const GapSample
 
 std::optional<GapSearch::Touch> GapSearch::search(int gap, const GapSample& a, const GapSample& b, const Bends& bends) {
     const double bound = bends.below;
-    // A touching gap that the solver left open stays on its plane. It touches again if it penetrates.
+    // A touching gap that the solver left open stays on its plane. Such a gap touches again if it penetrates.
     const bool rests = stepper_.t0 < start_.retry_time[gap];
     if (rests && std::abs(a.width) <= rounding_ && std::abs(b.width) <= rounding_) return std::nullopt;
     if (stays_open(gap, a, b, bound)) return std::nullopt;
@@ -160,7 +160,7 @@ std::optional<GapSearch::Touch> GapSearch::search(int gap, const GapSample& a, c
     if (b.width < -rounding_ && a.rate + bends.above * length < 0.0) return between(gap, a, b);
     if (bends.above * length * length < rounding_ || samples_ > parameters.max_samples) {
         // Bodies can slide to the next contact point, as a corner from a face onto an edge. The gap of that point then
-        // falls to zero and stays zero. It does not touch before it becomes negative.
+        // falls to zero and stays zero. The gap does not touch before it becomes negative.
         const bool has_closed = samples_ > parameters.max_samples && !rests && !(a.separation && slides_on(gap));
         if (a.width > 0.0 && b.width < -rounding_) return between(gap, a, b);
         if (b.width < -rounding_ || has_closed) return Touch{b.part, b.rate * stepper_.h};

@@ -60,17 +60,17 @@ bool HandOver::find(int gap, double& size) {
     double low = 0.0, high = size, at_low = bias_after(low, gap), at_high = bias_after(high, gap);
     const double acceleration = p.mechanism.gravity.norm() + system_.velocity(progress_.rate).cwiseAbs().maxCoeff();
     const double scale = acceleration + std::abs(at_low);
-    const double least = std::max(parameters.kept_bias_change * std::abs(at_high - at_low), min_bias_jump * scale);
+    const double min_jump = std::max(parameters.kept_bias_change * std::abs(at_high - at_low), min_bias_jump * scale);
     const double width = parameters.width * std::max(1.0, std::abs(progress_.t));
     while (high - low > width) {
         const double middle = 0.5 * (low + high);
         if (!(low < middle && middle < high)) break;
-        const double there = bias_after(middle, gap);
-        const double before = std::abs(there - at_low), behind = std::abs(at_high - there);
-        if (!(std::max(before, behind) >= least)) return false;
-        const bool is_before = before >= least;
+        const double at_middle = bias_after(middle, gap);
+        const double jump_before = std::abs(at_middle - at_low), jump_after = std::abs(at_high - at_middle);
+        if (!(std::max(jump_before, jump_after) >= min_jump)) return false;
+        const bool is_before = jump_before >= min_jump;
         (is_before ? high : low) = middle;
-        (is_before ? at_high : at_low) = there;
+        (is_before ? at_high : at_low) = at_middle;
     }
     size = high;
     return true;

@@ -19,8 +19,8 @@ struct HandOverParameters {
     double passing_time = 1e-13;
     // Part of the time to a hand-over that is left to the next step, since the acceleration changes on the way.
     double left_before = 1e-3;
-    // Width [s, or relative to the time above 1 s] of the interval that contains a hand-over. It is below the spacing
-    // of times, so the state after it lies at the feature up to rounding.
+    // Width [s, or relative to the time above 1 s] of the interval that contains a hand-over. The width is below the spacing
+    // of times, so the state after the interval lies at the feature up to rounding.
     double width = 1e-18;
 };
 

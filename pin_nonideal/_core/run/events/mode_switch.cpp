@@ -60,7 +60,7 @@ void ModeChanges::change(FoundEvent event) {
     bridge_chatter(event.of_gap() ? 0 : event.index);
 }
 
-// Check if a contact of the same two bodies was let go, because no contact of theirs had a load.
+// Check if a contact of the same two bodies was opened because no contact of these bodies had a load.
 bool ModeChanges::was_released(int gap) const {
     for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i)
         if (progress_.gaps.is_blocked(i) && same_bodies(p, gap, i)) return true;

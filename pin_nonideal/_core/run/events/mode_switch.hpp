@@ -13,7 +13,7 @@ struct ModeSwitchParameters {
     double forced_switch_spacing = 1e3;
     // Maximum speed [m/s or rad/s] of slip that is about to rest or to begin, relative to 1 + the largest velocity.
     double max_creep_speed = 1e-8;
-    // Length of a tiny step, relative to the time, in seconds below 1 s. In shorter steps the motion itself fails.
+    // Length of a tiny step, relative to the time, in seconds below 1 s. Motions over shorter steps are lost in rounding.
     double tiny_step = 1e-10;
 };
 
@@ -30,7 +30,7 @@ public:
     void change(FoundEvent event);
     // Forced switch: if no step is short enough, the motion of the current modes may have ended. `can_switch_modes`
     // returns false if the last forced switch was less than `forced_switch_spacing` tiny steps ago. `force_switch`
-    // selects modes one tiny step ahead. It returns false if it finds none.
+    // selects modes one tiny step ahead. The function returns false if no modes allow a motion.
     bool can_switch_modes(const Failure& failure) const;
     bool force_switch();
     // Check if the failure only means that no motion or no step was found, which proves nothing.
@@ -40,7 +40,7 @@ public:
     bool bridge_with_time_stepping(const Failure& failure, bool of_hand_over = false);
     // Check if a step failed because closed contacts contradict each other or the accuracy.
     static bool is_of_closed_contacts(const Failure& failure);
-    // Check if rows of closed contacts alone contradict each other, which are nearly dependent then.
+    // Check if rows of closed contacts alone contradict each other. Such rows are nearly dependent.
     bool is_of_contradicting_contacts(const Failure& failure) const;
     // Bridge an accumulation of events, and select modes at the new state.
     void bridge_chatter(int element);

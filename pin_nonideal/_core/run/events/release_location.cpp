@@ -56,7 +56,7 @@ bool ReleaseLocator::all_press() {
     return true;
 }
 
-// Locate the lift-off of redundant contacts. They stay closed as long as nonnegative loads exist, even if the
+// Locate the lift-off of redundant contacts. Redundant contacts stay closed as long as nonnegative loads exist, even if the
 // minimum-norm loads are not all nonnegative. Bisects the step for the first instant without nonnegative loads.
 std::optional<FoundEvent> ReleaseLocator::lift_together() {
     if (p.gaps.empty() || !w.now.rows.redundant || all_press()) return std::nullopt;
@@ -75,7 +75,7 @@ std::optional<FoundEvent> ReleaseLocator::lift_together() {
 }
 
 // Return the part of the step at which its interpolant releases the sticking elements. `rate`: their slip acceleration
-// at the step's end. The search approaches the instant from later times. It uses secants of the acceleration, which
+// at the step's end. The search approaches the instant from later times. The search uses secants of the acceleration, which
 // falls to zero toward the instant if limits do not jump, and bisection otherwise.
 double ReleaseLocator::release_part(double rate, const std::vector<Mode>& modes, ModeQuery& mode_query) {
     const double full = stepper_.h, width = parameters.time_tolerance * std::max(std::abs(stepper_.t0) / full, 1.0);
@@ -94,11 +94,11 @@ double ReleaseLocator::release_part(double rate, const std::vector<Mode>& modes,
         stepper_.interpolate(next, y);
         system_.read(y);
         update_kinematics(p, w, t, system_.q, system_.v);
-        const std::optional<double> there = release_rate(t, y, modes, mode_query);
-        falls = there && rate < HUGE_VAL && *there < parameters.max_rate_ratio * rate;
-        if (there) {
+        const std::optional<double> found_rate = release_rate(t, y, modes, mode_query);
+        falls = found_rate && rate < HUGE_VAL && *found_rate < parameters.max_rate_ratio * rate;
+        if (found_rate) {
             beyond = std::exchange(high, next);
-            rate_beyond = std::exchange(rate, *there);
+            rate_beyond = std::exchange(rate, *found_rate);
         } else {
             low = next;
         }
@@ -126,7 +126,8 @@ std::optional<double> ReleaseLocator::release_rate_inside(const std::vector<Mode
 
 // Locate the release of redundant sticking elements. The multiplier of a single element decides nothing: the elements
 // hold as long as some forces within all limits do. Elements that slip without moving are included. The step is
-// repeated up to the release on its interpolant. It is extended slightly if its own end does not show the release.
+// repeated up to the release on its interpolant. The repeated step is extended slightly if its end does not show the
+// release.
 std::optional<FoundEvent> ReleaseLocator::release_together() {
     if (!w.state.is_hyperstatic) return std::nullopt;
     const std::vector<Mode> modes = w.state.mode;

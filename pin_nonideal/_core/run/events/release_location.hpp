@@ -1,5 +1,5 @@
 // Location of events that no single margin shows: redundant elements that begin to slip together, and redundant contacts
-// that lift off together. They hold as long as some forces within all limits and cones do.
+// that lift off together. Such elements hold as long as some forces within all limits and cones hold.
 #pragma once
 
 #include <optional>

@@ -19,17 +19,17 @@ std::vector<int> contacts_of_bodies(const Program& p, const Workspace& w, int ga
 }
 
 // Check if the current motion, without these contacts, closes none of them. With friction it must also equal the motion
-// `held` with these contacts, since friction may hold bodies that are pressed by nothing else.
-bool needs_no_force(System& system, double t, const std::vector<int>& open, const VecX& held) {
+// `acceleration` with these contacts, since friction may hold bodies that are pressed by nothing else.
+bool needs_no_force(System& system, double t, const std::vector<int>& open, const VecX& acceleration) {
     const Program& p = system.p;
     Workspace& w = system.w;
     const bool rubs = std::any_of(open.begin(), open.end(), [&](int i) { return !p.gaps[i].elements.empty(); });
-    const double least =
-        unloaded_contacts_parameters.same_acceleration * (held.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
-    if (rubs && !((w.now.a - held).cwiseAbs().maxCoeff() <= least)) return false;
+    const double tolerance =
+        unloaded_contacts_parameters.same_acceleration * (acceleration.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
+    if (rubs && !((w.now.a - acceleration).cwiseAbs().maxCoeff() <= tolerance)) return false;
     return std::all_of(open.begin(), open.end(), [&](int i) {
         evaluate_gap(p, w, t, system.v, i);
-        return gap_acceleration(p, w, i) >= -std::max(least, acceleration_rounding(p, w, i));
+        return gap_acceleration(p, w, i) >= -std::max(tolerance, acceleration_rounding(p, w, i));
     });
 }
 
@@ -38,19 +38,19 @@ bool moves_without(System& system, double t, const std::vector<int>& contacts) {
     const Program& p = system.p;
     Workspace& w = system.w;
     const RunState before = w.state;
-    const VecX held = w.now.a;
+    const VecX acceleration = w.now.a;
     std::vector<char> closed = before.closed;
     for (int i : contacts) closed[i] = 0;
-    bool same = false;
+    bool is_needless = false;
     attempt([&] {  // a failure means that there is no motion without these contacts
         set_closed(p, w, closed);
         begin_step(p, w, t, system.q, system.v);
-        same = needs_no_force(system, t, contacts, held);
+        is_needless = needs_no_force(system, t, contacts, acceleration);
     });
     set_contacts(p, w, before.closed, before.mode);
     w.state = before;
     begin_step(p, w, t, system.q, system.v);
-    return same;
+    return is_needless;
 }
 
 }  // namespace

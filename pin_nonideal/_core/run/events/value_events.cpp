@@ -59,21 +59,21 @@ void ValueEvents::start(double t, const VecX& y) {
     for (int k = 0; k < size(); ++k) side_[k] = sign(value(k, t, y));
 }
 
-// A value that is zero at the start of a run has no sign. Its first sign is no event.
+// A value that is zero at the start of a run has no sign. The first sign of such a value is no event.
 double ValueEvents::first_crossing(int k) {
     double before = 0.0;
     for (int i = 1; i <= parameters.samples; ++i) {
-        const double part = static_cast<double>(i) / parameters.samples, here = value_inside(k, part);
-        if (side_[k] != 0 && sign(here) == -side_[k]) {
+        const double part = static_cast<double>(i) / parameters.samples, sample = value_inside(k, part);
+        if (side_[k] != 0 && sign(sample) == -side_[k]) {
             if (counts(k)) {
-                const auto margin = [&](double x) { return side_[k] * value_inside(k, x) / std::abs(here); };
+                const auto margin = [&](double x) { return side_[k] * value_inside(k, x) / std::abs(sample); };
                 const double at_start = margin(before);
                 if (before == 0.0 && at_start <= 0.0) return root_after_start(part, -1.0, 0.0, margin);
                 return root_between(before, at_start, part, -1.0, margin);
             }
-            side_[k] = sign(here);
+            side_[k] = sign(sample);
         } else if (side_[k] == 0) {
-            side_[k] = sign(here);
+            side_[k] = sign(sample);
         }
         before = part;
     }
@@ -89,19 +89,19 @@ void ValueEvents::end_step_at(double size) {
 // crossing.
 void ValueEvents::step_onto(int k, double part) {
     const double full = stepper_.h, t0 = stepper_.t0;
-    const double least = parameters.start_spacings * (std::nextafter(std::abs(t0), HUGE_VAL) - std::abs(t0));
+    const double min_size = parameters.start_spacings * (std::nextafter(std::abs(t0), HUGE_VAL) - std::abs(t0));
     const double low = std::max(0.0, part - root_search_parameters.margin_slope_step),
                  high = std::min(1.0, part + root_search_parameters.margin_slope_step);
     double slope = (value_inside(k, high) - value_inside(k, low)) / ((high - low) * full);
-    double size = std::max(part * full, least);
+    double size = std::max(part * full, min_size);
     end_step_at(size);
-    double here = value(k, t0 + size, stepper_.y1);
-    for (int i = 0; i < parameters.max_corrections && here != 0.0 && slope != 0.0; ++i) {
-        const double next = std::clamp(size - here / slope, least, full), change = next - size, before = here;
+    double end_value = value(k, t0 + size, stepper_.y1);
+    for (int i = 0; i < parameters.max_corrections && end_value != 0.0 && slope != 0.0; ++i) {
+        const double next = std::clamp(size - end_value / slope, min_size, full), change = next - size, before = end_value;
         if (std::abs(change) <= parameters.end_tolerance * full || t0 + next == t0 + size) break;
         end_step_at(size = next);
-        here = value(k, t0 + size, stepper_.y1);
-        slope = (here - before) / change;
+        end_value = value(k, t0 + size, stepper_.y1);
+        slope = (end_value - before) / change;
     }
 }
 
@@ -124,10 +124,10 @@ void ValueEvents::count(int k) {
 // Count events that coincide with the event at the step's end, and store the signs of all other values.
 void ValueEvents::store_signs() {
     for (int k = 0; k < size(); ++k) {
-        const double here = sign(value(k, stepper_.t0 + stepper_.h, stepper_.y1));
-        if (here == 0 || here == side_[k] || std::count(found_.begin(), found_.end(), k) > 0) continue;
+        const double end_sign = sign(value(k, stepper_.t0 + stepper_.h, stepper_.y1));
+        if (end_sign == 0 || end_sign == side_[k] || std::count(found_.begin(), found_.end(), k) > 0) continue;
         if (side_[k] != 0 && counts(k)) count(k);
-        else side_[k] = here;
+        else side_[k] = end_sign;
     }
 }
 
@@ -163,10 +163,10 @@ void ValueEvents::sample_end(double t, const VecX& y) {
     found_.clear();
     has_demand_ = false;
     for (int k = 0; k < size(); ++k) {
-        const double here = sign(value(k, t, y));
-        if (here == 0 || here == side_[k]) continue;
+        const double end_sign = sign(value(k, t, y));
+        if (end_sign == 0 || end_sign == side_[k]) continue;
         if (side_[k] != 0 && counts(k)) count(k);
-        else side_[k] = here;
+        else side_[k] = end_sign;
     }
 }
 

@@ -42,9 +42,9 @@ void ErrorNorm::set_tolerances(const VecX& y0, const VecX& y1, double h) {
     for (int k = 0; k < static_cast<int>(rounding_.size()); ++k) {
         // Positions integrate the velocities of the stages, which have the rounding of accelerations over the step.
         const double rate = rounding_[k] + (k < nv ? std::abs(h) * rounding_[nv + k] : 0.0);
-        const double least = std::abs(h) * rate;
-        limited_ |= least > tolerance_[k];
-        tolerance_[k] = std::max(tolerance_[k], least);
+        const double floor = std::abs(h) * rate;
+        limited_ |= floor > tolerance_[k];
+        tolerance_[k] = std::max(tolerance_[k], floor);
     }
     resolves_shares_ = std::abs(h) >= parameters.min_resolved_step;
     share_rounding_ = parameters.stuck_force_rounding * std::abs(h) * system_.w.now.F.cwiseAbs().maxCoeff();

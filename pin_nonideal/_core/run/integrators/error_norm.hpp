@@ -1,4 +1,5 @@
-// Norm of a state error relative to the tolerances, and size of the first step.
+// Norm of a state error relative to the tolerances, and size of the first step. RungeKutta::error combines the norms of
+// the two error estimates of dop853.
 #pragma once
 
 #include <limits>
@@ -49,7 +50,7 @@ public:
     void raise(VecX& rounding, const VecX& dy, const VecX& y);
     // Return the root mean square of dy at y, each coordinate relative to its tolerance.
     double operator()(const VecX& dy, const VecX& y);
-    // Return the same norm for the move of a step's end by a projection. It includes velocities only if stages are not
+    // Return the same norm for the move of a step's end by a projection. The norm includes velocities only if stages are not
     // projected. No component is removed.
     double of_projection(const VecX& dy, const VecX& y0, const VecX& y1, double t, double h);
     // Return a speed relative to the tolerance of the largest velocity, which set_tolerances has set.

@@ -11,13 +11,13 @@ struct GrowthGuardParameters {
     double min_recorded_speed = 1.0;
     double decade = 10.0;  // ratio of two recorded speeds
     // Decades in each half of a growth. Exponential growth takes equal time for both halves. Under a constant force, or
-    // in a motion polynomial in time, the second half takes much longer. It takes much less near a singular position,
-    // or under a force that grows with a power of the speed. Such runs end by themselves as their steps shrink.
+    // in a motion polynomial in time, the second half takes much longer. The second half takes much less near a singular
+    // position, or under a force that grows with a power of the speed. Such runs end by themselves as their steps shrink.
     size_t half = 3;
     // Least and largest ratio of the rates of growth of the two halves that counts as exponential growth.
     double as_fast = 0.8, much_faster = 100.0;
-    // A chaotic motion with a source of energy grows by a power of time. Its last decade takes at least this number of
-    // steps.
+    // A chaotic motion with a source of energy grows by a power of time. The last decade of such a growth takes at least
+    // this number of steps.
     long min_decade_steps = 1000;
     // Each of its decades takes longer than the one before, on average less than this many times as long. Under a
     // constant force a decade takes ten times as long, and near a singular position it is shorter.

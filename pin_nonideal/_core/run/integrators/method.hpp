@@ -18,7 +18,7 @@ struct Method {
     int order = 1, stages = 1;
     const double *A = nullptr, *B = nullptr, *C = nullptr;  // rows of A below the diagonal, in sequence
 
-    // Weights of the error estimate over the stages. They include the rate at the step's end if it is the first stage
+    // Weights of the error estimate over the stages. The weights include the rate at the step's end if it is the first stage
     // of the next step (first same as last). A second, coarser estimate guards against zeros of the first.
     const double *E = nullptr, *E_coarse = nullptr;
     bool first_same_as_last = false;

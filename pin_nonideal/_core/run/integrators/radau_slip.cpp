@@ -112,7 +112,7 @@ void Collocation::evaluate_stages(bool first) {
 void Collocation::find_response() {
     Workspace& w = system_.w;
     const double end = step_.t0 + step_.h;
-    const VecX here = w.now.a, v = w.now.v;
+    const VecX acceleration = w.now.a, v = w.now.v;
     for (const Element& e : elements_) {
         for (int k = 0; k < e.dim; ++k) {
             double& component = w.state.last_direction[e.index][k];
@@ -120,7 +120,7 @@ void Collocation::find_response() {
             component += parameters.perturbation;
             solve_dynamics(system_.p, w, end, v);
             component = before;
-            G_.col(e.row + k) = (w.now.a - here) / parameters.perturbation;
+            G_.col(e.row + k) = (w.now.a - acceleration) / parameters.perturbation;
         }
     }
 }
@@ -273,7 +273,8 @@ double Collocation::error() {
         error_ -= (part * table.at_start[j]) * F_[j];
         speed += table.at_start[j] * sigma_.col(j);
     }
-    // Components of the error along slip directions decay as the directions relax. Filter them by (1 - part df/dv)^-1.
+    // Components of the error along slip directions decay as the directions relax. The filter (1 - part df/dv)^-1 reduces
+    // these components.
     MatX K = part * P_[0] * Q_[0];
     for (size_t at = 0; at < elements_.size(); ++at)
         for (int k = 0; k < elements_[at].dim - 1; ++k) {

@@ -36,12 +36,12 @@ public:
 
     Collocation(Step& step, System& system, ErrorNorm& norm);
 
-    // Compute y1 from y0 and the rate there. The workspace then holds the directions of the step's end.
+    // Compute y1 from y0 and the rate at y0. The workspace then holds the directions of the step's end.
     void advance();
     // Check if the equations of the stages were solved.
     bool is_solved() const { return converged_ || step_.h == 0.0; }
-    // Return the norm of the error estimate, 1 at the tolerance. It uses the rate at the start, which the stages do not
-    // use. Return `failed_error` if the equations of the stages were not solved.
+    // Return the norm of the error estimate, 1 at the tolerance. The estimate uses the rate at the step's start, which the
+    // stages do not use. Return `failed_error` if the equations of the stages were not solved.
     double error();
     // Fastest relaxation rate of a direction at the step's end, times the step.
     double stiffness() const { return stiffness_; }

@@ -29,10 +29,10 @@ RoundingFloor::RoundingFloor(System& system, Stepper& stepper, ErrorNorm& norm, 
 }
 
 // Measure the rounding of the rates by changes of the last digits of the state, which alter every rounding on the way.
-// Opposite changes make opposite differences except for rounding. The second difference has the variance 1 + 1 + 4
-// times that of a rate.
+// Opposite changes of the state give opposite changes of the rates, except for rounding. The second difference of the rates
+// has 1 + 1 + 4 times the variance of the rounding of one rate.
 void RoundingFloor::measure() {
-    const double at = stepper_.t0 + stepper_.h, epsilon = std::numeric_limits<double>::epsilon();
+    const double end = stepper_.t0 + stepper_.h, epsilon = std::numeric_limits<double>::epsilon();
     const RunState kept = system_.w.state;
     const int n = system_.nq + system_.nv;
     const double size = system_.velocity(stepper_.end_rate()).cwiseAbs().maxCoeff();
@@ -50,7 +50,7 @@ void RoundingFloor::measure() {
             probe_ = stepper_.y1;
             probe_.head(n) += side * change_;
             system_.normalize(probe_);
-            system_.derivative(at, probe_, rate_);
+            system_.derivative(end, probe_, rate_);
             system_.w.state = kept;
             noise_ += rate_;
         }
@@ -61,7 +61,7 @@ void RoundingFloor::measure() {
     }
     system_.read(stepper_.y1);
     system_.read_law_states(stepper_.y1);
-    evaluate(system_.p, system_.w, at, system_.q, system_.v);
+    evaluate(system_.p, system_.w, end, system_.q, system_.v);
     system_.w.state = kept;
 }
 

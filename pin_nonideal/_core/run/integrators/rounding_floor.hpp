@@ -26,8 +26,8 @@ public:
     RoundingFloor(System& system, Stepper& stepper, ErrorNorm& norm, Progress& progress, Recording& out);
 
     // Measure the rounding of the rates at intervals, in runs with many steps. Call it after a step that the error
-    // control accepts. The workspace is evaluated at the step's end before and after. The norm raises the tolerance by
-    // the rounding, so that noise alone does not shorten the next step.
+    // control accepts. The workspace is evaluated at the step's end before and after the call. The norm raises the tolerance
+    // by the rounding, so that noise alone does not shorten the next step.
     void check_step();
 
 private:

@@ -18,7 +18,7 @@ struct StepControlParameters {
     double safety = 0.65, retry_safety = 0.9;
     double min_step_ratio = 0.2, max_step_ratio = 10.0;  // least and largest ratio of two successive steps
     // A step is shortened by `detour` if an evaluation is nearer to a singular position than `clearance` times the
-    // length of the step's path. Its evaluations are then at other positions.
+    // length of the step's path. The evaluations of the shortened step are at other positions.
     double clearance = 0.04, detour = 0.85;
     int max_detours = 3;  // maximum number of such steps in a row
 };

@@ -34,7 +34,7 @@ public:
     // Store data from the projection of an accepted step's end, for methods that use it.
     void learn();
 
-    // Interpolant of the states over the step, which needs the rate at the step's end. Leaves the workspace at other
+    // Interpolant of the states over the step, which needs the rate at the step's end. This leaves the workspace at other
     // states.
     void make_interpolant();
     void interpolate(double part, VecX& y) const;

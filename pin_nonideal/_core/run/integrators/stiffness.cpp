@@ -35,7 +35,7 @@ double StiffnessGuard::stage_rate() const {
 
 // Return the derivative of the rate along a unit direction. `force` receives that of the forces.
 VecX StiffnessGuard::difference(double relative, const VecX& direction, VecX& force) {
-    const double at = stepper_.t0 + stepper_.h;
+    const double end = stepper_.t0 + stepper_.h;
     const int n = static_cast<int>(direction.size());
     const double step = relative * (1.0 + stepper_.y1.head(n).cwiseAbs().maxCoeff());
     VecX there[2], forces[2];
@@ -43,7 +43,7 @@ VecX StiffnessGuard::difference(double relative, const VecX& direction, VecX& fo
         probe_ = stepper_.y1;
         probe_.head(n) += (side == 0 ? step : -step) * direction;
         probe_rate_ = VecX::Zero(system_.ny);
-        system_.derivative(at, probe_, probe_rate_);
+        system_.derivative(end, probe_, probe_rate_);
         there[side] = probe_rate_.head(n);
         forces[side] = system_.w.now.F;
         if (system_.p.has_laws()) forces[side] += system_.w.now.C;
@@ -97,8 +97,8 @@ void StiffnessGuard::check_step() {
 }
 
 void StiffnessGuard::check_stability_limit() {
-    const double border = stepper_.method.stability, size = stepper_.h, at = stepper_.t0 + size;
-    if (!(options_.end() - at > max_steps_ * size)) return;
+    const double border = stepper_.method.stability, size = stepper_.h, end = stepper_.t0 + size;
+    if (!(options_.end() - end > max_steps_ * size)) return;
     if (size * stage_rate() < parameters.near_border * border) {
         if (++progress_.quiet_steps == parameters.quiet_steps) progress_.stiff_steps = 0;
         return;
@@ -108,12 +108,12 @@ void StiffnessGuard::check_stability_limit() {
     progress_.stiff_steps = 0;
     const FastestMode mode = mode_here();
     if (size * mode.rate() > parameters.near_border * border && mode.decays())
-        throw Failure(Failure::Kind::stiff, at, {mode.dof}, mode.rate());
+        throw Failure(Failure::Kind::stiff, end, {mode.dof}, mode.rate());
 }
 
 void StiffnessGuard::estimate_remaining_time() {
     next_estimate_steps_ = 2 * steps_;
-    const double size = stepper_.h, at = stepper_.t0 + size, left = options_.end() - at;
+    const double size = stepper_.h, end = stepper_.t0 + size, left = options_.end() - end;
     const double so_far = std::chrono::duration<double>(Clock::now() - start_time_).count();
     if (so_far / static_cast<double>(steps_) * (left / size) < parameters.long_time) return;
     const Counters kept = system_.w.counters;  // the instant depends on the clock, so the evaluations are not counted
@@ -125,7 +125,7 @@ void StiffnessGuard::estimate_remaining_time() {
                       : radians > parameters.part_of_period && mode.rate() * left > parameters.many_radians;
     if (!follows) return;
     next_estimate_steps_ = parameters.no_estimate_steps;
-    options_.hint(at, mode.dof, mode.rate(), mode.decays());
+    options_.hint(end, mode.dof, mode.rate(), mode.decays());
 }
 
 void StiffnessGuard::require_time_steps(double size) {

@@ -25,7 +25,7 @@ struct StiffnessGuardParameters {
     double difference_step = 1e-8;  // relative step of differences: root of the unit roundoff
     int power_passes = 20;          // passes of the power iteration
     // Shorter relative step, and minimum ratio of the rates by both steps. The rate of a jump, as of a load whose
-    // contact point changes, grows as the step shrinks. It vanishes if the step does not reach the jump.
+    // contact point changes, grows as the step shrinks. This rate vanishes if the step does not reach the jump.
     double shorter_step = 1e-9, same_rate = 0.5;
     // Step count at which the remaining time is first estimated, doubled each time, and a step count past all runs.
     long first_estimate_steps = 500, no_estimate_steps = 1L << 62;

@@ -118,9 +118,9 @@ void System::project_and_evaluate(double t, VecX& y, VecX& dy) {
         kinetic_energy(p.mechanism, w.now.terms, v) + potential_energy(p.mechanism, w.now.terms) - before;
 }
 
-// Call `act` at the end of a time step whose modes may allow no motion. If they allow none, the friction of the step
-// determines the motion: always with `may_lack_motion`, else only if the solver found no motion of contacts, which proves
-// nothing. Return false if the friction of the step determines the motion.
+// Call `act` at the end of a time step whose modes may allow no motion. If the laws allow no motion, the friction of the
+// step determines the motion: always with `may_lack_motion`, else only if the solver found no motion of contacts, which
+// proves nothing. Return false if the friction of the step determines the motion.
 template <class Act>
 bool System::attempt_motion(double t, bool may_lack_motion, const Act& act) {
     const auto failure = attempt({Failure::Kind::paradox, Failure::Kind::not_converged}, act);

@@ -4,10 +4,9 @@
 // watch has two entries per friction element, whose rates the stages store:
 // - Sticking element: the rate is force / limit. Step control then resolves a load that changes while nothing moves.
 // The stages show if a limit was passed.
-// - Slipping element: the rates are the slip speed and the derivative of the slip speed. They show if slip came to rest
-// inside the step.
-// One entry per gap follows. Its rate is the normal force while the gap is closed. If redundant contacts share the
-// force, it is +1 while nonnegative loads exist, else -1.
+// - Slipping element: the rates are the slip speed and the derivative of the slip speed. The stages show if slip came to
+// rest inside the step. One entry per gap follows. The rate of this entry is the normal force while the gap is closed. If
+// redundant contacts share the force, it is +1 while nonnegative loads exist, else -1.
 //
 // q is integrated in ambient coordinates (a quaternion as four numbers). The right-hand side extends smoothly off the
 // unit sphere, so the order is kept. Unit lengths are restored at the step's end.

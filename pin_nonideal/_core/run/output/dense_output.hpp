@@ -13,8 +13,8 @@ struct DenseOutput {
     std::vector<double> times;   // start and end of each step
     std::vector<double> states;  // y without watch at each point, step by step
     std::vector<std::int8_t> modes;  // modes of the elements over each step
-    // Slip directions of all elements at each point, if an element has several directions. A step that did not solve
-    // for them stores the directions at its end.
+    // Slip directions of all elements at each point, if an element has several directions. A step that did not solve for
+    // slip directions stores the directions at the step's end.
     std::vector<double> directions;
     std::vector<std::int8_t> sought;  // whether the step solved for the directions
     std::vector<double> torque;  // torque held over each step, NaN if none, empty if the run holds none
@@ -30,7 +30,7 @@ public:
 
     DenseRecorder(System& system, Stepper& stepper, bool holds_torque, DenseOutput& out);
 
-    // Record the step just taken. Leaves the workspace at other states.
+    // Record the step just taken. This leaves the workspace at other states.
     void step(double numerical_energy);
     // Record a step of time stepping as a straight line between both states.
     void straight(double t0, const VecX& y0, double t1, const VecX& y1, double numerical_energy);

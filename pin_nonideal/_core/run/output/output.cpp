@@ -25,11 +25,11 @@ void Output::begin() {
     if (apart > 0.0) recorder_.reserve(static_cast<size_t>(std::min(options_.duration / apart + 2.0, max_reserved_samples)));
 }
 
-void Output::emit(double at, const VecX& state, bool evaluated) {
-    if (!out_.t.empty() && (jumps_ ? at < out_.t.back() : at <= out_.t.back())) return;
+void Output::emit(double time, const VecX& state, bool evaluated) {
+    if (!out_.t.empty() && (jumps_ ? time < out_.t.back() : time <= out_.t.back())) return;
     jumps_ = false;
     const GapState& gaps = progress_.gaps;
-    recorder_.sample(at, state, {progress_.impact_energy, progress_.numerical_energy}, evaluated,
+    recorder_.sample(time, state, {progress_.impact_energy, progress_.numerical_energy}, evaluated,
                      gaps.current ? &gaps.skipped : nullptr);
 }
 
@@ -84,32 +84,32 @@ void Output::keep_time_step(double from, const VecX& y_from) {
     if (options_.record.dense) dense_.straight(from, y_from, progress_.t, progress_.y, progress_.numerical_energy);
 }
 
-void Output::emit_between(double at) {
+void Output::emit_between(double time) {
     stepper_.make_interpolant();
-    stepper_.interpolate((at - stepper_.t0) / stepper_.h, sample_);
+    stepper_.interpolate((time - stepper_.t0) / stepper_.h, sample_);
     const bool redundant = w.now.rows.redundant;
     if (redundant) choice_ = w.now.rows;
     if (!w.now.rows.blocks.empty()) {
         system_.read(sample_);
-        project(p, w, at, system_.q, system_.v);
+        project(p, w, time, system_.q, system_.v);
         system_.write(sample_);
     }
     if (!w.now.rows.blocks.empty() || options_.record.evaluates() || p.constraints > 0) {
-        progress_.configured_t = at;
+        progress_.configured_t = time;
         progress_.configured_y.head(system_.ns) = sample_.head(system_.ns);
     }
     reset_slip_directions(w);
-    emit(at, sample_, false);
-    if (redundant) choose_as_before(at);
+    emit(time, sample_, false);
+    if (redundant) choose_as_before(time);
 }
 
 // Restore the run's choice of rows. A sample chooses rows that are long at its own state.
-void Output::choose_as_before(double at) {
+void Output::choose_as_before(double time) {
     const bool same = choice_.active == w.now.rows.active;
     static_cast<RowChoice&>(w.now.rows) = choice_;
     if (same) return;
     system_.read(sample_);
-    configure(p, w, at, system_.q, system_.v);
+    configure(p, w, time, system_.q, system_.v);
 }
 
 void Output::inside_step(std::optional<double> between) {

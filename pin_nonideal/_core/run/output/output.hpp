@@ -33,10 +33,10 @@ public:
     void configured_now();
 
 private:
-    void emit(double at, const VecX& state, bool evaluated);
-    // Record a sample inside the step just taken, from its interpolant. Leaves the workspace at the sample.
-    void emit_between(double at);
-    void choose_as_before(double at);
+    void emit(double time, const VecX& state, bool evaluated);
+    // Record a sample inside the step just taken, from its interpolant. This leaves the workspace at the sample.
+    void emit_between(double time);
+    void choose_as_before(double time);
     // Call `visit`, which may leave the workspace at any state of the step just taken, then restore the workspace at the
     // step's end.
     template <class Visit>

@@ -158,7 +158,7 @@ def test_a_cylinder_spins_in_a_groove():
 
 
 def test_a_wheel_that_spins_upright_rolls_straight():
-    """On both rims, for 10 m."""
+    """A wheel on both rims rolls straight for 10 m."""
     q = state(pin.rpy.rpyToMatrix(-0.5 * np.pi, 0.0, 0.0), RADIUS)
     run = pn.simulate(cylinder(length=0.03, mu=0.8), 5.0, q=q, v=[2.0, 0, 0, 0, 0, 2.0 / RADIUS])
     assert run.q[-1, 0] == pytest.approx(10.0, abs=1e-8)
@@ -240,7 +240,7 @@ def dropped(kind, seed):
 @pytest.mark.parametrize("kind", SHAPES)
 @pytest.mark.parametrize("seeds", ranges(6, 12, 300))
 def test_dropped_at_random(kind, seeds):
-    """No other run fails, hangs or penetrates; every sixth run is repeated bit by bit."""
+    """No run beside the paradoxes fails, hangs or penetrates; every sixth run is repeated bit by bit."""
     for seed in seeds:
         if (kind, seed) in PARADOX:
             continue

@@ -27,7 +27,7 @@ BALANCE = 1e-9
 
 
 class Pieces:
-    """Polynomials of t - time, one after each time; the first value before the first, the last one held."""
+    """Polynomials in t - time, one after each time; constant before the first and after the last one."""
 
     def __init__(self, times, pieces, last):
         self.times, self.pieces, self.last = np.asarray(times, float), pieces, last
@@ -45,7 +45,7 @@ class Pieces:
 
 
 def times(rng, count, width):
-    """Break times within `width` behind an instant drawn by lot."""
+    """Break times within `width` after a random instant."""
     inner = np.cumsum(rng.uniform(0.3, 1.0, count - 1))
     return rng.uniform(0.2, 2.0) + width * np.concatenate([[0.0], inner / inner[-1]])
 
@@ -208,7 +208,7 @@ def test_what_rests_is_moved_by_a_spline_far_in_its_future(ends):
 
 
 def test_a_jump_throws_what_rests_on_the_cart():
-    """A box on a table that is lifted at once at 1 m/s goes with it; let go of, it flies."""
+    """A ball on a table takes the table's jump to 1 m/s, and flies when the table stops."""
     model = pin.Model()
     table = model.addJoint(0, pin.JointModelPZ(), pin.SE3.Identity(), "table")
     model.appendBodyToJoint(table, pin.Inertia(5.0, np.zeros(3), np.eye(3)), pin.SE3.Identity())

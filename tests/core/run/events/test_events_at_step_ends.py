@@ -43,7 +43,7 @@ def spins_in_a_ball_joint():
 
 
 def turns_back():
-    """Thrown up a slope that does not hold it: it rests for no time, and slides back."""
+    """A block that slides up a steep slope rests for an instant only, and slides back."""
     model = point_mass("X", gravity=(-8.0, 0.0, 0.0))
     return model, {"laws": [pn.JointFriction("x", coulomb=2.0)], "v0": [1.5]}
 

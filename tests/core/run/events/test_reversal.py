@@ -25,7 +25,7 @@ ROCKS = np.array([0.02, -0.02, 0.0, 0.4, 0.4, 0.0, -0.848172, 0.0, 0.0, 0.0])
 
 
 def limbs():
-    """A trunk on two feet with limbs of one hinge each, drawn by lot."""
+    """A trunk on two feet with random limbs of one hinge each."""
     draw = np.random.default_rng(99)
     model, contacts, laws = empty(), [], []
     trunk = body(model, 0, pin.JointModelFreeFlyer(), "trunk", 2.0, inertia=0.05 * np.eye(3))
@@ -59,7 +59,7 @@ def limbs():
 @pytest.mark.parametrize("method", ["dop853", "dopri5"])
 @pytest.mark.parametrize("speed", [0.3, 0.55])
 def test_rocks_back(method, speed):
-    """Beside fixed steps, and by its ledger."""
+    """The run agrees with fixed steps, and its energy ledger closes."""
     scene = limbs()
     run = pn.simulate(scene, 0.15, q=Q, v=speed * ROCKS, method=method, record="energy")
     fixed = pn.simulate(scene, 0.15, q=Q, v=speed * ROCKS, method="rk4", dt=1e-4)

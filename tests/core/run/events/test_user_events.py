@@ -39,7 +39,7 @@ def event(function, terminal=False, direction=0):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_zeros_of_a_parabola(method):
-    """Where the height passes 1 m, upward and downward: closed form to 1e-12 s, by every method."""
+    """The height passes 1 m upward and downward at the closed-form times, to 1e-12 s, by every method."""
     run = pn.simulate(falling(), 1.2, method=method, events=[lambda t, q, v: q[0] - 1.0], **METHODS[method])
     root = np.sqrt(25.0 - 2.0 * G)
     expected = np.array([(5.0 - root) / G, (5.0 + root) / G])
@@ -52,7 +52,7 @@ def test_zeros_of_a_parabola(method):
 
 
 def test_against_the_period_of_a_pendulum():
-    """K(sin 1) of the complete elliptic integral: passes its lowest point at odd quarters of the period."""
+    """A pendulum passes its lowest point at odd quarters of the period, by the elliptic integral K(sin 1)."""
     from scipy.special import ellipk
 
     quarter = ellipk(np.sin(1.0) ** 2) / np.sqrt(G)
@@ -116,7 +116,7 @@ def test_a_value_that_starts_at_zero_is_no_event():
 
 
 def test_beside_events_of_friction():
-    """A block comes to rest at 0.5 s at 0.25 m; both are met, and the event of friction stays where it is."""
+    """A block comes to rest at 0.5 s at 0.25 m; both user events are found beside the friction event."""
     model = pin.Model()
     model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "slide")
     model.appendBodyToJoint(1, pin.Inertia(1.0, np.zeros(3), np.eye(3)), pin.SE3.Identity())

@@ -1,4 +1,4 @@
-"""Speeds that grow without bound end a run by name; no fall, motor or pendulum does."""
+"""Speeds that grow without bound end a run with a named error; falls, motors and pendulums do not."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def slide(**parts):
 
 @pytest.mark.parametrize("method", ADAPTIVE)
 def test_an_unstable_spring_is_named_with_its_growth(method):
-    """x'' = 100 x - 0.1 x': exp(9.95 t)."""
+    """x'' = 100 x - 0.1 x' grows as exp(9.95 t)."""
     scene = slide(forces=[pn.UserForce(lambda t, q, v: 100.0 * q - 0.1 * v)], q0=[1e-3])
     with pytest.raises(DivergenceError) as caught:
         pn.simulate(scene, 100.0, method=method)
@@ -55,7 +55,7 @@ def late_impedance(model, delay, stiffness, damping, period=1e-3):
 
 
 def test_an_impedance_that_is_late_is_named():
-    """The joints of a Panda, held stiffly by measurements that are 5 ms old."""
+    """A stiff controller holds the joints of a Panda by measurements that are 5 ms old."""
     panda = pn.load("panda_friction")
     model = panda.model
     M = pin.crba(model, model.createData(), panda.q0)

@@ -12,8 +12,8 @@ import pin_nonideal as pn
 
 from ....support.standing import ball, balls, planar_state, plate, star
 
-# Error of the default tolerance over several tenths of a second, and of the oracle, which starts at a finite
-# speed and integrates at 1e-9.
+# Error of a run at the default tolerance over several tenths of a second, and of the oracle: the oracle
+# starts at a finite speed and has the tolerance 1e-9.
 REACHED = 3e-8
 # Evaluations from slip onset until an explicit method is stable again.
 ONSET = 100
@@ -109,7 +109,7 @@ def test_other_methods_begin_as_well(method):
 
 
 def test_slow_slip_that_never_rests_is_followed_in_long_steps():
-    """A plate dragged by a spring whose end goes round: friction turns its slip within a millisecond."""
+    """A spring whose end moves in a circle drags a plate: friction turns the slip within a millisecond."""
     speed, rate, stiffness, damping = 2e-3, 2.0, 300.0, 30.0
     limit = 0.3 * 10.0 * 9.81
 

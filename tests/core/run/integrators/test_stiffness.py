@@ -68,7 +68,7 @@ def test_a_stiff_spring_that_is_damped(damping_ratio):
 
 
 def test_the_stiff_joint_of_several():
-    """The finger of an arm, whose inertia is a millionth of its file's damping; a loop at the other end."""
+    """The inertia of a finger is a millionth of its damping; the other end of the arm has a loop."""
     model, joint = empty(), 0
     for k, mass in enumerate([2.0, 1.0, 0.5]):
         place = pin.SE3(np.eye(3), np.array([0.0, 0.0, -0.4 if k else 0.0]))

@@ -1,4 +1,4 @@
-"""Time stepping is of second order between events, and keeps what the motion keeps."""
+"""Time stepping is of second order between events, and keeps the invariants of the motion."""
 
 from __future__ import annotations
 

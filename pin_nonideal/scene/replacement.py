@@ -1,4 +1,4 @@
-"""New scenes from a scene: with other parts, and with its robot on the ground."""
+"""Replacement of parts of a scene, and the configuration with its robot on the ground."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ UNCHANGED = UnchangedType()
 def parts_after(
     compiled: CompiledScene, new: Table, added: Table, remove: Iterable[str]
 ) -> dict[str, tuple[object, ...]]:
-    """Descriptions of a scene after a change, by kind.
+    """Return the descriptions of a scene after a replacement, by kind.
 
     Args:
         compiled: the scene before.
-        new: lists that replace present ones, by kind; None keeps a list.
+        new: lists that replace the lists of the scene, by kind; None keeps a list.
         added: lists that are appended, by kind.
         remove: names of descriptions to leave out.
 
@@ -81,10 +81,10 @@ def parts_of_replacement(
     """Return the parts of a scene, as `copying.parts_of` does, after `Scene.replace`.
 
     Args:
-        parts: parts of the scene before.
-        compiled: the compiled scene before.
-        states: states of the scene before.
-        lists: lists that replace present ones, by kind; None keeps a list.
+        parts: parts of the scene before the replacement.
+        compiled: the compiled scene before the replacement.
+        states: states of the scene before the replacement.
+        lists: lists that replace the lists of the scene, by kind; None keeps a list.
         added: lists that are appended, by kind.
         remove: names of descriptions to leave out.
         others: new actuation, or UNCHANGED; new "q0", "v0" and "name", or None for the present ones.
@@ -108,11 +108,11 @@ def parts_of_replacement(
 
 
 def held_entries(model: Model, held: Held, q0: State | None, v0: State | None) -> Held:
-    """Entries of the initial state that are named after a change.
+    """Return the entries of the initial state that its user names, after a replacement.
 
     Args:
         model: pinocchio.Model.
-        held: those before.
+        held: named entries before the replacement.
         q0: the new initial configuration, or None.
         v0: the new initial velocity, or None.
     """

@@ -30,9 +30,9 @@ class Rest:
 
     Attributes:
         rests: whether forces within all limits balance the configuration.
-        margin: 1 minus the smallest common factor of all friction limits for which forces balance. It is 1 if
-            no friction is needed, 0 if friction just suffices, negative if larger limits are needed, and -inf
-            if no friction suffices.
+        margin: 1 minus the smallest common factor of all friction limits for which forces balance. The margin
+            is 1 if no friction is needed, 0 if friction just suffices, negative if larger limits are needed,
+            and -inf if no friction suffices.
         friction: force of each friction element by name, along its slip directions, for the smallest factor
             [N or N m]; empty if no friction suffices. The friction of a pair of shapes is the sum of the
             forces at its points, along the slip directions of the first loaded point.
@@ -74,11 +74,12 @@ class Rest:
 def rest(scene: Scene, q: State | None = None, tau: State | None = None, *, t: float = 0.0) -> Rest:
     """Check if friction and contact forces can hold a scene at rest, and compute the margin.
 
-    The unknowns are multipliers lam, friction forces f and the smallest factor k of the static limits. They
-    satisfy F + A^T lam + D^T f = 0 and |f_e| <= k limit_e for each friction element e. Contacts press:
-    lam >= 0, and lam = 0 for open contacts. Limits of contacts depend on the unknown lam. Load-dependent
-    limits of joints are computed from the reactions of the sticking scene, with least norm if they are not
-    unique. Newton's method finds k; each step is one second-order cone program, solved by Clarabel.
+    The unknowns are multipliers lam, friction forces f and the smallest factor k of the static limits. The
+    unknowns satisfy F + A^T lam + D^T f = 0 and |f_e| <= k limit_e for each friction element e. Contacts
+    press: lam >= 0, and lam = 0 for open contacts. Limits of contacts depend on the unknown lam.
+    Load-dependent limits of joints are computed from the reactions of the sticking scene, with least norm if
+    they are not unique. Newton's method finds k; each step is one second-order cone program, solved by
+    Clarabel.
 
     Args:
         scene: the scene.
