@@ -125,7 +125,7 @@ def _resultant(scene: Scene, q: Array, t: float, forces: list[Array], own: slice
     loaded = [k for k, force in enumerate(forces) if force.any()]
     if len(loaded) < 2:
         return forces[loaded[0] if loaded else 0]
-    axes = slip_axes(scene, q, t, [own.start + k for k in loaded])
+    axes = slip_axes(compiled_scene(scene), q, t, [own.start + k for k in loaded])
     force = np.einsum("ki,kij->j", [forces[k] for k in loaded], axes)
     return np.asarray(axes[0] @ force)
 
