@@ -20,7 +20,7 @@ from pin_nonideal.loading.urdf.loop_tolerance import remove_dependent_rows
 from pin_nonideal.loading.urdf.xml import quote_names
 from pin_nonideal.loading.yaml.assembly import scene_arguments
 from pin_nonideal.loading.yaml.initial_state import Start, held_entries
-from pin_nonideal.scene.scene import Scene, with_origin
+from pin_nonideal.scene.scene import Scene, compiled_scene, with_origin
 from pin_nonideal.states.held import Held
 from pin_nonideal.types import Table
 from pin_nonideal.validation import flag
@@ -112,7 +112,7 @@ def load(
     _warn_of_open_loops(arguments, loaded.robot.open_loops)
     arguments["terms"] = terms
     scene = Scene(**arguments, assembly_tolerance=assembly_tolerance)
-    parts = remove_dependent_rows(scene, assembly_tolerance)
+    parts = remove_dependent_rows(compiled_scene(scene), assembly_tolerance)
     if parts is not None:
         arguments.update(model=parts.model, constraints=parts.constraints, q0=parts.q)
         arguments["notes"] = (*scene.notes, parts.note)

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from pin_nonideal.atomic_files import file_path, whole_file
+from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.compilation.delay import DelayedTorque
 from pin_nonideal.compilation.lowering import lower
 from pin_nonideal.compilation.resolver import Resolver
@@ -103,7 +104,7 @@ class Saver:
             "version": _version(),
             "scene": scene.name,
             "origin": scene_origin(scene).table,
-            "fingerprint": fingerprint(scene),
+            "fingerprint": fingerprint(compiled_scene(scene)),
             "options": {**vars(options), "atol": options.atol.tolist()},
             "interval": self.interval,
             "notes": list(notes),
@@ -179,20 +180,21 @@ def _version() -> list[str]:
     return [__version__, core.state_layout]
 
 
-def fingerprint(scene: Scene) -> str:
+def fingerprint(compiled: CompiledScene) -> str:
     """Return a digest of a compiled scene: model, rows, laws, forces and actuation as numbers.
 
     All user functions count as equal.
 
     Args:
-        scene: the scene.
+        compiled: the compiled scene.
     """
-    digest = hashlib.sha256((scene.model.saveToString() + scene.terms).encode())
-    transcript: Any = _Transcript(core.Builder(scene.model), digest)
-    lower(compiled_scene(scene).spec, transcript, Resolver(scene.model, scene.q0))
-    control = delayed_control(scene.actuation)
+    model, spec = compiled.model, compiled.spec
+    digest = hashlib.sha256((model.saveToString() + spec.terms).encode())
+    transcript: Any = _Transcript(core.Builder(model), digest)
+    lower(spec, transcript, Resolver(model, compiled.q0))
+    control = delayed_control(spec.actuation)
     if control is not None:  # the builder has no delay
-        initial = initial_torque(control, scene.model).tolist()
+        initial = initial_torque(control, model).tolist()
         digest.update(json.dumps([control.delay_in_samples, initial]).encode())
     return digest.hexdigest()
 
@@ -227,14 +229,14 @@ def _json_value(x: object) -> object:
     return "a function" if callable(x) else x
 
 
-def refuse_other_scene(held: Checkpoint, scene: Scene, path: Path) -> None:
+def refuse_other_scene(held: Checkpoint, compiled: CompiledScene, name: str, path: Path) -> None:
     """Check that a scene is the scene of the checkpoint.
 
     Raises:
         InputError: model, rows, laws or forces differ.
     """
-    if fingerprint(scene) != held.fingerprint:
+    if fingerprint(compiled) != held.fingerprint:
         raise InputError(
             f'resume: the scene must be the one that "{path}" was written with ("{held.scene}"); '
-            f'"{scene.name}" differs from it in its model, constraints, laws, contacts, forces or actuation'
+            f'"{name}" differs from it in its model, constraints, laws, contacts, forces or actuation'
         )

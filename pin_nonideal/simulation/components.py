@@ -1,6 +1,6 @@
 """Decoupled components of a scene: mechanisms without a common joint, row or load.
 
-Each component is a separate scene. The components of a scene are computed once and cached.
+Each component is a separate compiled scene. The components of a scene are computed once and cached.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.description.actuation import HoldPosition
 from pin_nonideal.description.constraints import (
     Distance,
@@ -25,7 +26,6 @@ from pin_nonideal.description.constraints import (
 )
 from pin_nonideal.description.forces import JointSpring, SpringDamper, Wrench
 from pin_nonideal.description.laws import Drag, JointFriction, SigmoidFriction
-from pin_nonideal.scene.scene import Scene, compiled_scene, scene_origin
 from pin_nonideal.states.parsing import named_configuration
 from pin_nonideal.types import Model, Table
 
@@ -43,43 +43,42 @@ class Component:
     """A mechanism of a scene that is decoupled from the others.
 
     Attributes:
-        scene: the mechanism as a separate scene.
+        compiled: the mechanism as a separate compiled scene.
         q: indices of its coordinates in the configuration of the whole scene, (nq,).
         v: indices of its coordinates in the velocity of the whole scene, (nv,).
         elements: indices of its friction elements in the whole scene, (ne,).
         works: indices of its work columns in the whole scene.
     """
 
-    scene: Scene
+    compiled: CompiledScene
     q: Indices
     v: Indices
     elements: Indices
     works: Indices
 
 
-def components(scene: Scene) -> list[Component]:
+def components(compiled: CompiledScene) -> list[Component]:
     """Return the decoupled mechanisms of a scene with dry friction; empty if there is only one.
 
     Scenes with contacts, states of laws or global descriptions count as one mechanism.
 
     Args:
-        scene: the whole scene.
+        compiled: the compiled whole scene, which holds the components.
     """
-    parts: list[Component] | None = scene.__dict__.get("_components")
+    parts: list[Component] | None = compiled.__dict__.get("_components")
     if parts is None:
-        parts = scene.__dict__["_components"] = _components(scene)
+        parts = compiled.__dict__["_components"] = _components(compiled)
     return parts
 
 
-def _components(scene: Scene) -> list[Component]:
-    model, program = scene.model, compiled_scene(scene).program
-    held = scene.actuation
+def _components(compiled: CompiledScene) -> list[Component]:
+    model, spec, held = compiled.model, compiled.spec, compiled.spec.actuation
     by_position = isinstance(held, HoldPosition) and isinstance(held.kp, float) and isinstance(held.kd, float)
-    descriptions = [*scene.constraints, *scene.laws, *scene.forces]
+    descriptions = [*spec.constraints, *spec.laws, *spec.forces]
     whole = (
-        not scene.element_names
-        or program.states
-        or scene.contacts
+        not compiled.elements.names
+        or compiled.program.states
+        or spec.contacts
         or not (held is None or by_position)
         or any(type(one) not in LOCAL_DESCRIPTIONS for one in descriptions)
         or sum(parent == 0 for parent in list(model.parents)[1:]) < 2
@@ -87,7 +86,7 @@ def _components(scene: Scene) -> list[Component]:
     if whole:
         return []
     tree = _trees(model)
-    anchors = dict(zip(scene.constraint_slices, scene.constraints, strict=False))
+    anchors = dict(zip(compiled.multipliers.slices, spec.constraints, strict=False))
     touched = [_tree_roots(one, model, tree, anchors) for one in descriptions]
     group = {root: root for root in tree[1:]}
     for roots in touched:
@@ -97,7 +96,11 @@ def _components(scene: Scene) -> list[Component]:
         return []
     own = [group[min(roots)] for roots in touched]
     return [
-        _component(scene, descriptions, own, [group.get(root) for root in tree], of)
+        _component(
+            compiled,
+            [joint for joint, root in enumerate(tree) if group.get(root) == of],
+            [one for one, each in zip(descriptions, own, strict=True) if each == of],
+        )
         for of in sorted(set(group.values()))
     ]
 
@@ -126,31 +129,20 @@ def _tree_roots(one: Any, model: Model, tree: Sequence[int], anchors: Table) -> 
     return roots - {0}
 
 
-def _component(
-    scene: Scene, descriptions: Sequence[Any], own: Sequence[int], group: Sequence[int | None], of: int
-) -> Component:
-    joints = [joint for joint, each in enumerate(group) if each == of]
-    model, q, v = _separate_model(scene.model, joints)
-    of_component = [one for one, each in zip(descriptions, own, strict=True) if each == of]
-    held = scene.actuation
+def _component(compiled: CompiledScene, joints: Sequence[int], own: Sequence[Any]) -> Component:
+    """Return the component of some joints and of the descriptions that act on them."""
+    model, q, v = _separate_model(compiled.model, joints)
+    spec, held = compiled.spec, compiled.spec.actuation
     if isinstance(held, HoldPosition) and held.q is not None:
-        held = replace(held, q=named_configuration(scene.model, held.q, scene.q0, "q")[q])
-    component_scene = Scene(
-        model,
-        constraints=[one for one in of_component if any(one is each for each in scene.constraints)],
-        laws=[one for one in of_component if any(one is each for each in scene.laws)],
-        forces=[one for one in of_component if any(one is each for each in scene.forces)],
-        actuation=held,
-        q0=scene.q0[q],
-        v0=scene.v0[v],
-        name=scene.name,
-        terms=scene.terms,
-        assembly_tolerance=scene_origin(scene).assembly_tolerance,
-    )
-    elements = [scene.element_names.index(name) for name in component_scene.element_names]
-    powers = compiled_scene(scene).program.power_names
-    works = [powers.index(name) for name in compiled_scene(component_scene).program.power_names]
-    return Component(component_scene, q, v, np.array(elements, dtype=np.intp), np.array(works, dtype=np.intp))
+        held = replace(held, q=named_configuration(compiled.model, held.q, compiled.q0, "q")[q])
+    parts: Table = {
+        kind: tuple(one for one in getattr(spec, kind) if any(one is each for each in own))
+        for kind in ("constraints", "laws", "forces")
+    }
+    part = CompiledScene(model, compiled.q0[q], spec._replace(**parts, actuation=held))
+    elements = [compiled.elements.names.index(name) for name in part.elements.names]
+    works = [compiled.program.power_names.index(name) for name in part.program.power_names]
+    return Component(part, q, v, np.array(elements, dtype=np.intp), np.array(works, dtype=np.intp))
 
 
 def _separate_model(model: Model, joints: Sequence[int]) -> tuple[Model, Indices, Indices]:

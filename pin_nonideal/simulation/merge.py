@@ -8,8 +8,8 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
+from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.core_loader import core
-from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.trajectory.dense_output import DenseOutput, dense_output, inside_steps
 from pin_nonideal.types import Array, Table
 
@@ -30,7 +30,7 @@ class MergedEvent(NamedTuple):
 
 
 def merge_outcomes(
-    scene: Scene,
+    compiled: CompiledScene,
     parts: Sequence[Component],
     outcomes: Sequence[core.Outcome],
     options: RunOptions,
@@ -41,7 +41,7 @@ def merge_outcomes(
     Without a grid, samples lie at the steps of the component with the most steps.
 
     Args:
-        scene: the whole scene.
+        compiled: the compiled whole scene.
         parts: components of the scene.
         outcomes: outcome of each component, with interpolants.
         options: options of the run.
@@ -67,25 +67,27 @@ def merge_outcomes(
             np.array([e.time for e in events]),
         ]
     t = np.unique(np.concatenate(times or [np.zeros(0)]))
-    motion = _motion(scene, parts, dense, t)
-    joined = SimpleNamespace(**_samples(scene, options, t, *motion))
+    motion = _motion(compiled, parts, dense, t)
+    joined = SimpleNamespace(**_samples(compiled, options, t, *motion))
     for name in COUNTERS:
         setattr(joined, name, sum(getattr(one, name) for one in outcomes))
     joined.rounding = max((one.rounding for one in outcomes), default=0.0)
     joined.events, joined.stopped = events, stopped
     if options.dense:
-        _join_dense(scene, parts, dense, joined)
+        _join_dense(compiled, parts, dense, joined)
     return cast(core.Outcome, joined)
 
 
-def _motion(scene: Scene, parts: Sequence[Component], dense: Sequence[DenseOutput], t: Array) -> Motion:
+def _motion(
+    compiled: CompiledScene, parts: Sequence[Component], dense: Sequence[DenseOutput], t: Array
+) -> Motion:
     """Return states of the whole scene at given times, with modes, slip directions and energy moved.
 
     Directions have no columns if every element slips along one direction.
     """
-    nq, nv, ne = scene.model.nq, scene.model.nv, len(scene.element_names)
+    nq, nv, ne = compiled.model.nq, compiled.model.nv, len(compiled.elements.names)
     work = dense[0].states.shape[2] - parts[0].q.size - parts[0].v.size if dense else 0
-    columns = len(compiled_scene(scene).program.power_names) if work else 0
+    columns = len(compiled.program.power_names) if work else 0
     # One row per coordinate, so that each component fills contiguous times.
     states, moved = np.zeros((nq + nv + columns, t.size)), np.zeros(t.size)
     modes, sought = np.zeros((2, ne, t.size), dtype=np.int8)
@@ -112,7 +114,7 @@ def _motion(scene: Scene, parts: Sequence[Component], dense: Sequence[DenseOutpu
 
 
 def _samples(
-    scene: Scene,
+    compiled: CompiledScene,
     options: RunOptions,
     t: Array,
     states: Array,
@@ -122,7 +124,7 @@ def _samples(
     moved: Array,
 ) -> Table:
     """Return the samples as fields of a core outcome; states of a tree alone need no evaluation."""
-    program, (nq, nv) = compiled_scene(scene).program, (scene.model.nq, scene.model.nv)
+    program, (nq, nv) = compiled.program, (compiled.model.nq, compiled.model.nv)
     records = (
         options.a,
         options.tau,
@@ -152,7 +154,7 @@ def _samples(
 
 
 def _join_dense(
-    scene: Scene, parts: Sequence[Component], dense: Sequence[DenseOutput], joined: SimpleNamespace
+    compiled: CompiledScene, parts: Sequence[Component], dense: Sequence[DenseOutput], joined: SimpleNamespace
 ) -> None:
     """Join the interpolants of all components: their polynomials, on the intervals between all steps."""
     ends = np.unique(np.concatenate([one.times.ravel() for one in dense]))
@@ -162,9 +164,9 @@ def _join_dense(
     # Points stay inside an interval, so that they are evaluated by its own polynomial.
     inside = np.clip(part, 1e-9, 1.0 - 1e-9)
     t = (stretches[:, :1] + inside * np.diff(stretches, axis=1)).ravel()
-    states, modes, directions, sought, _ = _motion(scene, parts, dense, t)
+    states, modes, directions, sought, _ = _motion(compiled, parts, dense, t)
     joined.dense_times, joined.dense_states = stretches.ravel(), states.ravel()
     joined.dense_modes = modes[::points].ravel()
     joined.dense_directions, joined.dense_sought = directions.ravel(), sought[::points].ravel()
     joined.dense_torque = np.zeros(0)
-    joined.dense_moved = _motion(scene, parts, dense, ends[1:])[4]
+    joined.dense_moved = _motion(compiled, parts, dense, ends[1:])[4]

@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike
 
 from pin_nonideal.description.drive_kinds import sampled_drives
 from pin_nonideal.errors import InputError
-from pin_nonideal.scene.scene import Scene
 from pin_nonideal.validation import choice, count, label, positive, relative_tolerance, sequence
 
 from .methods import METHODS, SCIPY
@@ -151,11 +150,11 @@ def step_limit(max_steps: float | None) -> int:
     )
 
 
-def check_clock(scene: Scene, t0: float, duration: float, lengths: dict[str, float]) -> None:
+def check_clock(actuation: object, t0: float, duration: float, lengths: dict[str, float]) -> None:
     """Check that durations and steps are much longer than the spacing of floating-point times.
 
     Args:
-        scene: scene to simulate.
+        actuation: actuation of the scene.
         t0: initial time [s].
         duration: duration [s].
         lengths: dt and output_dt [s], if given.
@@ -166,7 +165,7 @@ def check_clock(scene: Scene, t0: float, duration: float, lengths: dict[str, flo
     end = max(abs(t0), abs(t0 + duration))
     spacing = float(np.spacing(end))
     named = {f"simulate: {key}": value for key, value in {"duration": duration, **lengths}.items()}
-    controls = sampled_drives(scene.actuation)
+    controls = sampled_drives(actuation)
     for control in controls:
         named[f"{label(control)}: period"] = control.period
     for what, value in named.items():

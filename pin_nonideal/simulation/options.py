@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.errors import InputError
 from pin_nonideal.scene.evaluation import SEVERAL_CHOICES
-from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.types import Array
 from pin_nonideal.validation import array, choice, flag, nonnegative, number, positive
 
@@ -85,7 +85,8 @@ class RunOptions:
 
 
 def run_options(
-    scene: Scene,
+    compiled: CompiledScene,
+    name: str,
     duration: float,
     t0: float,
     method: str,
@@ -104,7 +105,8 @@ def run_options(
     """Return the checked options of a run.
 
     Args:
-        scene: scene to simulate.
+        compiled: compiled scene to simulate.
+        name: name of the scene, for messages.
         duration: duration [s].
         t0: initial time [s].
         method: integration method.
@@ -124,12 +126,12 @@ def run_options(
         InputError: an option is invalid, or two options exclude each other.
     """
     check_method(method, rtol, atol, dt)
-    if opening := compiled_scene(scene).opening_names:
-        check_opening(method, record, compiled_scene(scene).contact(opening[0]))
-    nv = scene.model.nv
+    if opening := compiled.opening_names:
+        check_opening(method, record, compiled.contact(opening[0]))
+    nv = compiled.model.nv
     if nv == 0:
-        raise InputError(f'simulate: "{scene.name}" has no joint that moves; there is nothing to simulate')
-    tolerance = np.full(2 * nv + compiled_scene(scene).program.states, DEFAULT_ATOL)
+        raise InputError(f'simulate: "{name}" has no joint that moves; there is nothing to simulate')
+    tolerance = np.full(2 * nv + compiled.program.states, DEFAULT_ATOL)
     if atol is not None:
         if np.asarray(atol, dtype=object).ndim == 0:
             tolerance[:] = nonnegative("simulate: atol", atol)
@@ -147,7 +149,7 @@ def run_options(
         raise InputError(
             'simulate: events="separate" needs an output_dt: without one, every step is a sample'
         )
-    check_clock(scene, begin, length, lengths)
+    check_clock(compiled.spec.actuation, begin, length, lengths)
     groups = record_groups(record)
     forces = bool(groups & {"forces", "contact_points"})
     return RunOptions(
@@ -225,21 +227,21 @@ def check_values(
     flag("simulate: strict", strict)
 
 
-def cached_options(scene: Scene, *arguments: Any) -> RunOptions:
+def cached_options(compiled: CompiledScene, *arguments: Any) -> RunOptions:
     """Return cached options of `run_options`; controllers often repeat the same run.
 
     Args:
-        scene: scene to simulate, which holds the cache.
+        compiled: compiled scene to simulate, which holds the cache.
         *arguments: the other arguments of `run_options`, in order.
     """
-    cache: dict[object, RunOptions] = scene.__dict__.setdefault("_cached_options", {})
+    cache: dict[object, RunOptions] = compiled.__dict__.setdefault("_cached_options", {})
     key = (arguments, tuple(map(type, arguments)))  # types separate True from 1.0
     try:
         if key in cache:
             return cache[key]
     except TypeError:  # lists and arrays are mutable, so their options are not cached
-        return run_options(scene, *arguments)
+        return run_options(compiled, *arguments)
     if len(cache) >= MAX_CACHED:
         cache.clear()
-    cache[key] = options = run_options(scene, *arguments)
+    cache[key] = options = run_options(compiled, *arguments)
     return options

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.compilation.contact_groups import contact_names
 from pin_nonideal.compilation.error_context import open_loop_error, singular_position
 from pin_nonideal.core_loader import core
@@ -72,33 +73,34 @@ def finish(
         RunError: the run stopped early.
         OutputError: the first checkpoint of the run could not be written.
     """
-    fields = partial(_fields, scene, outcome, options, list(notes))
-    stats = outcome_stats(outcome, wall)
+    compiled = compiled_scene(scene)
+    fields = partial(_fields, compiled, outcome, options, list(notes))
+    known: Table = {"stats": outcome_stats(outcome, wall), "scene": scene, "name": scene.name}
 
     def shaped() -> Trajectory:
-        return Trajectory(**fields(), stats=stats)
+        return Trajectory(**(fields() | known))
 
     # A time step may penetrate a contact, which the next step detects. An opening loop stops the run itself.
-    enters = options.method == "moreau" and bool(compiled_scene(scene).opening_names)
+    enters = options.method == "moreau" and bool(compiled.opening_names)
     if (
         not enters
         and outcome.largest_violation > MAX_RESIDUAL
         and (stopped is None or isinstance(stopped, core.CoreFailure))
     ):
-        raise _open_loop_failure(scene, shaped())
+        raise _open_loop_failure(compiled, shaped())
     if stopped is None:
-        return Trajectory.later(fields, stats=stats)
+        return Trajectory.later(fields, **known)
     if isinstance(stopped, OutputError):
         raise stopped
     trajectory = shaped()
     last = float(trajectory.t[-1]) if len(trajectory) else options.t0
     cause: BaseException | None = None
-    singular = _singular(scene, trajectory, stopped)
+    singular = _singular(compiled, trajectory, stopped)
     if singular is not None:
         error = singular
         error.args = (f"{error}; {TRAJECTORY_HINT}",)
     elif isinstance(stopped, core.CoreFailure):
-        error = compiled_scene(scene).named(stopped)
+        error = compiled.named(stopped)
         error.args = (f"{error}{_overflow_hint(error, options)}; {TRAJECTORY_HINT}", *error.args[1:])
     elif isinstance(stopped, KeyboardInterrupt):
         error = RunInterrupted(f"the run was interrupted at t = {last:.4g} s; {TRAJECTORY_HINT}", time=last)
@@ -112,9 +114,9 @@ def finish(
     raise error from cause
 
 
-def _fields(scene: Scene, outcome: core.Outcome, options: RunOptions, notes: list[str]) -> Table:
-    """Return all fields of the trajectory except its counters; with `separate`, samples on the grid only."""
-    fields = outcome_fields(scene, outcome, options)
+def _fields(compiled: CompiledScene, outcome: core.Outcome, options: RunOptions, notes: list[str]) -> Table:
+    """Return the fields of the trajectory without its scene; with `separate`, samples on the grid only."""
+    fields = outcome_fields(compiled, outcome, options)
     t, q, v = fields["t"], fields["q"], fields["v"]
     grid = grid_of(t, options)
     for name in options.event_names:
@@ -122,8 +124,7 @@ def _fields(scene: Scene, outcome: core.Outcome, options: RunOptions, notes: lis
         at = np.searchsorted(t, times) if times else np.zeros(0, dtype=int)
         fields.setdefault("user_events", []).append(UserEventRecord(name, np.array(times), q[at], v[at]))
     if options.dense:
-        elements = compiled_scene(scene).elements.count
-        fields["dense"] = dense_output(outcome, options, scene.model.nv, elements)
+        fields["dense"] = dense_output(outcome, options, compiled.model.nv, compiled.elements.count)
     trajectory_fields = with_defaults({**fields, "grid": grid, "notes": notes})
     if not options.separate:
         return trajectory_fields
@@ -132,28 +133,27 @@ def _fields(scene: Scene, outcome: core.Outcome, options: RunOptions, notes: lis
     return {name: value for name, value in vars(run).items() if name != "stats"}
 
 
-def _open_loop_failure(scene: Scene, trajectory: Trajectory) -> LoopClosureError:
+def _open_loop_failure(compiled: CompiledScene, trajectory: Trajectory) -> LoopClosureError:
     """Return the error of a run that has left its constraints, with the samples before that time."""
     k = int((trajectory.violation > MAX_RESIDUAL).argmax())
     t = float(trajectory.t[k])
-    runner = compiled_scene(scene).program.runner()
+    runner = compiled.program.runner()
     residual = residuals_at(runner, trajectory.q[k], trajectory.v[k], t)
-    left = np.where(gap_rows(compiled_scene(scene).program), np.maximum(-residual, 0.0), np.abs(residual))
-    gaps = largest_by_contact(left, compiled_scene(scene).slices, compiled_scene(scene).contact_of)
+    left = np.where(gap_rows(compiled.program), np.maximum(-residual, 0.0), np.abs(residual))
+    gaps = largest_by_contact(left, compiled.slices, compiled.contact_of)
     stopped = open_loop_error(max(gaps, key=lambda key: gaps[key]), gaps, t, f"; {TRAJECTORY_HINT}")
     stopped.trajectory = _stopped_trajectory(trajectory.first(k), stopped)
     return stopped
 
 
-def _singular(scene: Scene, trajectory: Trajectory, stopped: BaseException) -> RunError | None:
+def _singular(compiled: CompiledScene, trajectory: Trajectory, stopped: BaseException) -> RunError | None:
     """Return the error of a run whose steps end in a singular position of its constraints, or None."""
     of_core = isinstance(stopped, core.CoreFailure) and stopped.kind is core.FailureKind.step_size
     if not (of_core or type(stopped) is StepSizeError) or len(trajectory) < 2:
         return None
-    compiled = compiled_scene(scene)
     runner, rows = compiled.program.runner(), holonomic_rows(compiled.program)
     (first, _), (last, shares) = (
-        _independence(runner, scene, trajectory, k, rows) for k in (0, len(trajectory) - 1)
+        _independence(runner, trajectory, k, rows) for k in (0, len(trajectory) - 1)
     )
     rank = int((first > MIN_SINGULAR_VALUE).sum())
     if not rank or last[rank - 1] > SINGULAR_RATIO * first[rank - 1]:
@@ -165,10 +165,11 @@ def _singular(scene: Scene, trajectory: Trajectory, stopped: BaseException) -> R
 
 
 def _independence(
-    runner: core.Runner, scene: Scene, run: Trajectory, k: int, rows: NDArray[np.bool_]
+    runner: core.Runner, run: Trajectory, k: int, rows: NDArray[np.bool_]
 ) -> tuple[Array, Array]:
     """Return the singular values of the rows of positions at a sample, and the left singular vectors."""
-    M = scene.mass_matrix(run.q[k])
+    nv = run.v.shape[1]
+    M = runner.terms(run.q[k], np.zeros(nv))[0].reshape(nv, nv)
     left, values, _ = np.linalg.svd(metric_rows(runner, M, run.q[k], run.v[k], float(run.t[k]))[rows])
     return values, left
 

@@ -63,10 +63,10 @@ def resume(
                 "and pass it: resume(path, scene=scene)"
             )
         scene = load(held.origin["name"], **held.origin["parameters"])
-    refuse_other_scene(held, scene, source)
-    options = held.options
+    compiled, options = compiled_scene(scene), held.options
+    refuse_other_scene(held, compiled, scene.name, source)
     interval = held.interval if checkpoint_interval is None else checkpoint_interval
-    program, delayed = compiled_scene(scene).program_of_runs(options.t0)
+    program, delayed = compiled.program_of_runs(options.t0)
     if delayed is not None:
         delayed.pending = held.delayed
     saver = Saver(source, scene, options, interval, held.wall_s, held.notes, delayed)

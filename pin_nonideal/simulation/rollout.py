@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,9 +15,10 @@ from pin_nonideal.compilation.parameter_overrides import ParameterOverrides, par
 from pin_nonideal.core_loader import core
 from pin_nonideal.errors import InputError, PinNonidealError, RunError, RunInterrupted, short_repr
 from pin_nonideal.scene.scene import Scene, compiled_scene, require_scene, scene_states
+from pin_nonideal.scene.state import SceneStates
 from pin_nonideal.states.joint_layout import require_resolved
 from pin_nonideal.trajectory.run_list import RunList
-from pin_nonideal.types import Array, State
+from pin_nonideal.types import Array, Model, State
 from pin_nonideal.validation import array, by_name, choice, count
 
 from .decoupled import decoupled_components, rollout_decoupled
@@ -100,13 +102,15 @@ def rollout(
     require_scene("rollout", scene)
     threads = _threads(jobs)
     keep = choice("rollout: failures", failures, ("raise", "keep")) == "keep"
-    starts_q, starts_v = _starts(scene, q, v, parameters)
-    options = run_options(scene, duration, t0, method, rtol, atol, dt, output_dt, max_steps, record, several)
+    compiled = compiled_scene(scene)
+    starts_q, starts_v = _starts(scene_states(scene), compiled.model, q, v, parameters)
+    steps = (method, rtol, atol, dt, output_dt, max_steps)
+    options = run_options(compiled, scene.name, duration, t0, *steps, record, several)
     if method in SCIPY:
         raise InputError(f'rollout: method must be one of the core\'s; "{method}" runs in SciPy')
     if parameters and options.dense:
         raise InputError('rollout: record "dense" goes without parameters; take output_dt for more samples')
-    numbers = parse_overrides(compiled_scene(scene), parameters or {}, len(starts_q))
+    numbers = parse_overrides(compiled, parameters or {}, len(starts_q))
     if choice("rollout: as_arrays", as_arrays, (True, False)):
         return _arrays(scene, starts_q, starts_v, numbers, options, threads, keep, record)
     results = _run(scene, starts_q, starts_v, numbers, options, threads)
@@ -131,11 +135,12 @@ def _threads(jobs: int) -> int:
     return jobs if jobs > 0 else max(1, (os.cpu_count() or 1) + 1 + jobs)
 
 
-def _starts(scene: Scene, q: object, v: object, parameters: object) -> tuple[Array, Array]:
+def _starts(
+    states: SceneStates, model: Model, q: object, v: object, parameters: object
+) -> tuple[Array, Array]:
     """Return the initial states of all runs; a missing state is the scene's initial state."""
     if parameters is not None and not isinstance(parameters, Mapping):
         raise InputError(f"rollout: parameters must be values by name; got {short_repr(parameters)}")
-    states, model = scene_states(scene), scene.model
     starts_q = None if q is None else _states_of_runs(q, model.nq, states.configuration, "rollout: q")
     starts_v = None if v is None else _states_of_runs(v, model.nv, states.velocity, "rollout: v")
     by_run: list[Any] = [each for each in (starts_q, starts_v) if each is not None]
@@ -145,9 +150,9 @@ def _starts(scene: Scene, q: object, v: object, parameters: object) -> tuple[Arr
     if not counts:
         raise InputError("rollout needs states or parameters of its runs: rollout(scene, q, v, duration)")
     if starts_q is None:
-        starts_q = np.tile(scene.initial_state()[0], (counts[0], 1))
+        starts_q = np.tile(states.closed_initial()[0], (counts[0], 1))
     if starts_v is None:
-        starts_v = np.tile(scene.initial_state()[1], (counts[0], 1))
+        starts_v = np.tile(states.closed_initial()[1], (counts[0], 1))
     if len(starts_q) != len(starts_v):
         raise InputError(f"rollout: q and v must have as many rows; got {len(starts_q)} and {len(starts_v)}")
     return starts_q, starts_v
@@ -191,10 +196,10 @@ def _arrays(
     if len(record):
         raise InputError("rollout: as_arrays records states alone; leave record out, or as_arrays")
     q = scene_states(scene).with_unit_parts(q)
-    require_resolved(scene.model, q)
-    if len(q):
-        compiled_scene(scene).check_functions(q[0], v[0], options.t0)
     compiled = compiled_scene(scene)
+    require_resolved(compiled.model, q)
+    if len(q):
+        compiled.check_functions(q[0], v[0], options.t0)
     on, v_on, opened = compiled.projection.nearest_of_each(q, v, options.t0, threads, numbers)
     errors = {i: compiled.named(e) if isinstance(e, core.CoreFailure) else e for i, e in opened.items()}
     for i, error in errors.items():
@@ -205,7 +210,8 @@ def _arrays(
     closed = np.array([i for i in range(len(q)) if i not in errors], dtype=np.intp)
     starts = np.ascontiguousarray(on[closed]), np.ascontiguousarray(v_on[closed])
     of_closed = numbers._replace(values=numbers.values[closed])
-    runs = run_arrays(scene, *starts, of_closed, options, threads).among(len(q), closed, errors)
+    runs = run_arrays(compiled, *starts, of_closed, options, threads).among(len(q), closed, errors)
+    runs = replace(runs, scene=scene)
     for i, error in runs.failures.items():
         if isinstance(error, RunError):
             error.index = i
@@ -225,7 +231,7 @@ def _run(
     begin = time.perf_counter()
     compiled, states = compiled_scene(scene), scene_states(scene)
     q = states.with_unit_parts(q)
-    require_resolved(scene.model, q)
+    require_resolved(compiled.model, q)
     if len(q):
         compiled.check_functions(q[0], v[0], options.t0)
     on, v_on, open_starts = compiled.projection.nearest_of_each(q, v, options.t0, threads, numbers)
@@ -236,8 +242,8 @@ def _run(
     rows = slice(None) if len(going) == len(q) else going
     started = np.ascontiguousarray(on[rows]), np.ascontiguousarray(v_on[rows])
     values = np.ascontiguousarray(numbers.values[rows])
-    if not numbers.names and (parts := decoupled_components(scene, options)):
-        outcomes = rollout_decoupled(scene, parts, *started, options, threads)
+    if not numbers.names and (parts := decoupled_components(compiled, options)):
+        outcomes = rollout_decoupled(compiled, parts, *started, options, threads)
     else:
         program = compiled.program_of_runs(options.t0, by_thread=True)[0]
         outcomes = core.rollout(program, *started, options, threads, numbers.names, values)

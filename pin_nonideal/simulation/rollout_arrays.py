@@ -9,10 +9,11 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.compilation.parameter_overrides import ParameterOverrides
 from pin_nonideal.core_loader import core
 from pin_nonideal.errors import LoopClosureError, PinNonidealError, RunInterrupted, UserFunctionError
-from pin_nonideal.scene.scene import Scene, compiled_scene
+from pin_nonideal.scene.scene import Scene
 from pin_nonideal.types import Array
 
 from .decoupled import decoupled_components, rollout_decoupled
@@ -85,26 +86,31 @@ class RunArrays:
 
 
 def run_arrays(
-    scene: Scene, q0: Array, v0: Array, numbers: ParameterOverrides, options: RunOptions, threads: int
+    compiled: CompiledScene,
+    q0: Array,
+    v0: Array,
+    numbers: ParameterOverrides,
+    options: RunOptions,
+    threads: int,
 ) -> RunArrays:
-    """Simulate initial states that satisfy the constraints, and return their samples.
+    """Simulate initial states that satisfy the constraints, and return their samples, without the scene.
 
     Args:
-        scene: scene to simulate.
+        compiled: compiled scene to simulate.
         q0: initial configurations, (n, nq).
         v0: initial velocities, (n, nv).
         numbers: numbers that differ between runs.
         options: options of all runs.
         threads: number of native threads.
     """
-    n, compiled = len(q0), compiled_scene(scene)
-    parts = [] if numbers.names else decoupled_components(scene, options)
+    n = len(q0)
+    parts = [] if numbers.names else decoupled_components(compiled, options)
     if parts:
-        outcomes = rollout_decoupled(scene, parts, q0, v0, options, threads)
+        outcomes = rollout_decoupled(compiled, parts, q0, v0, options, threads)
         complete = [outcome for outcome in outcomes if outcome is not None]
         if len(complete) < len(outcomes):
             raise RunInterrupted("the runs were interrupted")
-        return _of_outcomes(scene, complete)
+        return _of_outcomes(compiled, complete)
     numbers_of_runs = np.ascontiguousarray(numbers.values)
     program = compiled.program_of_runs(options.t0, by_thread=True)[0]
     try:
@@ -121,15 +127,14 @@ def run_arrays(
         samples.astype(np.int64),
         violation,
         steps.astype(np.int64),
-        scene=scene,
     )
-    runs.failures.update(_failures(scene, dict(stopped), violation))
+    runs.failures.update(_failures(compiled, dict(stopped), violation))
     return runs
 
 
-def _of_outcomes(scene: Scene, outcomes: Sequence[core.Outcome]) -> RunArrays:
+def _of_outcomes(compiled: CompiledScene, outcomes: Sequence[core.Outcome]) -> RunArrays:
     """Return the samples of runs whose components took their own steps."""
-    n, (nq, nv) = len(outcomes), (scene.model.nq, scene.model.nv)
+    n, (nq, nv) = len(outcomes), (compiled.model.nq, compiled.model.nv)
     samples = np.array([len(one.t) for one in outcomes], dtype=np.int64)
     max_samples = int(samples.max(initial=0))
     t, q, v = (
@@ -144,17 +149,17 @@ def _of_outcomes(scene: Scene, outcomes: Sequence[core.Outcome]) -> RunArrays:
     violation = np.array([one.largest_violation for one in outcomes])
     steps = np.array([one.steps for one in outcomes], dtype=np.int64)
     stopped = {i: one.stopped for i, one in enumerate(outcomes) if one.stopped is not None}
-    return RunArrays(t, q, v, samples, violation, steps, _failures(scene, stopped, violation), scene)
+    return RunArrays(t, q, v, samples, violation, steps, _failures(compiled, stopped, violation))
 
 
 def _failures(
-    scene: Scene, stopped: dict[int, BaseException], violation: Array
+    compiled: CompiledScene, stopped: dict[int, BaseException], violation: Array
 ) -> dict[int, PinNonidealError]:
     """Return the errors of stopped runs and of runs that have left their constraints, by index."""
     failures: dict[int, PinNonidealError] = {}
     for i, cause in stopped.items():
         if isinstance(cause, core.CoreFailure):
-            failures[i] = compiled_scene(scene).named(cause)
+            failures[i] = compiled.named(cause)
         elif isinstance(cause, PinNonidealError):
             failures[i] = cause
         elif isinstance(cause, KeyboardInterrupt):

@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
+from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.drive_kinds import switching_drives
 from pin_nonideal.errors import InputError, RunError, StepSizeError
-from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.types import Array, Table
 
 from .events import Watched
@@ -41,10 +41,10 @@ class _Run:
     """One run with a SciPy solver: right-hand side, Jacobian, tolerances and steps."""
 
     def __init__(
-        self, scene: Scene, options: RunOptions, tick: Tick | None, events: Sequence[Watched]
+        self, compiled: CompiledScene, options: RunOptions, tick: Tick | None, events: Sequence[Watched]
     ) -> None:
-        self.model, self.options = scene.model, options
-        self.core = core.ExternalRun(compiled_scene(scene).program, options, tick, list(events))
+        self.model, self.options = compiled.model, options
+        self.core = core.ExternalRun(compiled.program, options, tick, list(events))
         self.failure: core.CoreFailure | None = None
 
     def rate(self, t: float, y: Array) -> Array:
@@ -140,7 +140,7 @@ def _one_blas_thread() -> AbstractContextManager[object]:
 
 
 def simulate_stiff(
-    scene: Scene,
+    compiled: CompiledScene,
     q0: Array,
     v0: Array,
     options: RunOptions,
@@ -150,7 +150,7 @@ def simulate_stiff(
     """Simulate with one of SciPy's implicit methods.
 
     Args:
-        scene: scene to simulate.
+        compiled: compiled scene to simulate.
         q0: initial configuration on the constraints, (nq,).
         v0: initial velocity on the constraints, (nv,).
         options: checked options of the run.
@@ -165,10 +165,10 @@ def simulate_stiff(
     """
     from scipy import integrate
 
-    if switching := switching_drives(scene.actuation):
+    if switching := switching_drives(compiled.spec.actuation):
         kind = type(switching[0]).__name__
         raise InputError(f'simulate: {kind} needs one of the core\'s methods; got "{options.method}"')
-    run = _Run(scene, options, tick, events)
+    run = _Run(compiled, options, tick, events)
     try:
         with _one_blas_thread():
             run.core.start(q0, v0)

@@ -120,7 +120,8 @@ def simulate(
     choice("simulate: progress", progress, (True, False, None))
     steps = (method, rtol, atol, dt, output_dt, max_steps)
     more = (record, several, max_wall, requests.names, requests.separate, strict)
-    options = cached_options(scene, duration, t0, *steps, *more)
+    compiled = compiled_scene(scene)
+    options = cached_options(compiled, scene.name, duration, t0, *steps, *more)
     _check_together(method, requests, callback, checkpoint)
     nonnegative("simulate: checkpoint_interval", checkpoint_interval)
     if checkpoint is not None:
@@ -136,14 +137,14 @@ def simulate(
     for start, notes_of_start in ((q, moved), (v, followed)):
         if notes_of_start and start is not None and by_name(start) is None:
             warnings.warn(f"simulate: {notes_of_start[0]}", RuntimeWarning, stacklevel=2)
-    program, delayed = compiled_scene(scene).program_of_runs(options.t0)
+    program, delayed = compiled.program_of_runs(options.t0)
     saver = None
     if checkpoint is not None:
         from .checkpoint import Saver
 
         saver = Saver(checkpoint, scene, options, checkpoint_interval, notes=notes, delayed=delayed)
     hints: list[str] = []
-    explicit_only = compiled_scene(scene).explicit_only
+    explicit_only = compiled.explicit_only
 
     def hint(at: float, dof: int, rate: float, decays: bool) -> None:
         hints.append(f"from t = {at:.4g} s on {stiff_hint(scene.model, dof, rate, decays, explicit_only)}")
@@ -154,13 +155,13 @@ def simulate(
         if method in SCIPY:
             from .scipy_solvers import simulate_stiff
 
-            outcome, stopped = simulate_stiff(scene, q0, v0, options, tick, requests.watched)
+            outcome, stopped = simulate_stiff(compiled, q0, v0, options, tick, requests.watched)
         else:
-            parts = [] if saver or between else decoupled_components(scene, options)
-            merged = run_decoupled(scene, parts, q0, v0, options, tick) if parts else None
+            parts = [] if saver or between else decoupled_components(compiled, options)
+            merged = run_decoupled(compiled, parts, q0, v0, options, tick) if parts else None
             # If a component fails, a run in common steps reports the failure.
             outcome = merged or run_together(
-                scene,
+                compiled,
                 q0,
                 v0,
                 options,

@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.description.scene_spec import SceneSpec
 from pin_nonideal.errors import InputError, PinNonidealError
 from pin_nonideal.scene.scene import Scene, compiled_scene
@@ -16,7 +17,7 @@ from pin_nonideal.states.rows import MIN_SINGULAR_VALUE, holonomic_rows, residua
 from pin_nonideal.states.scales import coordinate, slides
 from pin_nonideal.types import Array, Model
 
-from .inverse_dynamics import inverse_dynamics
+from .inverse_dynamics import torques_of_motion
 from .residual import AtRest
 
 Mask = NDArray[np.bool_]
@@ -38,13 +39,12 @@ class ClosedReference:
     follow from the constraints at every time.
 
     Args:
-        scene: the scene without actuation and contacts; its constraints hold positions.
+        compiled: the compiled scene without actuation and contacts; its constraints hold positions.
         times: sample times [s], (nt,).
         q: configurations, (nt, nq); coordinates that are not given are guesses.
         v: velocities, (nt, nv), or None.
         stated: mask of the stated coordinates, (nv,).
-        driven: names of the driven joints.
-        dofs: mask of their degrees of freedom, (nv,).
+        driven: mask of the driven degrees of freedom, (nv,).
         who: words for messages.
         rounding: rounding of times at the ends, see `ReferenceMotion`.
 
@@ -55,32 +55,30 @@ class ClosedReference:
 
     def __init__(
         self,
-        scene: Scene,
+        compiled: CompiledScene,
         times: Array,
         q: Array,
         v: Array | None,
         stated: Mask,
-        driven: list[str],
-        dofs: Mask,
+        driven: Mask,
         who: str,
         rounding: float = TIME_ROUNDING,
     ) -> None:
-        self._scene, self._driven, self._who = scene, driven, who
-        compiled = compiled_scene(scene)
-        self._program = compiled.program
+        self._compiled, self._driven, self._who = compiled, driven, who
+        self._program, self._model = compiled.program, compiled.model
         self._runner, self._rows = self._program.runner(), holonomic_rows(self._program)
         self._allowed = CLOSURE_TOL * max(1.0, compiled.projection.length)
-        still = np.zeros(scene.model.nv)
+        still = np.zeros(compiled.model.nv)
         try:
-            start = compiled.project(q[0], still, float(times[0]), Held(q=stated & dofs))[0]
+            start = compiled.project(q[0], still, float(times[0]), Held(q=stated & driven))[0]
         except PinNonidealError:
-            self._free = ~(stated & dofs)
+            self._free = ~(stated & driven)
             start = self._configuration_on(q[0], float(times[0]))  # raises an error that names the loop
-        basis = AtRest(scene, still, float(times[0]), start).free(start)
-        self._free = ~self._independent_mask(basis, [stated & dofs, stated])
+        basis = AtRest(compiled, still, float(times[0]), start).free(start)
+        self._free = ~self._independent_mask(basis, [stated & driven, stated])
         on = np.array(q)
         on[0] = self._configuration_on(start, float(times[0]))
-        unit = np.where(slides(scene.model), compiled.projection.length or 1.0, 1.0)
+        unit = np.where(slides(compiled.model), compiled.projection.length or 1.0, 1.0)
         for k in range(1, len(on)):
             on[k] = self._follow_sample(on[k - 1], q[k], stated, times[k - 1 : k + 1], unit)
         self._require_reference(on, q, times, stated, unit)
@@ -89,7 +87,7 @@ class ClosedReference:
             for k, t in enumerate(times.tolist()):
                 on_rates[k] = self._velocity(on[k], on_rates[k], t)
             self._require_rates(on, on_rates, v, times, stated, unit)
-        self._motion = ReferenceMotion(scene.model, times, on, on_rates, rounding)
+        self._motion = ReferenceMotion(compiled.model, times, on, on_rates, rounding)
 
     def __call__(self, t: float) -> tuple[Array, Array, Array]:
         """Return q (nq,), v (nv,) and a (nv,) on the constraints at time t [s]."""
@@ -103,7 +101,9 @@ class ClosedReference:
 
     def torques(self, q: Array, v: Array, a: Array, t: float) -> Array:
         """Return the torques of the driven joints for a motion on the constraints, (nv,)."""
-        return inverse_dynamics(self._scene, q, v, a, self._driven, t=t).tau
+        name, dofs = self._model.name or "scene", np.flatnonzero(self._driven).tolist()
+        rest = AtRest(self._compiled, np.zeros(len(v)), t, q)
+        return torques_of_motion(rest, q, v, a, dofs, name).tau
 
     def _follow_sample(self, before: Array, q: Array, stated: Mask, times: Array, unit: Array) -> Array:
         """Return a sample on the constraints, followed from the sample before it in short moves, (nq,).
@@ -115,15 +115,14 @@ class ClosedReference:
             times: times of both samples [s].
             unit: unit displacement of each coordinate, (nv,).
         """
-        model = self._scene.model
 
         def way() -> Array:
-            return np.where(stated, pin.difference(model, before, q), 0.0)
+            return np.where(stated, pin.difference(self._model, before, q), 0.0)
 
         count = max(1, int(np.ceil(np.abs(way() / unit).max(initial=0.0) / MAX_MOVE)))
         for left in range(count, 0, -1):
             t = float(times[1] - (left - 1) / count * (times[1] - times[0]))
-            before = self._configuration_on(pin.integrate(model, before, way() / left), t)
+            before = self._configuration_on(pin.integrate(self._model, before, way() / left), t)
         return before
 
     def _require_reference(self, on: Array, q: Array, times: Array, stated: Mask, unit: Array) -> None:
@@ -132,7 +131,7 @@ class ClosedReference:
         Raises:
             InputError: a given coordinate has moved farther.
         """
-        model, still = self._scene.model, np.zeros(self._scene.model.nv)
+        model, still = self._model, np.zeros(self._model.nv)
         for t, now, reference in zip(times.tolist(), on, q, strict=True):
             away = np.where(stated, pin.difference(model, now, reference), 0.0)
             if np.abs(away / unit).max(initial=0.0) > LOG_ROUNDING:
@@ -169,7 +168,7 @@ class ClosedReference:
         worst = int(np.argmax(np.abs(away / scale)))
         return InputError(
             f'{self._who}: {what} opens "{name}" by {gap:.2g} {unit}, and the constraints change '
-            f'"{coordinate(self._scene.model, worst)}" by {abs(away[worst]):.2g}; give samples that satisfy '
+            f'"{coordinate(self._model, worst)}" by {abs(away[worst]):.2g}; give samples that satisfy '
             "the constraints, or only as many joints by name as the constraints leave free, "
             f"{np.sum(~self._free)} here"
         )
@@ -187,7 +186,7 @@ class ClosedReference:
                 along = left[best] / sizes[best]
                 left = left - np.outer(left @ along, along)
         if chosen.sum() < basis.shape[1]:
-            loose = coordinate(self._scene.model, int(np.argmax(np.linalg.norm(left, axis=1))))
+            loose = coordinate(self._model, int(np.argmax(np.linalg.norm(left, axis=1))))
             raise InputError(
                 f'{self._who}: q must determine the motion with feedforward "constrained"; the constraints '
                 f'leave "{loose}" free beside the joints that q names; name further joints'
@@ -196,7 +195,7 @@ class ClosedReference:
 
     def _configuration_on(self, q: Array, t: float) -> Array:
         """Return the configuration on the constraints with the independent coordinates of q, (nq,)."""
-        on = polish_free(self._scene.model, self._runner, q, self._free, self._rows, t)
+        on = polish_free(self._model, self._runner, q, self._free, self._rows, t)
         phi = residuals_at(self._runner, on, np.zeros(len(self._free)), t)
         if not np.abs(phi[self._rows]).max(initial=0.0) <= self._allowed:
             name, gap = widest_loop(phi, self._program)
@@ -225,8 +224,8 @@ class ClosedReference:
         return np.asarray(x)
 
 
-def without_drives(model: Model, q0: Array, spec: SceneSpec, who: str) -> Scene:
-    """Return a scene with the constraints, laws and forces of another, without contacts and actuation.
+def without_drives(model: Model, q0: Array, spec: SceneSpec, who: str) -> CompiledScene:
+    """Return a compiled scene with the constraints, laws and forces of another, without contacts and drives.
 
     Args:
         model: pinocchio.Model.
@@ -246,11 +245,11 @@ def without_drives(model: Model, q0: Array, spec: SceneSpec, who: str) -> Scene:
         terms=spec.terms,
         assembly_tolerance=spec.assembly_tolerance,
     )
-    program = compiled_scene(scene).program
-    for c in program.constraints:
+    compiled = compiled_scene(scene)
+    for c in compiled.program.constraints:
         if not np.all(c.holonomic):
             raise InputError(
                 f'{who}: feedforward "constrained" needs constraints of positions; "{c.name}" constrains '
                 'velocities only; take feedforward "rnea" or "gravity"'
             )
-    return scene
+    return compiled

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from pin_nonideal.errors import EquilibriumError, InputError, LoopClosureError
 from pin_nonideal.html_tables import numbers, table
-from pin_nonideal.scene.scene import Scene, compiled_scene, require_scene
+from pin_nonideal.scene.scene import Scene, compiled_scene, require_scene, scene_states
+from pin_nonideal.scene.state import SceneStates
 from pin_nonideal.states.parsing import named_velocity
 from pin_nonideal.types import Array, Model, State
 from pin_nonideal.validation import choice, count, number
@@ -110,7 +111,8 @@ def equilibrium(
     torque = None if tau is None else named_velocity(scene.model, tau, still, "equilibrium: tau")
     time, attempts = number("equilibrium: t", t), count("equilibrium: starts", starts, min_value=1)
     start = scene.project(q, still, time)[0]
-    search = _Search(AtRest(scene, torque, time, start), downhill)
+    at_rest = AtRest(compiled_scene(scene), torque, time, start)
+    search = _Search(at_rest, scene_states(scene), downhill)
     best: Equilibrium | None = None
     for k in range(attempts):
         q = start if k == 0 else search.elsewhere(start, k)
@@ -131,12 +133,12 @@ def equilibrium(
 class _Search:
     """Searches for an equilibrium from several starts."""
 
-    def __init__(self, rest: AtRest, downhill: bool) -> None:
-        self.rest, self.downhill = rest, downhill
-        self.model: Model = rest.scene.model
+    def __init__(self, rest: AtRest, states: SceneStates, downhill: bool) -> None:
+        self.rest, self.states, self.downhill = rest, states, downhill
+        self.model: Model = rest.compiled.model
         self.least = np.inf
-        self.nearest = np.array(rest.scene.q0)
-        self.unit = np.ones(rest.scene.model.nv)  # unit displacement of each coordinate
+        self.nearest = np.array(rest.compiled.q0)
+        self.unit = np.ones(self.model.nv)  # unit displacement of each coordinate
         self.longest = MAX_SLIDE if rest.only_slides else MAX_STEP
 
     def elsewhere(self, start: Array, k: int) -> Array | None:
@@ -144,7 +146,7 @@ class _Search:
         rest, unit = self.rest, self.rest.units(self.rest.mass(start), self.rest.free(start))
         move = unit * np.random.default_rng(k).standard_normal(self.model.nv) * min(1.5, 0.3 * k)
         try:
-            return rest.scene.project(pin.integrate(self.model, start, move), rest.still, rest.t)[0]
+            return self.states.project(pin.integrate(self.model, start, move), rest.still, rest.t)[0]
         except (LoopClosureError, InputError):  # InputError: a contact would start with penetration
             return None
 
@@ -180,9 +182,8 @@ class _Search:
 
     def reason(self) -> str:
         """Return the reason of a failed search: a drive that exceeds all resistance, or unbalanced forces."""
-        friction_note = "; dry friction is ignored here, and `rest` includes it" * bool(
-            self.rest.scene.element_names
-        )
+        has_friction = bool(self.rest.compiled.elements.names)
+        friction_note = "; dry friction is ignored here, and `rest` includes it" * has_friction
         now = self.rest.balance(self.nearest)
         way = now.free @ now.left
         way /= np.linalg.norm(way) or 1.0
@@ -207,12 +208,12 @@ class _Search:
     def in_play(self, now: Balance, inertia: Array) -> Array:
         """Return the force scale along the columns of free, from acting forces and weight, (k,)."""
         acting = np.abs(now.F) + np.abs(now.A.T) @ np.abs(now.lam)
-        pull = weight(self.rest.scene) * np.sqrt(np.diag(inertia))  # largest force along each column
+        pull = weight(self.model) * np.sqrt(np.diag(inertia))  # largest force along each column
         return np.asarray(np.abs(now.free).T @ acting + pull)
 
     def polished(self, q: Array, now: Balance, move: Array) -> tuple[Array, Balance]:
         """Return the state after one more step if its unbalanced force is smaller, else the given state."""
-        there = self.rest.scene.project(pin.integrate(self.model, q, move), self.rest.still, self.rest.t)[0]
+        there = self.states.project(pin.integrate(self.model, q, move), self.rest.still, self.rest.t)[0]
         then = self.rest.balance(there)
         return (there, then) if np.linalg.norm(then.left) < np.linalg.norm(now.left) else (q, now)
 
@@ -272,9 +273,9 @@ class _Search:
 
     def step(self, q: Array, now: Balance, move: Array) -> tuple[Array, Balance] | None:
         """Return the state after a step, or None if the forces do negative work along it."""
-        scene, move = self.rest.scene, self.to_contact(q, move)
+        move = self.to_contact(q, move)
         try:
-            there = scene.project(pin.integrate(self.model, q, move), self.rest.still, self.rest.t)[0]
+            there = self.states.project(pin.integrate(self.model, q, move), self.rest.still, self.rest.t)[0]
             then = self.rest.balance(there)
         except (LoopClosureError, InputError):
             return None
@@ -301,5 +302,5 @@ class _Search:
         grows = ~neutral & ((rates.real < 0.0) | (np.abs(rates.imag) > 1e-3 * np.abs(rates)))
         verdict = False if grows.any() else None if neutral.any() else True
         left = float(np.abs(now.left).max(initial=0.0))
-        lam = compiled_scene(self.rest.scene).multipliers.groups.sum(now.lam)
+        lam = self.rest.compiled.multipliers.groups.sum(now.lam)
         return Equilibrium(q, lam, left, now.free, stiffness, rates, verdict, start)

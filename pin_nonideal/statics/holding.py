@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.core_loader import core
-from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.states.rows import MIN_SINGULAR_VALUE
 from pin_nonideal.types import Array
 
@@ -59,7 +59,7 @@ class HoldingTorque:
 
 
 def holding_torques(
-    scene: Scene,
+    compiled: CompiledScene,
     q: Array,
     tau: Array,
     t: float,
@@ -69,28 +69,28 @@ def holding_torques(
     """Return the holding torques of each joint of one degree of freedom that a law of dry friction acts on.
 
     Args:
-        scene: the scene.
+        compiled: the compiled scene.
         q: configuration on the constraints, (nq,).
         tau: torques of all drives, (nv,).
         t: time [s].
         open_rows: mask of rows of open contacts, (m,).
         dofs: driven degrees of freedom; all when None.
     """
-    at_rest = AtRest(scene, tau, t, q)
+    at_rest = AtRest(compiled, tau, t, q)
     at_rest.open = open_rows
     return {
-        name: _Joint(scene, at_rest, q, tau, dof).holding()
-        for name, dof in _friction_joints(scene, at_rest, q).items()
+        name: _Joint(at_rest, q, tau, dof).holding()
+        for name, dof in _friction_joints(at_rest, q).items()
         if dofs is None or dof in dofs
     }
 
 
-def _friction_joints(scene: Scene, at_rest: AtRest, q: Array) -> dict[str, int]:
+def _friction_joints(at_rest: AtRest, q: Array) -> dict[str, int]:
     """Return the degree of freedom of each joint with one freedom that a law of dry friction acts on.
 
     Friction of contacts and rolling bodies counts in the bands, but names no joint.
     """
-    program, model = compiled_scene(scene).program, scene.model
+    program, model = at_rest.program, at_rest.compiled.model
     if not len(program.element_sizes):
         return {}
     D = np.abs(at_rest.directions(q)[0])
@@ -98,7 +98,7 @@ def _friction_joints(scene: Scene, at_rest: AtRest, q: Array) -> dict[str, int]:
     for law, size in zip(program.element_laws, program.element_sizes, strict=True):
         own = D[first : first + size]
         first += size
-        if law < len(scene.laws):  # laws come before the friction of contacts
+        if law < len(at_rest.compiled.spec.laws):  # laws come before the friction of contacts
             acts |= (own > MIN_SINGULAR_VALUE * own.max(axis=1, initial=0.0, keepdims=True)).any(axis=0)
     return {
         str(model.names[j]): int(model.idx_vs[j])
@@ -122,8 +122,8 @@ class _Ends(NamedTuple):
 class _Joint:
     """Torques of one joint, with the torques of all others unchanged."""
 
-    def __init__(self, scene: Scene, at_rest: AtRest, q: Array, tau: Array, dof: int) -> None:
-        self.scene, self.rest, self.q, self.tau, self.dof = scene, at_rest, q, tau, dof
+    def __init__(self, at_rest: AtRest, q: Array, tau: Array, dof: int) -> None:
+        self.rest, self.q, self.tau, self.dof = at_rest, q, tau, dof
         self.known: dict[float, _Ends] = {}
         self.scale = 0.0
 
@@ -140,7 +140,7 @@ class _Joint:
             torque = self.tau.copy()
             torque[self.dof] = x
             self.rest.tau = torque
-            cones = LimitCones(self.scene, self.rest, self.q, self.dof)
+            cones = LimitCones(self.rest, self.q, self.dof)
             # Effort limits may have changed the torque that acts.
             acting = float((self.rest.forces(self.q) - self.rest.undriven(self.q))[self.dof])
             low, high = cones.span()

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from pin_nonideal.core_loader import core
 from pin_nonideal.errors import FrictionConvergenceError, InputError, short_repr
@@ -21,11 +20,13 @@ from pin_nonideal.states.parsing import (
     named_velocity,
 )
 from pin_nonideal.states.rows import MIN_SINGULAR_VALUE, minimum_norm, rows_at
-from pin_nonideal.types import Array, State, Table
+from pin_nonideal.types import Array, Model, State, Table
 from pin_nonideal.validation import array, by_name, number, sequence
 
 from .holding import HoldingTorque, holding_torques
 from .residual import AtRest, weight
+
+Limits = tuple[Array, Array]  # least and largest torque of each driven degree of freedom [N m or N]
 
 # Tolerance of A a = b, relative to its terms.
 ACCELERATION_TOL = 1e-6
@@ -111,33 +112,41 @@ def inverse_dynamics(
     speed = named_velocity(model, v, scene.v0, "inverse_dynamics: v")
     acceleration = named_velocity(model, a, still, "inverse_dynamics: a")
     time = number("inverse_dynamics: t", t)
-    dofs = _driven(scene, actuated)
-    limits = None if bounds is None else _bounds(scene, bounds, dofs)
-    rest = AtRest(scene, still, time, at)
-    A, b, _, rate = rows_at(rest.runner, at, speed, time)
+    dofs = _driven(model, actuated)
+    limits = None if bounds is None else _bounds(model, bounds, dofs)
+    rest = AtRest(compiled_scene(scene), still, time, at)
+    return torques_of_motion(rest, at, speed, acceleration, dofs, scene.name, limits)
+
+
+def torques_of_motion(
+    rest: AtRest, q: Array, v: Array, a: Array, dofs: list[int], name: str, limits: Limits | None = None
+) -> InverseDynamics:
+    """Return the torques of a motion with the time and the contacts of `rest`, see `inverse_dynamics`."""
+    A, b, _, rate = rows_at(rest.runner, q, v, rest.t)
     if len(A):
-        allowed = _allowed_residual(rest, at, A, b, acceleration)
-        _open_contacts(rest, A, b, rate, acceleration, allowed)
-        _check_follows(scene, A, b, acceleration, rest.open, allowed)
-    result = _Torques(rest, at, speed, acceleration, dofs).solve(limits)
-    if speed.any() or acceleration.any():
+        allowed = _allowed_residual(rest, q, A, b, a)
+        _open_contacts(rest, A, b, rate, a, allowed)
+        _check_follows(rest, A, b, a, allowed)
+    result = _Torques(rest, q, v, a, dofs).solve(limits, name)
+    if v.any() or a.any():
         return result
-    return replace(result, _holding=partial(holding_torques, scene, at, result.tau, time, rest.open, dofs))
+    at_rest = rest.compiled, q, result.tau, rest.t, rest.open, dofs
+    return replace(result, _holding=partial(holding_torques, *at_rest))
 
 
-def _driven(scene: Scene, actuated: Sequence[str] | None) -> list[int]:
+def _driven(model: Model, actuated: Sequence[str] | None) -> list[int]:
     """Return the degrees of freedom of the actuated joints."""
     if actuated is None:
-        return list(range(scene.model.nv))
+        return list(range(model.nv))
     if isinstance(actuated, str):
         raise InputError(f"inverse_dynamics: actuated must be a list of joints; got {short_repr(actuated)}")
     joints = [
-        find_joint(scene.model, name, "inverse_dynamics: actuated") for name in sequence("actuated", actuated)
+        find_joint(model, name, "inverse_dynamics: actuated") for name in sequence("actuated", actuated)
     ]
-    return [int(scene.model.idx_vs[j]) + k for j in joints for k in range(scene.model.nvs[j])]
+    return [int(model.idx_vs[j]) + k for j in joints for k in range(model.nvs[j])]
 
 
-def _bounds(scene: Scene, bounds: object, dofs: list[int]) -> tuple[Array, Array]:
+def _bounds(model: Model, bounds: object, dofs: list[int]) -> Limits:
     """Least and largest torque of each actuated degree of freedom."""
     pairs = by_name(bounds)
     if pairs is not None:
@@ -156,7 +165,7 @@ def _bounds(scene: Scene, bounds: object, dofs: list[int]) -> tuple[Array, Array
     def bound(k: int, others: float) -> Array:
         entry, what = bounds[k], f"bounds: {('least', 'largest')[k]}"
         if by_name(entry) is not None:
-            return named_joint_values(scene.model, entry, what, others)[dofs]
+            return named_joint_values(model, entry, what, others)[dofs]
         if np.ndim(entry) == 0:
             return np.full(len(dofs), float(array(what, entry, ())))
         return array(what, entry, (len(dofs),))
@@ -169,7 +178,7 @@ def _bounds(scene: Scene, bounds: object, dofs: list[int]) -> tuple[Array, Array
 
 def _allowed_residual(rest: AtRest, q: Array, A: Array, b: Array, a: Array) -> Array:
     """Return the allowed residual of each row of A a = b, relative to its terms and to gravity, (m,)."""
-    falls = rest.scaled_rows(q, rest.root(q))[1] * weight(rest.scene)
+    falls = rest.scaled_rows(q, rest.root(q))[1] * weight(rest.compiled.model)
     return np.asarray(ACCELERATION_TOL * (np.abs(A) @ np.abs(a) + np.abs(b) + falls + ROUNDING))
 
 
@@ -179,16 +188,13 @@ def _open_contacts(rest: AtRest, A: Array, b: Array, rate: Array, a: Array, allo
         rest.release((rate > AT_REST * (1.0 + np.abs(rate).max())) | (A @ a - b > allowed))
 
 
-def _check_follows(
-    scene: Scene, A: Array, b: Array, a: Array, open_rows: NDArray[np.bool_], allowed: Array
-) -> None:
+def _check_follows(rest: AtRest, A: Array, b: Array, a: Array, allowed: Array) -> None:
     """Raise InputError if an acceleration violates A a = b of a constraint or closed contact."""
-    missed = np.where(open_rows, 0.0, np.abs(A @ a - b))
+    missed = np.where(rest.open, 0.0, np.abs(A @ a - b))
     if (missed > allowed).any():
         worst = int(np.argmax(missed / allowed))
-        compiled = compiled_scene(scene)
-        point = next(n for n, s in compiled.slices.items() if s.start <= worst < s.stop)
-        name = compiled.contact(point)
+        point = next(n for n, s in rest.compiled.slices.items() if s.start <= worst < s.stop)
+        name = rest.compiled.contact(point)
         raise InputError(
             f'inverse_dynamics: a must follow the constraints, A a = b; "{name}" misses it by '
             f"{missed[worst]:.2g} (m/s^2 or rad/s^2); take one that scene.acceleration gives, or solve for "
@@ -210,7 +216,7 @@ class _Torques:
 
     def _modes(self) -> tuple[list[Any], Array]:
         """Return modes from slip, or its acceleration at rest, and a velocity at which all elements slip."""
-        runner, t, v, model = self.rest.runner, self.rest.t, self.v, self.rest.scene.model
+        runner, t, v, model = self.rest.runner, self.rest.t, self.v, self.rest.compiled.model
         rows = [
             runner.slip_rows(pin.integrate(model, self.q, s * DIFFERENCE_STEP * v), v, t).reshape(-1, len(v))
             for s in (-1.0, 0.0, 1.0)
@@ -232,7 +238,7 @@ class _Torques:
         ahead = 10.0 * quiet / max(quiet_change, float(np.abs(self.a).max(initial=0.0)))
         return modes, v + ahead * self.a if begins else v
 
-    def solve(self, limits: tuple[Array, Array] | None) -> InverseDynamics:
+    def solve(self, limits: Limits | None, name: str) -> InverseDynamics:
         """Iterate torques of least norm, within their limits, until friction agrees with the reactions."""
         G = self.free.T @ self.select / self.arms
         root = np.linalg.cholesky(self.free.T @ self.M @ self.free)
@@ -258,18 +264,16 @@ class _Torques:
         else:
             raise FrictionConvergenceError(
                 f"inverse_dynamics: friction and torques did not settle in {MAX_PASSES} passes; the friction "
-                f'of "{self.rest.scene.name}" depends too much on the torques here',
-                element=", ".join(self.rest.scene.element_names),
+                f'of "{name}" depends too much on the torques here',
+                element=", ".join(self.rest.compiled.elements.names),
             )
         lam = self.rest.runner.solve(self.q, self.slipping, self.rest.t, tau, self.modes).lam
         left = float(np.abs(self.free @ (G @ u - needed)).max(initial=0.0))
-        rows = compiled_scene(self.rest.scene).multipliers.groups
+        rows = self.rest.compiled.multipliers.groups
         return InverseDynamics(tau, rows.sum(np.asarray(lam)), left)
 
 
-def _bounded_least_squares(
-    scaled: Array, needed: Array, lengths: Array, limits: tuple[Array, Array] | None
-) -> Array:
+def _bounded_least_squares(scaled: Array, needed: Array, lengths: Array, limits: Limits | None) -> Array:
     """Solve min |scaled (lengths u) - needed| for the u of least norm; active limits hold exactly."""
     u = minimum_norm(scaled, needed, lengths)
     if limits is None or ((limits[0] <= u) & (u <= limits[1])).all():

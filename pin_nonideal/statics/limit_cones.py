@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pin_nonideal.core_loader import core
-from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.states.rows import MIN_SINGULAR_VALUE
 from pin_nonideal.types import Array
 
@@ -28,7 +27,6 @@ class LimitCones:
     of rows and elements that exert no force: open contacts and friction without a load.
 
     Args:
-        scene: the scene.
         at_rest: forces at rest.
         q: configuration on the constraints, (nq,).
         dof: degree of freedom of the drive with an additional torque, or None.
@@ -44,13 +42,12 @@ class LimitCones:
         unheld: motion that no unknown resists, along the part of the load that nothing balances, (nv,).
     """
 
-    def __init__(self, scene: Scene, at_rest: AtRest, q: Array, dof: int | None = None) -> None:
-        core_program = compiled_scene(scene).program
+    def __init__(self, at_rest: AtRest, q: Array, dof: int | None = None) -> None:
         root = at_rest.root(q)
         _, reach, rows = at_rest.scaled_rows(q, root)
         _, lengths, D = at_rest.directions(q)
         self.rows = m = len(rows)
-        ends = [0, *np.cumsum(core_program.element_sizes).tolist()]
+        ends = [0, *np.cumsum(at_rest.program.element_sizes).tolist()]
         self.parts = [slice(m + a, m + b) for a, b in pairwise(ends)]
         for first, end in pairwise(ends):
             lengths[first:end] = lengths[first:end].max(initial=0.0)
@@ -64,7 +61,7 @@ class LimitCones:
         scaled = np.vstack([rows, np.vstack([D, drive]) / self.lengths[m:, None]])
         acting = np.linalg.solve(root, -at_rest.forces(q))
         largest = float(np.linalg.norm(acting))
-        self.unit = max(largest, MIN_FORCE_SCALE * weight(scene))
+        self.unit = max(largest, MIN_FORCE_SCALE * weight(at_rest.compiled.model))
         if dof is not None or self.unit == 0.0:
             self.unit = max(self.unit, float(limits.max(initial=0.0))) or 1.0
         acts = np.ones(len(scaled), dtype=bool)
@@ -107,7 +104,7 @@ class LimitCones:
             (ne,).
         """
         # Laws of joints come before the friction of contacts and rolling bodies.
-        laws = len(at_rest.scene.laws)
+        laws = len(at_rest.compiled.spec.laws)
         elements = [
             (row if law >= laws else -1, coefficient, constant)
             for law, (row, coefficient, constant) in zip(

@@ -8,19 +8,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.core_loader import core
-from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.states.rows import (
     MIN_SINGULAR_VALUE,
     gap_rows,
-    holonomic_rows,
     minimum_norm,
     residuals_at,
     row_lengths,
     rows_at,
 )
 from pin_nonideal.states.scales import slides
-from pin_nonideal.types import Array
+from pin_nonideal.types import Array, Model
 
 
 class Balance(NamedTuple):
@@ -52,7 +51,7 @@ class AtRest:
     Functions of time are frozen: driven constraints keep their value at time t.
 
     Args:
-        scene: the scene.
+        compiled: the compiled scene.
         tau: torques that replace the scene's actuation, (nv,), or None.
         t: time [s].
         q: configuration that defines the open contacts, (nq,).
@@ -64,16 +63,16 @@ class AtRest:
         only_slides: whether all coordinates are lengths.
     """
 
-    def __init__(self, scene: Scene, tau: Array | None, t: float, q: Array) -> None:
-        self.scene, self.tau, self.t = scene, tau, t
-        self.program = compiled_scene(scene).program
+    def __init__(self, compiled: CompiledScene, tau: Array | None, t: float, q: Array) -> None:
+        self.compiled, self.tau, self.t = compiled, tau, t
+        self.program = compiled.program
         self.runner = self.program.runner()
-        self.still = np.zeros(scene.model.nv)
-        self._slides = slides(scene.model)
+        self.still = np.zeros(compiled.model.nv)
+        self._slides = slides(compiled.model)
         self.only_slides = bool(self._slides.all())
         self._smooth = [core.Mode.unloaded] * len(self.program.element_sizes)
         self.gaps = gap_rows(self.program)
-        self.touching = TOUCHING_GAP * max(1.0, compiled_scene(scene).projection.length)
+        self.touching = TOUCHING_GAP * max(1.0, compiled.projection.length)
         self.begin(q)
 
     def begin(self, q: Array) -> None:
@@ -239,20 +238,11 @@ def _free_basis(scaled: Array, root: Array) -> Array:
     return np.asarray(np.linalg.qr(np.linalg.solve(root.T, turned[rank:].T))[0])
 
 
-def weight(scene: Scene) -> float:
+def weight(model: Model) -> float:
     """Compute the norm of the weight of free bodies in the metric of M^-1 [sqrt(kg) m/s^2].
 
     Args:
-        scene: the scene.
+        model: pinocchio.Model.
     """
-    mass = sum(body.mass for body in scene.model.inertias)
-    return float(np.sqrt(mass) * np.linalg.norm(scene.model.gravity.linear))
-
-
-def restricts_velocity_only(scene: Scene) -> bool:
-    """Check if a row restricts the velocity but no position, such as a knife edge.
-
-    Args:
-        scene: the scene.
-    """
-    return not bool(holonomic_rows(compiled_scene(scene).program).all())
+    mass = sum(body.mass for body in model.inertias)
+    return float(np.sqrt(mass) * np.linalg.norm(model.gravity.linear))

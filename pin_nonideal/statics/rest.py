@@ -8,6 +8,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
+from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.compilation.contact_groups import contact_names
 from pin_nonideal.html_tables import NAMES_MAX, numbers, table
 from pin_nonideal.scene.scene import Scene, compiled_scene, require_scene
@@ -95,64 +96,62 @@ def rest(scene: Scene, q: State | None = None, tau: State | None = None, *, t: f
         FrictionConvergenceError: the solver found neither forces nor a proof that there are none.
     """
     require_scene("rest", scene)
-    still = np.zeros(scene.model.nv)
+    compiled, still = compiled_scene(scene), np.zeros(scene.model.nv)
     torque = None if tau is None else named_velocity(scene.model, tau, still, "rest: tau")
     time = number("rest: t", t)
     at = scene.project(q, still, time)[0]
-    at_rest = AtRest(scene, torque, time, at)
+    at_rest = AtRest(compiled, torque, time, at)
     drives = at_rest.forces(at) - at_rest.undriven(at)
-    cones = LimitCones(scene, at_rest, at)
+    cones = LimitCones(at_rest, at)
     factor = cones.min_factor()
-    holding = partial(holding_torques, scene, at, drives, time, at_rest.open)
+    holding = partial(holding_torques, compiled, at, drives, time, at_rest.open)
     if np.isinf(factor):
-        reason = _unheld(scene, at_rest, at, cones)
-        rows = len(compiled_scene(scene).multipliers.groups.names)
+        reason = _unheld(at_rest, at, cones)
+        rows = len(compiled.multipliers.groups.names)
         return Rest(False, -np.inf, {}, np.zeros(rows), reason, holding)
     forces = cones.forces(factor)
-    compiled = compiled_scene(scene)
     friction = {
-        name: _resultant(scene, at, time, [forces[part] for part in cones.parts[own]], own)
+        name: _resultant(compiled, at, time, [forces[part] for part in cones.parts[own]], own)
         for name, own in compiled.elements.slices().items()
     }
     margin = 1.0 - factor
     rests = margin >= -10.0 * FACTOR_TOL
-    reason = "" if rests else _elements_at_limit(scene, cones, factor)
+    reason = "" if rests else _elements_at_limit(compiled, cones, factor)
     lam = compiled.multipliers.groups.sum(forces[: cones.rows])
     return Rest(rests, margin, friction, lam, reason, holding)
 
 
-def _resultant(scene: Scene, q: Array, t: float, forces: list[Array], own: slice) -> Array:
+def _resultant(compiled: CompiledScene, q: Array, t: float, forces: list[Array], own: slice) -> Array:
     """Return the sum of the friction forces of a contact, along the axes of its first loaded point."""
     loaded = [k for k, force in enumerate(forces) if force.any()]
     if len(loaded) < 2:
         return forces[loaded[0] if loaded else 0]
-    axes = slip_axes(scene, q, t, [own.start + k for k in loaded])
+    axes = slip_axes(compiled, q, t, [own.start + k for k in loaded])
     force = np.einsum("ki,kij->j", [forces[k] for k in loaded], axes)
     return np.asarray(axes[0] @ force)
 
 
-def _elements_at_limit(scene: Scene, cones: LimitCones, factor: float) -> str:
+def _elements_at_limit(compiled: CompiledScene, cones: LimitCones, factor: float) -> str:
     """Return the elements at their limits where friction needs larger limits."""
-    compiled = compiled_scene(scene)
     elements = compiled.program.element_names
     names = contact_names((elements[e] for e in cones.at_limits(factor)), compiled.contact_of)
     where = f"; at their limits: {_quote(names)}" if names else ""
     return f"dry friction needs {factor:.4g} times its limits{where}"
 
 
-def _unheld(scene: Scene, at_rest: AtRest, q: Array, cones: LimitCones) -> str:
+def _unheld(at_rest: AtRest, q: Array, cones: LimitCones) -> str:
     """Return the joint, the contacts or the elements that cannot hold for any friction limits."""
+    compiled = at_rest.compiled
     if not cones.holds:
         force, way = at_rest.forces(q), cones.unheld
         shares = force * way
         dof = int(np.abs(shares).argmax())
         at_joint = float(force @ way) / float(way[dof])
         return (
-            f'nothing holds the motion of joint "{_joint_of(scene.model, dof)}": {at_joint:.4g} (N or N m) '
-            "is left on it, and no constraint, contact or friction acts along this motion"
+            f'nothing holds the motion of joint "{_joint_of(compiled.model, dof)}": {at_joint:.4g} (N or N m)'
+            " is left on it, and no constraint, contact or friction acts along this motion"
         )
     pulls, missing_friction = cones.missing()
-    compiled = compiled_scene(scene)
     points = {rows.start: name for name, rows in compiled.slices.items()}
     parts = []
     if pulls:

@@ -133,11 +133,10 @@ class TrackTrajectory(SceneDrive):
             motion = ReferenceMotion(model, times, q, v, rounding)
             tracking = _Tracking(model, motion, stated, driven, kp, kd, self.feedforward)
             return BoundDrive(tracking, driven, breaks)
-        scene = without_drives(model, q0, spec, who)
-        names = [place.name for place in joint_places(model) if driven[place.v_first]]
+        compiled = without_drives(model, q0, spec, who)
 
         def reference() -> ClosedReference:
-            return ClosedReference(scene, times, q, v, stated, names, driven, who, rounding)
+            return ClosedReference(compiled, times, q, v, stated, driven, who, rounding)
 
         constrained = _ConstrainedTracking(model, reference, kp, kd)
         return BoundDrive(constrained, driven, breaks, constrained.prepare)

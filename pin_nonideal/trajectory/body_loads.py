@@ -14,7 +14,7 @@ from pin_nonideal.compilation.resolver import WORLD, Frame, Resolver
 from pin_nonideal.description.constraints import KnifeEdge, Rolling
 from pin_nonideal.description.forces import SpringDamper, Wrench
 from pin_nonideal.description.laws import Drag
-from pin_nonideal.scene.scene import Scene, compiled_scene
+from pin_nonideal.scene.scene import compiled_scene
 from pin_nonideal.states.kinematics import BodyMotions
 from pin_nonideal.types import Array
 
@@ -49,20 +49,20 @@ def loads_on_bodies(run: RunFields) -> Iterator[Load]:
     Args:
         run: fields of the run, with reactions.
     """
-    scene: Scene = run.scene
-    resolver = Resolver(scene.model, scene.q0)
-    for name, c in compiled_scene(scene).described.items():
+    compiled = compiled_scene(run.scene)
+    resolver = Resolver(compiled.model, compiled.q0)
+    for name, c in compiled.described.items():
         if name in reactions_of(run) and (frames := _frames(c, name, resolver)):
             yield from _pair(run, name, c, *frames)
-    for name in compiled_scene(scene).points:
+    for name in compiled.points:
         if name in reactions_of(run):
             yield from _pair_of_shapes(run, name)
-    for f in scene.forces:
+    for f in compiled.spec.forces:
         if isinstance(f, Wrench):
             yield _wrench_loads(run, f, resolver.frame(f.frame, "reaction"))
         elif isinstance(f, SpringDamper):
             yield from _sprung(f, *resolver.pair(f, "reaction"))
-    for law in scene.laws:
+    for law in compiled.spec.laws:
         if isinstance(law, Drag):
             yield _drag_loads(law, resolver.frame(law.frame, "reaction"))
 
@@ -112,7 +112,7 @@ def _pair(run: RunFields, name: str, c: Any, first: Frame, second: Frame) -> Ite
 
 def _pair_of_shapes(run: RunFields, name: str) -> Iterator[Load]:
     """Yield the wrench of a pair of shapes with several points on both of its bodies."""
-    bodies = contact_bodies(run.scene, name)
+    bodies = contact_bodies(compiled_scene(run.scene), name)
     for joint, sign in ((bodies.joint, 1.0), (bodies.other, -1.0)):
 
         def at(k: int, motions: BodyMotions, sign: float = sign) -> pin.Force:

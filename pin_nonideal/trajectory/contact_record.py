@@ -28,9 +28,10 @@ def contact_record(run: RunFields, name: str) -> ContactRecord:
         if name in scene.contact_names:
             raise InputError(f'contact("{name}") has no contact point; see run.force("{name}")')
         raise UnknownNameError(f'no contact "{name}" in this run{nearest(name, forces)}')
-    points = compiled_scene(scene).points.get(name, [name])
+    compiled = compiled_scene(scene)
+    points = compiled.points.get(name, [name])
     q = np.asarray(run.q, dtype=float)
-    bodies = contact_bodies(scene, name)
+    bodies = contact_bodies(compiled, name)
     loads, touching = _loads(run, name)
     closed: NDArray[np.bool_] = np.ones(len(run.t), dtype=bool)
     if run.closed is not None:
@@ -43,8 +44,8 @@ def contact_record(run: RunFields, name: str) -> ContactRecord:
         force=forces[name],
         torque=torques[name],
         normal_force=loads.sum(axis=1),
-        center=centers(loads, contact_lines(scene, q, run.t, touching)[0]),
-        gap=gaps_of_points(scene, q, run.t, points).min(axis=1),
+        center=centers(loads, contact_lines(compiled, q, run.t, touching)[0]),
+        gap=gaps_of_points(compiled, q, run.t, points).min(axis=1),
     )
 
 

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.core_loader import core
 from pin_nonideal.errors import InputError
-from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.types import Array, Table
 
 from .outcome import outcome_fields
@@ -67,14 +67,15 @@ class DenseOutput:
     def __len__(self) -> int:
         return len(self.times)
 
-    def at(self, scene: Scene, t: Array) -> Table:
-        """Return the fields of a Trajectory with samples at any times of the run.
+    def at(self, compiled: CompiledScene, t: Array, name: str) -> Table:
+        """Return the fields of a Trajectory, without its scene, with samples at any times of the run.
 
         At the boundary of two steps, for example at an event, the later step is used.
 
         Args:
-            scene: scene of the run.
+            compiled: compiled scene of the run.
             t: times [s], (k,).
+            name: name of the scene, for messages.
 
         Raises:
             InputError: a time is outside of the run.
@@ -84,11 +85,11 @@ class DenseOutput:
             outside_time = t.max() if len(self) and self.times[0, 0] <= t.min() else t.min()
             raise InputError(f"at: t must lie in the run, which took {span}; got {outside_time:g} s")
         sizes = (self.states.shape[2], self.modes.shape[1], len(self.torque) and self.torque.shape[1])
-        program, nv = compiled_scene(scene).program, scene.model.nv
+        program, nv = compiled.program, compiled.model.nv
         work = len(program.power_names) if self.options.energy else 0
-        known = (scene.model.nq + nv + program.states + work, len(program.element_names))
+        known = (compiled.model.nq + nv + program.states + work, len(program.element_names))
         if sizes[:2] != known or sizes[2] not in (0, nv):
-            raise InputError(f'at: the scene "{scene.name}" is not the one of the run')
+            raise InputError(f'at: the scene "{name}" is not the one of the run')
         step = np.maximum(np.searchsorted(self.times[:, 0], t, side="right") - 1, 0)
         begin, end = self.times[step].T
         part = (t - begin) / (end - begin)
@@ -106,7 +107,7 @@ class DenseOutput:
             np.ascontiguousarray(self.torque[step] if len(self.torque) else self.torque),
             moved,
         )
-        return outcome_fields(scene, outcome, self.options)
+        return outcome_fields(compiled, outcome, self.options)
 
 
 def inside_steps(states: Array, step: NDArray[np.int64], part: Array) -> Array:

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from pin_nonideal.atomic_files import file_path, mode_of, whole_file
+from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.errors import LoadingError, PinNonidealError
 from pin_nonideal.loading.load import load_from_origin
 from pin_nonideal.scene.scene import Scene, compiled_scene, scene_origin
@@ -211,15 +212,15 @@ def reason_of(error: Exception) -> str:
     return "its content is damaged or of another kind"
 
 
-def matches_scene(scene: Scene, joints: Sequence[JointPlace], rows: Table) -> bool:
+def matches_scene(compiled: CompiledScene, joints: Sequence[JointPlace], rows: Table) -> bool:
     """Check if a scene has the joints and rows of a run.
 
     Args:
-        scene: scene to compare.
+        compiled: compiled scene to compare.
         joints: joints of the run.
         rows: rows of the run.
     """
-    return compiled_scene(scene).joints == list(joints) and compiled_scene(scene).rows == rows
+    return compiled.joints == list(joints) and compiled.rows == rows
 
 
 def describe_content(joints: Sequence[JointPlace], rows: Table) -> str:
@@ -255,7 +256,7 @@ def reload_scene(origin: Any, joints: Sequence[JointPlace], rows: Table, notes: 
     except (PinNonidealError, OSError, ValueError, LookupError, TypeError, AttributeError) as error:
         notes.append(f"the scene of the run cannot be loaded again: {error}")
         return None
-    if matches_scene(scene, joints, rows):
+    if matches_scene(compiled_scene(scene), joints, rows):
         return scene
     notes.append(f'the robot "{origin["name"]}" is no longer the one of the run; its scene is left out')
     return None

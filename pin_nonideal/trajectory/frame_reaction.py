@@ -7,6 +7,7 @@ consists of the frames that descend from it on its body, and of the moving joint
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +16,7 @@ import pinocchio as pin
 from pin_nonideal.errors import InputError
 from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.states.kinematics import BodyMotions, frame_index
-from pin_nonideal.types import Array, Model
+from pin_nonideal.types import Array, GeometryModel, Model
 
 from .body_loads import Load, about_world, loads_on_bodies
 from .fields import RunFields, reactions_of
@@ -81,7 +82,10 @@ def frame_reaction(run: RunFields, name: str, index: int) -> Array:
     model = run.scene.model
     joint, place = int(model.frames[index].parentJoint), model.frames[index].placement
     loads = [load for load in loads_on_bodies(run) if load.joint == joint]
-    part = _part_beyond(run.scene, index, loads, who)
+    children = [c for c in range(1, model.njoints) if model.parents[c] == joint]
+    held = [c for c in children if _child_beyond(model, c, index, who)]
+    own_loads = [load for load in loads if _load_beyond(run.scene, load, index, who)]
+    part = Part(joint, _inertia_beyond(model, index, who), held, own_loads)
     bodies = [_whole_body(model, joint, loads)] if joint else []
     if not joint:  # the universe has no reaction; its children show the same masses and gravity
         bodies = [_whole_body(model, child, _on(run, child)) for child in part.children]
@@ -141,20 +145,6 @@ def _whole_body(model: Model, joint: int, loads: list[Load]) -> Part:
 
 def _on(run: RunFields, joint: int) -> list[Load]:
     return [load for load in loads_on_bodies(run) if load.joint == joint]
-
-
-def _part_beyond(scene: Scene, index: int, loads: list[Load], who: str) -> Part:
-    """Return the part beyond a frame.
-
-    Raises:
-        InputError: the model does not determine the part beyond the frame.
-    """
-    model = scene.model
-    joint = int(model.frames[index].parentJoint)
-    children = [c for c in range(1, model.njoints) if model.parents[c] == joint]
-    held = [c for c in children if _child_beyond(model, c, index, who)]
-    own = [load for load in loads if _load_beyond(scene, load, index, who)]
-    return Part(joint, _inertia_beyond(model, index, who), held, own)
 
 
 def _is_beyond(model: Model, frame: int, index: int) -> bool | None:
@@ -254,7 +244,8 @@ def _load_beyond(scene: Scene, load: Load, index: int, who: str) -> bool:
     if load.frame is not None and model.existFrame(load.frame):
         is_beyond = _is_beyond(model, frame_index(model, load.frame), index)
         if load.contact is not None and load.frame == str(model.names[load.joint]):
-            is_beyond = _shape_beyond(scene, load.joint, load.contact, index)
+            names = compiled_scene(scene).shapes.get(load.contact, ())
+            is_beyond = _shape_beyond(model, scene.collision_model, load.joint, names, index)
     elif load.frame is not None:  # a joint without a frame
         is_beyond = False
     if is_beyond is None:
@@ -266,16 +257,17 @@ def _load_beyond(scene: Scene, load: Load, index: int, who: str) -> bool:
     return is_beyond
 
 
-def _shape_beyond(scene: Scene, joint: int, contact: str, index: int) -> bool | None:
+def _shape_beyond(
+    model: Model, shapes: GeometryModel | None, joint: int, names: Sequence[str], index: int
+) -> bool | None:
     """Check if a contact that names only the moving joint, as those of collision shapes, lies beyond a frame.
 
     Each shape of a `GeometryContact` belongs to a link. Another contact lies on the link of the joint itself,
     unless shapes on that body lie beyond the frame.
     """
-    shapes = scene.collision_model
     own = [] if shapes is None else [g for g in shapes.geometryObjects if g.parentJoint == joint]
-    named = [g for g in own if g.name in compiled_scene(scene).shapes.get(contact, ())]
-    sides = {_is_beyond(scene.model, int(g.parentFrame), index) for g in named or own}
+    named = [g for g in own if g.name in names]
+    sides = {_is_beyond(model, int(g.parentFrame), index) for g in named or own}
     if named:
         return sides.pop() if len(sides) == 1 else None
     return None if sides - {False} else False

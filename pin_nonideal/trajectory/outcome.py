@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.compilation.contact_groups import Groups
 from pin_nonideal.compilation.error_context import joint_of
 from pin_nonideal.core_loader import core
-from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.types import Array, Table
 
 from .pair_events import ContactStates, contact_events
@@ -42,18 +42,19 @@ def outcome_stats(outcome: core.Outcome, wall: float) -> Stats:
     )
 
 
-def outcome_fields(scene: Scene, outcome: core.Outcome, options: Any) -> Table:
-    """Return the fields of a Trajectory, without its counters, from the core's flat arrays.
+def outcome_fields(compiled: CompiledScene, outcome: core.Outcome, options: Any) -> Table:
+    """Return the fields of a Trajectory, without its counters and its scene, from the core's flat arrays.
 
     Args:
-        scene: scene of the run.
+        compiled: compiled scene of the run.
         outcome: result of the core.
         options: options of the run, a RunOptions.
     """
-    t, nq, nv, compiled = outcome.t, scene.q0.size, scene.v0.size, compiled_scene(scene)
+    t, nq, nv = outcome.t, compiled.model.nq, compiled.model.nv
     nt, program = len(t), compiled.program
     every = getattr(options, "contact_points", False)  # dense output of earlier versions has no such option
-    points = recorded_points(scene, outcome, every=every, forces=options.forces, reactions=options.reactions)
+    recorded = {"forces": options.forces, "reactions": options.reactions}
+    points = recorded_points(compiled, outcome, every=every, **recorded)
     fields: Table = {"points": points}
     if options.a:
         fields["a"] = outcome.a.reshape(nt, nv)
@@ -65,21 +66,21 @@ def outcome_fields(scene: Scene, outcome: core.Outcome, options: Any) -> Table:
         rows = compiled.multipliers.groups
         fields["lam"] = rows.sum(outcome.lam.reshape(nt, program.rows))
         fields["lam_ideal"] = rows.sum(outcome.lam_ideal.reshape(nt, program.rows))
-        fields |= contact_forces(scene, outcome, points)
+        fields |= contact_forces(compiled, outcome, points)
     if options.laws:
-        fields |= _of_laws(scene, outcome)
+        fields |= _of_laws(compiled, outcome)
     if every:
         fields["contact_points"] = {} if points is None else points.by_contact()
     if options.reactions:
-        fields["reactions"] = reactions(scene, outcome, points)
+        fields["reactions"] = reactions(compiled, outcome, points)
     works = compiled.works
     if options.power:
         power = works.sum(outcome.power.reshape(nt, works.count))
-        fields["power"] = dict(zip(_columns(works, scene), power.T, strict=True))
+        fields["power"] = dict(zip(_columns(compiled), power.T, strict=True))
     if options.energy:
         jumps = ["impacts"] if compiled.opening_names else []
-        fields["energy"] = _ledger(works, [*_columns(works, scene), *jumps], outcome.energy)
-    if scene.contact_names:
+        fields["energy"] = _ledger(works, [*_columns(compiled), *jumps], outcome.energy)
+    if compiled.contacts.names:
         closed = outcome.closed.reshape(nt, compiled.contacts.count).astype(bool)
         fields["closed"] = compiled.contacts.any(closed)
     if program.states:
@@ -90,9 +91,9 @@ def outcome_fields(scene: Scene, outcome: core.Outcome, options: Any) -> Table:
 
     def states() -> ContactStates:
         modes = fields.get("modes", np.zeros((nt, 0), dtype=np.int8))
-        return ContactStates(t, fields["closed"], scene.contact_names, modes, scene.element_names)
+        return ContactStates(t, fields["closed"], compiled.contacts.names, modes, elements.names)
 
-    events = [_event(scene, event, options.event_names) for event in outcome.events]
+    events = [_event(compiled, event, options.event_names) for event in outcome.events]
     fields |= {
         "t": t,
         "q": outcome.q.reshape(nt, nq),
@@ -104,13 +105,11 @@ def outcome_fields(scene: Scene, outcome: core.Outcome, options: Any) -> Table:
         fields = {key: _copied(value) for key, value in fields.items()}
     return dict(
         events=contact_events(events, compiled.contact, states),
-        scene=scene,
         element_names=list(elements.names),
         element_laws=compiled.laws.index[np.array(program.element_laws, dtype=int)[elements.starts]].tolist(),
         law_names=list(compiled.laws.names),
         joints=compiled.joints,
         rows=compiled.rows,
-        name=scene.name,
         **fields,
     )
 
@@ -122,9 +121,9 @@ def _copied(value: object) -> object:
     return np.array(value) if isinstance(value, np.ndarray) else value
 
 
-def _of_laws(scene: Scene, outcome: core.Outcome) -> Table:
+def _of_laws(compiled: CompiledScene, outcome: core.Outcome) -> Table:
     """Return the forces of the laws on the degrees of freedom of each law, and the limits of the elements."""
-    compiled, nt = compiled_scene(scene), len(outcome.t)
+    nt = len(outcome.t)
     flat, last = (numbers.astype(int).tolist() for numbers in compiled.program.law_supports())
     ends = [0, *last]
     supports = [flat[start:end] for start, end in itertools.pairwise(ends)]
@@ -157,19 +156,18 @@ def _sum_of_laws(supports: Sequence[list[int]], forces: Array) -> tuple[list[int
     return together, total
 
 
-def _event(scene: Scene, event: core.Event, functions: Sequence[str]) -> Event:
+def _event(compiled: CompiledScene, event: core.Event, functions: Sequence[str]) -> Event:
     """Return an event with the name of its element, contact or constraint, or of the user's function."""
     if event.kind is core.EventKind.user:
         return Event(event.time, event.kind.name, functions[event.element])
     if event.kind in (core.EventKind.saturate, core.EventKind.desaturate):
-        joint = scene.model.names[joint_of(scene.model, event.element)]
+        joint = compiled.model.names[joint_of(compiled.model, event.element)]
         return Event(event.time, event.kind.name, str(joint))
     if not event.of_contact and event.kind is not core.EventKind.jump:
         # Without friction, a cluster of events consists of contact events.
-        compiled = compiled_scene(scene)
         names = compiled.program.element_names or compiled.opening_names
         return Event(event.time, event.kind.name, names[event.element])
-    name = compiled_scene(scene).block_names[event.element]
+    name = compiled.block_names[event.element]
     if event.kind not in (core.EventKind.impact, core.EventKind.jump):
         return Event(event.time, event.kind.name, name, miss=event.miss)
     change = event.energy_change
@@ -191,9 +189,9 @@ def _ledger(works: Groups, columns: Sequence[str], energy: Array) -> dict[str, A
     return ledger
 
 
-def _columns(works: Groups, scene: Scene) -> list[str]:
+def _columns(compiled: CompiledScene) -> list[str]:
     """Return the names of the power columns; laws are renamed if another ledger column has their name."""
-    names = works.names
-    first_law = len(names) - len(scene.law_names)
+    names = compiled.works.names
+    first_law = len(names) - len(compiled.laws.names)
     used_names = {*LEDGER, *names[:first_law], "projection"}
     return names[:first_law] + [f"law {name}" if name in used_names else name for name in names[first_law:]]

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.compilation.contact_groups import OPEN
 from pin_nonideal.core_loader import core
-from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.types import Array
 
 from .contact_points import contact_lines, gaps_of_points, side_of_point
@@ -86,47 +86,45 @@ class PointSamples:
 
 
 def recorded_points(
-    scene: Scene, outcome: core.Outcome, *, every: bool, forces: bool, reactions: bool
+    compiled: CompiledScene, outcome: core.Outcome, *, every: bool, forces: bool, reactions: bool
 ) -> PointSamples | None:
     """Return the samples of contact points of a run, or None if there are no points to record.
 
     Args:
-        scene: scene of the run.
+        compiled: compiled scene of the run.
         outcome: result of the core.
         every: whether all contact points are recorded, with gaps and positions; else the points of pairs of
             shapes that touch.
         forces: whether the run recorded forces.
         reactions: whether it recorded reactions.
     """
-    compiled, nt = compiled_scene(scene), len(outcome.t)
-    program = compiled.program
+    program, nt = compiled.program, len(outcome.t)
     framed = [compiled.block_names[block] for block in program.framed_contacts]
     if not framed or not (every or compiled.points):
         return None
     column = {name: k for k, name in enumerate(compiled.point_names)}
     closed = outcome.closed.reshape(nt, len(column)) != 0
-    names = framed if every else _touching(scene, outcome, closed)
+    names = framed if every else _touching(compiled, outcome, closed)
     contacts = [compiled.contact(name) for name in names]
     loads, pushes, fields = np.zeros((nt, 0)), np.zeros((nt, 0, 3)), {}
     if forces:
         rows = [compiled.slices[name].stop - 1 for name in names]
         loads = outcome.lam.reshape(nt, program.rows)[:, rows]
     if forces or reactions:
-        side = np.array([side_of_point(scene, name) for name in names])
-        given = _forces(outcome, framed, names) if forces else _reactions(scene, outcome, names)
+        side = np.array([side_of_point(compiled, name) for name in names])
+        given = _forces(outcome, framed, names) if forces else _reactions(compiled, outcome, names)
         pushes = side[:, None] * given
     if every:
         q = np.ascontiguousarray(outcome.q.reshape(nt, -1))
-        fields["gaps"] = gaps_of_points(scene, q, outcome.t, names)
-        fields["places"] = contact_lines(scene, q, outcome.t, names)[0]
+        fields["gaps"] = gaps_of_points(compiled, q, outcome.t, names)
+        fields["places"] = contact_lines(compiled, q, outcome.t, names)[0]
     closed_points = closed[:, [column[name] for name in names]]
-    modes = _modes(scene, outcome, names)
+    modes = _modes(compiled, outcome, names)
     return PointSamples(names, contacts, closed_points, modes, loads, pushes, **fields)
 
 
-def _touching(scene: Scene, outcome: core.Outcome, closed: NDArray[np.bool_]) -> list[str]:
+def _touching(compiled: CompiledScene, outcome: core.Outcome, closed: NDArray[np.bool_]) -> list[str]:
     """Return the points of pairs of shapes that are closed or loaded at a sample, or take an impact."""
-    compiled = compiled_scene(scene)
     chosen = set(np.array(compiled.point_names)[closed.any(axis=0)].tolist())
     chosen |= {compiled.block_names[event.element] for event in outcome.events if event.of_contact}
     framed = [compiled.block_names[block] for block in compiled.program.framed_contacts]
@@ -140,17 +138,17 @@ def _forces(outcome: core.Outcome, framed: Sequence[str], names: Sequence[str]) 
     return forces[:, [column[name] for name in names]]
 
 
-def _reactions(scene: Scene, outcome: core.Outcome, names: Sequence[str]) -> Array:
+def _reactions(compiled: CompiledScene, outcome: core.Outcome, names: Sequence[str]) -> Array:
     """Return the forces of points as `_forces` does, from their wrenches."""
-    blocks, first = compiled_scene(scene).program.reaction_blocks, scene.model.njoints - 1
-    column = {compiled_scene(scene).block_names[block]: first + k for k, block in enumerate(blocks)}
+    blocks, first = compiled.program.reaction_blocks, compiled.model.njoints - 1
+    column = {compiled.block_names[block]: first + k for k, block in enumerate(blocks)}
     wrenches = outcome.reactions.reshape(len(outcome.t), first + len(blocks), 12)
     return wrenches[:, [column[name] for name in names], 6:9]
 
 
-def _modes(scene: Scene, outcome: core.Outcome, names: Sequence[str]) -> NDArray[np.int8]:
+def _modes(compiled: CompiledScene, outcome: core.Outcome, names: Sequence[str]) -> NDArray[np.int8]:
     """Return the modes of the friction elements of points, (nt, n)."""
-    elements = compiled_scene(scene).program.element_names
+    elements = compiled.program.element_names
     column = {name: k for k, name in enumerate(elements)}
     modes = outcome.modes.reshape(len(outcome.t), len(elements)) if elements else None
     shown = np.full((len(outcome.t), len(names)), OPEN, dtype=np.int8)

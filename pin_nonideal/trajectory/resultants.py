@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.compilation.contact_groups import Groups
 from pin_nonideal.core_loader import core
-from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.states.kinematics import frame_motion
 from pin_nonideal.types import Array, Table
 
@@ -16,18 +16,18 @@ from .point_samples import PointSamples
 WRENCH = 12  # numbers of a reaction: force and moment in its own axes, then in world axes
 
 
-def contact_forces(scene: Scene, outcome: core.Outcome, points: PointSamples | None) -> Table:
+def contact_forces(compiled: CompiledScene, outcome: core.Outcome, points: PointSamples | None) -> Table:
     """Return the fields `contact_forces` and `contact_torques` of the contacts between two frames.
 
     Args:
-        scene: scene of the run.
+        compiled: compiled scene of the run.
         outcome: result of the core.
         points: samples of the points of pairs of shapes.
     """
-    compiled, nt = compiled_scene(scene), len(outcome.t)
+    nt = len(outcome.t)
     names = [compiled.block_names[block] for block in compiled.program.framed_contacts]
     raw = outcome.contact_forces.reshape(nt, len(names), 3)
-    places = _places(scene, outcome, points)
+    places = _places(compiled, outcome, points)
     forces, torques = {}, {}
     for name, own in Groups(names, compiled.contact_of).slices().items():
         forces[name], torques[name] = raw[:, own.start], np.zeros((nt, 3))
@@ -53,44 +53,47 @@ def centers(loads: Array, places: Array, missing: float = np.nan) -> Array:
     return np.asarray(np.divide(weighted, total, out=np.full(weighted.shape, missing), where=total != 0.0))
 
 
-def reactions(scene: Scene, outcome: core.Outcome, points: PointSamples | None) -> dict[str, Array]:
+def reactions(
+    compiled: CompiledScene, outcome: core.Outcome, points: PointSamples | None
+) -> dict[str, Array]:
     """Return the wrenches of joints, then of anchors and contacts, in their own axes and in world axes.
 
     Args:
-        scene: scene of the run.
+        compiled: compiled scene of the run.
         outcome: result of the core.
         points: samples of the points of pairs of shapes.
     """
-    compiled = compiled_scene(scene)
-    joints = [str(name) for name in scene.model.names][1:]
+    joints = [str(name) for name in compiled.model.names][1:]
     names = [*joints, *(compiled.block_names[block] for block in compiled.program.reaction_blocks)]
     raw = outcome.reactions.reshape(len(outcome.t), len(names), WRENCH)
     table = {name: raw[:, own.start] for name, own in Groups(names, compiled.contact_of).slices().items()}
     if points is not None:
-        places = _places(scene, outcome, points)
-        table |= {name: _wrench(scene, outcome, points, places, name) for name in compiled.points}
+        places = _places(compiled, outcome, points)
+        table |= {name: _wrench(compiled, outcome, points, places, name) for name in compiled.points}
     return table
 
 
-def _places(scene: Scene, outcome: core.Outcome, points: PointSamples | None) -> Array:
+def _places(compiled: CompiledScene, outcome: core.Outcome, points: PointSamples | None) -> Array:
     """Return the positions of points in the world [m], (nt, n, 3)."""
     if points is None:
         return np.zeros((len(outcome.t), 0, 3))
     if points.places is not None:
         return points.places
-    q = np.ascontiguousarray(outcome.q.reshape(len(outcome.t), scene.model.nq))
-    return contact_lines(scene, q, outcome.t, points.names)[0]
+    q = np.ascontiguousarray(outcome.q.reshape(len(outcome.t), compiled.model.nq))
+    return contact_lines(compiled, q, outcome.t, points.names)[0]
 
 
-def _wrench(scene: Scene, outcome: core.Outcome, points: PointSamples, places: Array, name: str) -> Array:
+def _wrench(
+    compiled: CompiledScene, outcome: core.Outcome, points: PointSamples, places: Array, name: str
+) -> Array:
     """Return the wrench of a pair of shapes on its first body, about the origin of its joint, (nt, 12).
 
     Its own axes are those of the joint of the other body.
     """
-    model, nt, columns = scene.model, len(outcome.t), points.of(name)
+    model, nt, columns = compiled.model, len(outcome.t), points.of(name)
     if not columns:
         return np.zeros((nt, WRENCH))
-    bodies = contact_bodies(scene, name)
+    bodies = contact_bodies(compiled, name)
     q, v = outcome.q.reshape(nt, model.nq), outcome.v.reshape(nt, model.nv)
     origin = frame_motion(model, str(model.names[bodies.joint]), q, v)[0]
     forces = points.forces[:, columns]

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from pin_nonideal.errors import InputError, short_repr
 from pin_nonideal.html_tables import table
-from pin_nonideal.scene.scene import Scene
+from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.types import Array, Table
 from pin_nonideal.validation import array
 from pin_nonideal.validation import count as whole_number
@@ -321,7 +321,8 @@ class Trajectory(RunFields):
         if self.scene is None:
             raise InputError("at(t) needs the scene of the run, which this one has lost")
         times = array("at: t", t, (None,) if np.ndim(t) else ())
-        run = Trajectory(**self.dense.at(self.scene, times.reshape(-1)))
+        fields = self.dense.at(compiled_scene(self.scene), times.reshape(-1), self.scene.name)
+        run = Trajectory(**fields, scene=self.scene, name=self.scene.name)
         if len(run) and run.energy and self.energy:
             # The balance is relative to the start of the run.
             run.energy["balance"] += run.energy["total"][0] - self.energy["total"][0]
@@ -385,7 +386,7 @@ def restore_trajectory(fields: Table, origin: Any, path: Any, scene: Scene | str
         return dataclasses.replace(run, scene=reload_scene(origin, run.joints, run.rows, run.notes))
     if not (scene is None or isinstance(scene, Scene)):
         raise InputError(f'Trajectory.load: scene must be a Scene, "source" or None; got {short_repr(scene)}')
-    if scene is not None and not matches_scene(scene, run.joints, run.rows):
+    if scene is not None and not matches_scene(compiled_scene(scene), run.joints, run.rows):
         raise InputError(
             f'Trajectory.load: the scene "{scene.name}" is not the one of the run in "{path}", which has '
             f"{describe_content(run.joints, run.rows)}; pass the scene that was simulated, or scene=None"

@@ -111,7 +111,7 @@ def test_a_replay_draws_shapes_in_their_own_colors():
     pn.free_body(model, "red", box, mass=1.0, collision_model=shapes, color=(1.0, 0.0, 0.0))
     pn.free_body(model, "plain", box, mass=1.0, collision_model=shapes)
     contacts = pn.ground_contacts(model, shapes)
-    drawn = colored_collisions(pn.Scene(model, contacts=contacts, collision_model=shapes))
+    drawn = colored_collisions(pn.Scene(model, contacts=contacts, collision_model=shapes).collision_model)
     colors = {visual.name: visual.color for visual in drawn}
     assert colors == {"red": (1.0, 0.0, 0.0, 1.0), "plain": LINK_COLORS[2]}
 
@@ -125,7 +125,7 @@ def test_a_replay_draws_the_floor(ground):
     contacts = pn.ground_contacts(model, shapes, ["ball"], given)
     scene = pn.Scene(model, contacts=contacts, collision_model=shapes)
     assert scene.contact_names == ["ball on ground"]
-    floor = ground_of(planes_of(scene), np.array([0.0, 0.0, 1.0]))
+    floor = ground_of(planes_of(scene._compiled), np.array([0.0, 0.0, 1.0]))
     assert floor is not None
     assert floor.point[2] == pytest.approx(-0.5)
 

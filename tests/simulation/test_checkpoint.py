@@ -309,7 +309,8 @@ def test_a_damaged_header(written):
 def states_of(scene, duration):
     """Return the states that the core writes, and the options to read them."""
     states = []
-    options = run_options(scene, duration, 0.0, "dop853", 1e-6, None, None, None, None, (), "error")
+    steps = ("dop853", 1e-6, None, None, None, None)
+    options = run_options(scene._compiled, scene.name, duration, 0.0, *steps, (), "error")
     q, v = scene.initial_state()
     scene._compiled.program.runner().simulate(q, v, options, save=states.append)
     return states, options

@@ -119,7 +119,7 @@ class Drive:
     def pendulums(self, error: BaseException) -> tuple[pn.Scene, np.ndarray]:
         motion = pn.PrescribedMotion("joint0 of 1", self, name="drive")
         scene, q = pendulums([0, 1, 2], COULOMB, constraints=[motion])
-        assert len(components(scene)) == 3
+        assert len(components(scene._compiled)) == 3
         self.error = error
         return scene, scene.project(q)[0]
 
@@ -166,7 +166,7 @@ def test_an_interrupt_ends_the_runs_of_all_mechanisms() -> None:
 )
 def test_what_acts_on_both_makes_one_of_two(said: dict[str, Any], groups: list[list[int]]) -> None:
     scene, _ = pendulums([0, 1, 2], COULOMB, **said)
-    names = [list(part.scene.model.names)[1:] for part in components(scene)]
+    names = [list(part.compiled.model.names)[1:] for part in components(scene._compiled)]
     assert sorted(sorted({int(name[-1]) for name in own}) for own in names) == groups
 
 
@@ -178,7 +178,7 @@ def test_loops_stay_closed() -> None:
     scene, q = pendulums(which, law, constraints=rods)
     v = np.array([2.0, 3.0, 4.0, -1.0, 0.5, 0.0])
     run = pn.simulate(scene, 2.0, q=np.zeros_like(q), v=v, record="energy")
-    assert len(components(scene)) == 3
+    assert len(components(scene._compiled)) == 3
     assert run.violation.max() < 1e-12
     assert run.violation_rate.max() < 1e-11
     assert np.abs(run.energy["balance"]).max() < 1e-7

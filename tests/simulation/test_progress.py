@@ -9,7 +9,6 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal.scene.scene import compiled_scene
 
 
 def pendulums(count, **parts):
@@ -56,14 +55,14 @@ def test_mechanisms_one_after_another_advance_one_bar(monkeypatch):
     )
     monkeypatch.setattr(
         "pin_nonideal.simulation.decoupled.run_together",
-        lambda scene, q0, v0, options, tick: _run(tick, scene, q0, v0, options),
+        lambda compiled, q0, v0, options, tick: _run(tick, compiled, q0, v0, options),
     )
     pn.simulate(pendulums(2), 1.0, t0=3.0)
     assert times == [3.25, 3.5, 3.75, 4.0, 4.0]
 
 
-def _run(tick, scene, q0, v0, options):
+def _run(tick, compiled, q0, v0, options):
     """Run a mechanism that reports its progress at half time and at its end."""
     for t in (3.5, 4.0):
         tick(t)
-    return compiled_scene(scene).program.runner().simulate(q0, v0, options)
+    return compiled.program.runner().simulate(q0, v0, options)

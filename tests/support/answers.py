@@ -397,7 +397,7 @@ def coupled(case: Case) -> bool:
     scene = case.scene
     if len(scene.element_names) < 2 or case.contacts:
         return False
-    at = AtRest(scene, None, case.t0, case.states[0][0])
+    at = AtRest(scene._compiled, None, case.t0, case.states[0][0])
     slip = at.directions(case.states[0][0])[0] @ at.free(case.states[0][0])
     size = np.linalg.norm(slip, axis=1, keepdims=True)
     slip = slip[size[:, 0] > 0.0] / size[size > 0.0][:, None]

@@ -59,10 +59,14 @@ def run_of(model: pin.Model, t: Any, q: Callable[[float], Any], **fields: Any) -
         constraint_slices=fields.pop("constraint_slices", dict.fromkeys(names, slice(0, 0))),
     )
     scene._compiled = SimpleNamespace(
+        model=model,
+        q0=scene.q0,
         program=_program(scene, names),
         described=dict(zip(names, held, strict=True)),
         slices=scene.constraint_slices,
-        spec=SimpleNamespace(contacts=scene.contacts),
+        rows=scene.constraint_slices,
+        multipliers=SimpleNamespace(slices=scene.constraint_slices),
+        spec=scene,
         points={},
         contact_of={},
         contact=str,

@@ -40,7 +40,7 @@ def sliding() -> Any:
 
 
 def parts(run: Any) -> tuple[Any, Any, Any]:
-    motion, marks = sample(run), marks_of(run.scene)
+    motion, marks = sample(run), marks_of(run.scene._compiled)
     touches = contact_points(run, motion)
     return motion, elements_of(run, motion, marks, touches), arrows_of(run, motion, touches)
 

@@ -52,7 +52,7 @@ def frames(run: object, name: str) -> list[pin.SE3]:
 
 def test_an_anchor_is_marked_on_both_bodies() -> None:
     run = four_bar()
-    (mark,) = marks_of(run.scene)
+    (mark,) = marks_of(run.scene._compiled)
     assert (mark.name, mark.kind) == ("loop", "anchor")
     motion = sample(run, 20.0)
     first, second = motion.point(mark.joint1, mark.point1), motion.point(mark.joint2, mark.point2)
@@ -66,7 +66,7 @@ def test_an_anchor_on_the_world_stays_where_its_frame_starts() -> None:
     model = jointed(pin.JointModelRZ())
     add_frame(model, "tip", 1, [0.4, 0.0, 0.0])
     run = run_of(model, [0.0, 1.0], lambda t: np.array([0.5 + t]), constraints=[PointAnchor("tip")])
-    (mark,) = marks_of(run.scene)
+    (mark,) = marks_of(run.scene._compiled)
     assert mark.joint2 == 0
     np.testing.assert_allclose(mark.point2, [0.4 * np.cos(0.5), 0.4 * np.sin(0.5), 0.0], atol=ROUNDING)
     assert mark.name == "PointAnchor"
@@ -76,7 +76,7 @@ def test_a_joint_without_a_frame_of_its_own_is_marked_by_its_name() -> None:
     model = jointed(pin.JointModelRZ(), pin.JointModelRZ())
     assert not model.existFrame("j1")
     run = run_of(model, [0.0, 1.0], lambda t: np.array([t, 0.0]), constraints=[PointAnchor("j1")])
-    (mark,) = marks_of(run.scene)
+    (mark,) = marks_of(run.scene._compiled)
     assert (mark.joint1, mark.joint2) == (2, 0)
     np.testing.assert_allclose(mark.point1, np.zeros(3), atol=ROUNDING)
     np.testing.assert_allclose(mark.point2, [0.4, 0.0, 0.0], atol=ROUNDING)
@@ -213,7 +213,7 @@ def test_constraints_of_pinocchio_are_drawn_like_anchors() -> None:
     assert [(arrow.name, arrow.kind) for arrow in found] == [(arrow.name, arrow.kind) for arrow in expected]
     np.testing.assert_allclose(found[0].values, expected[0].values, atol=ROUNDING)
     np.testing.assert_allclose(found[0].origin, expected[0].origin, atol=ROUNDING)
-    assert marks_of(run.scene)[0].kind == "anchor"
+    assert marks_of(run.scene._compiled)[0].kind == "anchor"
 
 
 def test_rods_springs_and_contacts_are_marked() -> None:
@@ -227,7 +227,7 @@ def test_rods_springs_and_contacts_are_marked() -> None:
         contacts=[PointContact("tip", name="foot")],
         given_forces=[SpringDamper("tip", stiffness=1.0, name="spring")],
     )
-    assert [(mark.name, mark.kind) for mark in marks_of(run.scene)] == [
+    assert [(mark.name, mark.kind) for mark in marks_of(run.scene._compiled)] == [
         ("rod", "rod"),
         ("foot", "contact"),
         ("spring", "spring"),

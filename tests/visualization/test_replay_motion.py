@@ -9,6 +9,7 @@ import pytest
 from pin_nonideal.description.contacts import PointContact
 from pin_nonideal.errors import InputError
 from pin_nonideal.visualization.page.camera import pattern_spacings, view
+from pin_nonideal.visualization.page.contact_surfaces import planes_of
 from pin_nonideal.visualization.page.frames import MAX_FRAMES, MIN_FRAMES, POSITION_TOLERANCE, sample
 from pin_nonideal.visualization.page.joint_tracks import Tracks, halfway
 from pin_nonideal.visualization.page.stick_figure import link_bars
@@ -123,7 +124,8 @@ def test_a_run_that_cannot_be_sampled_is_refused() -> None:
 
 def seen(run: object) -> object:
     model = run.scene.model
-    return view(run.scene, sample(run, 30.0), link_bars(model, [], 1.0), [], NOTHING)
+    planes = planes_of(run.scene._compiled)
+    return view(model, sample(run, 30.0), link_bars(model, [], 1.0), [], NOTHING, planes)
 
 
 def test_a_planar_mechanism_is_seen_across_its_plane() -> None:
@@ -161,7 +163,7 @@ def test_a_cart_is_followed_however_far_it_goes() -> None:
         jointed(pin.JointModelPX(), lever=0.0), np.linspace(0.0, 50.0, 9), lambda t: np.array([20.0 * t])
     )
     box = Visual("box", 1, pin.SE3.Identity(), Shape("box", (0.5, 0.3, 0.2)), (1.0,) * 4)
-    found = view(run.scene, sample(run, 30.0), [box], [], NOTHING)
+    found = view(run.scene.model, sample(run, 30.0), [box], [], NOTHING, [])
     assert found.follow
     assert found.size == pytest.approx(np.linalg.norm([0.5, 0.3, 0.2]))
     assert np.abs(found.outline).max() < 1.0
@@ -170,11 +172,11 @@ def test_a_cart_is_followed_however_far_it_goes() -> None:
 def test_what_stands_still_leaves_half_of_the_view_to_what_moves() -> None:
     run = four_bar()
     motion, drawn = sample(run, 30.0), link_bars(run.scene.model, [], 1.0)
-    alone = view(run.scene, motion, drawn, [], NOTHING).outline
+    alone = view(run.scene.model, motion, drawn, [], NOTHING, []).outline
     tile, white = Shape("box", (0.5, 0.5, 0.01)), (1.0,) * 4
     places = [pin.SE3(np.eye(3), np.array([0.5 * k, 0.0, 0.0])) for k in range(20)]
     plates = [Visual("plate", 0, place, tile, white) for place in places]
-    beside = view(run.scene, motion, [*drawn, *plates], [], NOTHING).outline
+    beside = view(run.scene.model, motion, [*drawn, *plates], [], NOTHING, []).outline
     assert np.ptp(beside[:, 0]) <= 2.0 * np.linalg.norm(np.ptp(alone, axis=0))
 
 
@@ -185,7 +187,7 @@ def test_a_large_floor_does_not_push_the_robot_away() -> None:
     floor = Visual("floor", 0, here, Shape("box", (50.0, 50.0, 0.01)), (1.0, 1.0, 1.0, 1.0))
     stand = Visual("stand", 0, here, Shape("box", (0.2, 0.2, 1.6)), (1.0, 1.0, 1.0, 1.0))
     alone, on_floor, on_stand = (
-        view(run.scene, motion, [*drawn, *more], [], NOTHING) for more in ([], [floor], [stand])
+        view(run.scene.model, motion, [*drawn, *more], [], NOTHING, []) for more in ([], [floor], [stand])
     )
     assert on_floor.size == alone.size
     assert on_stand.outline[:, 2].min() == pytest.approx(-0.8)

@@ -91,7 +91,8 @@ def test_gaps_and_modes_of_contacts_without_friction_are_shown() -> None:
 def test_the_ground_lies_at_the_height_of_its_contact() -> None:
     run = ball(height=-0.5)
     motion = sample(run)
-    assert view(run.scene, motion, [], [], np.zeros((0, 3))).ground == -0.5
+    planes = planes_of(run.scene._compiled)
+    assert view(run.scene.model, motion, [], [], np.zeros((0, 3)), planes).ground == -0.5
 
 
 def test_an_incline_is_a_patch_below_the_path_of_what_touches_it() -> None:
@@ -101,7 +102,7 @@ def test_an_incline_is_a_patch_below_the_path_of_what_touches_it() -> None:
     scene = pn.Scene(model, contacts=[pn.PointContact("foot", mu=0.2)], q0=[0.0, 0.1])
     run = pn.simulate(scene, 0.5)
     motion = sample(run)
-    (plane,) = planes_of(scene)
+    (plane,) = planes_of(scene._compiled)
     (patch,) = contact_surfaces(run, motion, [], up_direction(model))
     np.testing.assert_allclose(patch.placement.rotation[:, 2], plane.normal, atol=ROUNDING)
     top = patch.placement.act(np.array([0.0, 0.0, patch.shape.size[2] / 2.0]))
@@ -136,7 +137,7 @@ def test_springs_wrenches_and_drag_are_arrows_of_what_they_do() -> None:
     ]
     scene = pn.Scene(model, forces=forces, laws=[pn.Drag("tip", 0.4, exponent=2.0, name="air")], v0=[1.0])
     run = pn.simulate(scene, 1.0, output_dt=0.01)
-    motion, marks = sample(run), marks_of(scene)
+    motion, marks = sample(run), marks_of(scene._compiled)
     arrows = {(arrow.name, arrow.unit): arrow for arrow in applied_force_arrows(run, motion, marks)}
     q, v = motion.q[:, 0], motion.of(run.v)[:, 0]
     pull = 30.0 * (2.0 - q - 1.5) - 0.7 * v

@@ -13,6 +13,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.constraints import Constraint, FrameAnchor, JointCoupling, PointAnchor
 from pin_nonideal.scene.scene import Scene, compiled_scene
@@ -54,30 +55,30 @@ class IndependentRows(NamedTuple):
 _Points = tuple[PointAnchor, ...]
 
 
-def remove_dependent_rows(scene: Scene, tolerance: float) -> IndependentRows | None:
+def remove_dependent_rows(compiled: CompiledScene, tolerance: float) -> IndependentRows | None:
     """Return the constraints of a scene with rounded loops, or None if no row depends on rounding.
 
     Args:
-        scene: scene of the file.
+        compiled: compiled scene of the file.
         tolerance: accuracy of lengths and angles of the loops [m or rad].
     """
-    constraints = list(scene.constraints)
-    program = compiled_scene(scene).program
+    model, q0, constraints = compiled.model, compiled.q0, list(compiled.spec.constraints)
+    program = compiled.program
     holonomic = all(holds for c in program.constraints for holds in c.holonomic)
     looped = [isinstance(c, (PointAnchor, JointCoupling, FrameAnchor)) for c in constraints]
     if sum(looped) < 2 or not holonomic or len(program.constraints) != len(looped) or program.rows > MAX_ROWS:
         return None
-    independent, q, gap, nearly = _independent_rows(scene, program, tolerance)
+    independent, q, gap, nearly = _independent_rows(compiled, tolerance)
     if independent is None:
-        return IndependentRows(scene.model, constraints, scene.q0, nearly) if nearly else None
-    model, welds = _split_welds(scene.model, constraints, [c.name for c in program.constraints])
+        return IndependentRows(model, constraints, q0, nearly) if nearly else None
+    model, welds = _split_welds(model, constraints, [c.name for c in program.constraints])
     if welds:
         split = [part for c in constraints for part in (welds.get(id(c), (c,)))]
-        scene = Scene(model, constraints=split, q0=scene.q0, assembly_tolerance=tolerance)
-        program = compiled_scene(scene).program
-        independent, q, gap, nearly = _independent_rows(scene, program, tolerance)
+        divided = compiled_scene(Scene(model, constraints=split, q0=q0, assembly_tolerance=tolerance))
+        program = divided.program
+        independent, q, gap, nearly = _independent_rows(divided, tolerance)
         if independent is None:
-            return IndependentRows(model, constraints, scene.q0, nearly) if nearly else None
+            return IndependentRows(model, constraints, q0, nearly) if nearly else None
     left, removed_rows = _remaining_constraints(constraints, welds, program, independent)
     if not removed_rows:
         return None
@@ -149,15 +150,15 @@ def _select_rows(c: Constraint, independent: NDArray[np.bool_]) -> Constraint | 
 
 
 def _independent_rows(
-    scene: Scene, program: core.Program, tolerance: float
+    compiled: CompiledScene, tolerance: float
 ) -> tuple[NDArray[np.bool_] | None, Array, float, str]:
     """Return the mask of independent rows, the configuration with the smallest gaps, the gap, and a note.
 
     The note reports rows that depend on others nearly, but not within the tolerance, if the loops close. The
     mask is None if the loops do not close, or if no row depends on others because of rounded frames.
     """
-    model, runner = scene.model, program.runner()
-    q, gap = nearest_closure(model, program, runner, scene.q0, tolerance)
+    model, program, runner = compiled.model, compiled.program, compiled.program.runner()
+    q, gap = nearest_closure(model, program, runner, compiled.q0, tolerance)
     if gap > tolerance:
         return None, q, gap, ""
     generator = np.random.default_rng(5)

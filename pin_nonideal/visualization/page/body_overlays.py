@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
 
-from pin_nonideal.types import Table
+from pin_nonideal.types import GeometryModel, Table
 
 from .visuals import LINK_COLORS, Visual, visuals_of
-
-if TYPE_CHECKING:
-    from pin_nonideal.scene.scene import Scene
 
 # Collision shapes with more triangles are left out.
 MAX_TRIANGLES = 20_000
@@ -31,28 +27,28 @@ def inertia_box(inertia: pin.Inertia) -> Table:
     }
 
 
-def collisions_of(scene: Scene) -> list[Visual]:
+def collisions_of(collision_model: GeometryModel | None) -> list[Visual]:
     """Collision shapes, unless they have too many triangles in total."""
-    if scene.collision_model is None:
+    if collision_model is None:
         return []
     overlays, room = [], MAX_TRIANGLES
-    for visual in visuals_of(scene.collision_model, MAX_TRIANGLES):
+    for visual in visuals_of(collision_model, MAX_TRIANGLES):
         if visual.shape.kind != "plane" and len(visual.shape.triangles) <= room:
             room -= len(visual.shape.triangles)
             overlays.append(visual)
     return overlays
 
 
-def colored_collisions(scene: Scene) -> list[Visual]:
+def colored_collisions(collision_model: GeometryModel | None) -> list[Visual]:
     """Return collision shapes in place of visuals: in the color of their link, unless they override it.
 
     Args:
-        scene: scene of the replay.
+        collision_model: shapes, or None.
     """
-    if scene.collision_model is None:
+    if collision_model is None:
         return []
-    own = {item.name for item in scene.collision_model.geometryObjects if item.overrideMaterial}
+    own = {item.name for item in collision_model.geometryObjects if item.overrideMaterial}
     return [
         shape if shape.name in own else replace(shape, color=LINK_COLORS[shape.joint % len(LINK_COLORS)])
-        for shape in collisions_of(scene)
+        for shape in collisions_of(collision_model)
     ]

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from pin_nonideal.types import Array
 
-from .contact_surfaces import Plane, ground_of, planes_of
+from .contact_surfaces import Plane, ground_of
 from .frames import Motion
 from .visuals import Visual
-
-if TYPE_CHECKING:
-    from pin_nonideal.scene.scene import Scene
 
 # Number of frames from which the bounding box of the motion is computed.
 BOX_FRAMES = 200
@@ -53,24 +50,23 @@ class View:
 
 
 def view(
-    scene: Scene,
+    model: pin.Model,
     motion: Motion,
     visuals: list[Visual],
     marks: list[tuple[int, Array]],
     shown: Array,
-    planes: list[Plane] | None = None,
+    planes: list[Plane],
 ) -> View:
     """Return the view that shows the whole motion.
 
     Args:
-        scene: scene with gravity, masses and contacts.
+        model: model with gravity and masses.
         motion: motion of the run.
         visuals: drawn shapes.
         marks: additional points, as joint index and position in its frame [m].
         shown: additional points of the world in the view [m], (k, 3).
-        planes: planes of the contacts, if they are known.
+        planes: planes of the contacts.
     """
-    model = scene.model
     up = up_direction(model)
     coarse = motion.only(np.unique(np.linspace(0, len(motion.times) - 1, BOX_FRAMES).astype(int)))
     clouds = [(joint, coarse.point(joint, np.zeros(3))) for joint in range(1, model.njoints)]
@@ -96,7 +92,7 @@ def view(
         outline=_extreme_points(beside),
         size=max(size, 0.05 * _diagonal(points)),
         link=link_length(model, marks, max(size, 0.05 * _diagonal(points))),
-        ground=_ground(planes_of(scene) if planes is None else planes, visuals, points, size, up, follow),
+        ground=_ground(planes, visuals, points, size, up, follow),
         follow=follow,
         stays=stays,
     )

@@ -69,14 +69,14 @@ def contact_points(run: Trajectory, motion: Motion) -> list[ContactPoint]:
         k for k, name in enumerate(names) if hasattr(compiled.described[name], "plane") or name in touched
     ]
     chosen_names = [names[k] for k in chosen]
-    places, normals = contact_lines(run.scene, motion.q, motion.times, chosen_names)
+    places, normals = contact_lines(compiled, motion.q, motion.times, chosen_names)
     closed = _closed_mask(run, chosen_names)
     return [
         ContactPoint(
             name,
             compiled.contact(name),
             compiled.described[name],
-            *contact_bodies(run.scene, name)[:2],
+            *contact_bodies(compiled, name)[:2],
             places[:, column],
             normals[:, column],
             closed[motion.before, column],

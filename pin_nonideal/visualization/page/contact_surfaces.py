@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pinocchio as pin
 
+from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.description.contacts import JointLimit
 from pin_nonideal.description.contacts.pair_of_shapes import point_contacts
 from pin_nonideal.description.contacts.round import CapsuleContact, SphereContact
-from pin_nonideal.scene.scene import Scene, compiled_scene
+from pin_nonideal.scene.scene import compiled_scene
 from pin_nonideal.states.kinematics import frame_on_joint
 from pin_nonideal.types import Array
 from pin_nonideal.validation import axis_triad, unit_axis
@@ -54,17 +55,17 @@ class Plane:
         )
 
 
-def planes_of(scene: Scene) -> list[Plane]:
+def planes_of(compiled: CompiledScene) -> list[Plane]:
     """Return the planes of all contacts and rolling bodies, without duplicates."""
-    planes: list[Plane] = []
-    for item in [*point_contacts(compiled_scene(scene).spec.contacts), *scene.constraints]:
+    model, planes = compiled.model, list[Plane]()
+    for item in [*point_contacts(compiled.spec.contacts), *compiled.spec.constraints]:
         name = getattr(item, "plane", "")
-        if not hasattr(item, "normal") or (name is not None and not (name and scene.model.existFrame(name))):
+        if not hasattr(item, "normal") or (name is not None and not (name and model.existFrame(name))):
             continue
-        joint, place = (0, pin.SE3.Identity()) if name is None else frame_on_joint(scene.model, name)
+        joint, place = (0, pin.SE3.Identity()) if name is None else frame_on_joint(model, name)
         normal = np.asarray(place.rotation) @ np.asarray(unit_axis("normal", item.normal))
         point = np.asarray(place.translation) + getattr(item, "height", 0.0) * normal
-        plane = Plane(joint, point, normal, [_touching(scene.model, item)])
+        plane = Plane(joint, point, normal, [_touching(model, item)])
         known = next((other for other in planes if other.same(plane)), None)
         if known is None:
             planes.append(plane)
@@ -96,7 +97,8 @@ def contact_surfaces(
         up: direction against gravity, (3,).
         planes: planes of the contacts, if they are known.
     """
-    planes = planes_of(run.scene) if planes is None else planes
+    compiled, shapes = compiled_scene(run.scene), run.scene.visual_model
+    planes = planes_of(compiled) if planes is None else planes
     ground, drawn = ground_of(planes, up), {visual.joint for visual in visuals}
     hidden = [
         plane for plane in planes if plane is not ground and (plane.joint not in drawn or not plane.joint)
@@ -104,15 +106,14 @@ def contact_surfaces(
     patches = [
         _patch(number, plane, motion) for number, plane in enumerate(hidden) if 0 not in drawn or plane.joint
     ]
-    return patches + _stops(run, motion) + _round_bodies(run.scene)
+    round_bodies = [] if shapes is not None and len(shapes.geometryObjects) else _round_bodies(compiled)
+    return patches + _stops(run, motion) + round_bodies
 
 
-def _round_bodies(scene: Scene) -> list[Visual]:
+def _round_bodies(compiled: CompiledScene) -> list[Visual]:
     """Return the spheres and capsules in contact with each other, for a scene without shapes."""
-    if scene.visual_model is not None and len(scene.visual_model.geometryObjects):
-        return []
     sides: dict[tuple[Any, ...], None] = {}  # of many contacts each, in their order
-    for item in point_contacts(compiled_scene(scene).spec.contacts):
+    for item in point_contacts(compiled.spec.contacts):
         if isinstance(item, SphereContact):
             sides[item.frame1, CENTER, item.radius1] = sides[item.frame2, CENTER, item.radius2] = None
         elif isinstance(item, CapsuleContact):
@@ -123,7 +124,7 @@ def _round_bodies(scene: Scene) -> list[Visual]:
         start, end = np.array(segment)
         key = (frame, (end - start).tobytes())
         if radius > 0.0 and key not in bodies:  # corners and edges have radius 0
-            bodies[key] = _round_body(scene.model, frame, start, end, radius)
+            bodies[key] = _round_body(compiled.model, frame, start, end, radius)
     return list(bodies.values())
 
 

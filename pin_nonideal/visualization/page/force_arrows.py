@@ -17,9 +17,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pinocchio as pin
 
+from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.contacts import UserContact
-from pin_nonideal.scene.scene import Scene, compiled_scene
+from pin_nonideal.scene.scene import compiled_scene
 from pin_nonideal.states.rows import rows_at
 from pin_nonideal.trajectory.contact_points import contact_bodies
 from pin_nonideal.trajectory.resultants import centers
@@ -89,8 +90,10 @@ def arrows_of(
     forces = getattr(run, "contact_forces", None) or {}
     arrows = list(_contact_arrows(run, motion, touches))
     if run.recorded("lam"):
-        for name, item, shown in constraints_of(run.scene) if held is None else held:
-            rows = run.scene.constraint_slices[name]
+        compiled = compiled_scene(run.scene)
+        for constraint in constraints_of(compiled) if held is None else held:
+            name, item, _ = constraint
+            rows = compiled.multipliers.slices[name]
             parts = {"total": motion.of(run.lam[:, rows])}
             if run.recorded("lam_ideal"):
                 ideal = motion.of(run.lam_ideal[:, rows])
@@ -101,7 +104,7 @@ def arrows_of(
                 arrows += _user_gap_arrows(run, motion, name, motion.of(run.lam[:, rows]))
                 continue
             for kind, lam in parts.items():
-                arrows += _reaction(run.scene, motion, name, kind, item, shown, lam)
+                arrows += _reaction(compiled, motion, constraint, kind, lam)
     # Friction of contacts is part of the contact forces.
     touching = {*forces, *(arrow.name for arrow in [*arrows, *more] if arrow.kind == "total")}
     drawn = [] if run.law_names and touching.issuperset(run.law_names) else [("nonideal", "F_nonideal")]
@@ -117,19 +120,19 @@ def arrows_of(
 def _contact_arrows(run: Trajectory, motion: Motion, touches: Sequence[ContactPoint]) -> Iterator[Arrow]:
     """Yield the forces of contacts: at the contact point, or at the center of pressure of several points."""
     forces, points = getattr(run, "contact_forces", None) or {}, getattr(run, "points", None)
-    pairs = compiled_scene(run.scene).points
+    compiled = compiled_scene(run.scene)
     by_contact: dict[str, list[ContactPoint]] = {}
     for touch in touches:
         if touch.contact in forces:
             by_contact.setdefault(touch.contact, []).append(touch)
     for contact, own in by_contact.items():
         joint, place = own[0].joint, own[0].place
-        if contact in pairs and points is not None:
+        if contact in compiled.points and points is not None:
             columns = {points.names[k]: k for k in points.of(contact)}
             own = [touch for touch in own if touch.name in columns]
             if not own:  # it never touches
                 continue
-            joint, places = contact_bodies(run.scene, contact).joint, np.stack([x.place for x in own], axis=1)
+            joint, places = contact_bodies(compiled, contact).joint, np.stack([x.place for x in own], axis=1)
             loads = motion.of(points.loads[:, [columns[touch.name] for touch in own]])
             loads[~loads.any(axis=1)] = 1.0  # the middle of the points has no force
             place = centers(loads, places)
@@ -160,15 +163,15 @@ def _above_rounding(arrows: list[Arrow], model: pin.Model, size: float) -> list[
 
 
 def _reaction(
-    scene: Scene, motion: Motion, name: str, kind: str, item: Any, shown: core.DisplayKind, lam: Array
+    compiled: CompiledScene, motion: Motion, constraint: Constraint, kind: str, lam: Array
 ) -> list[Arrow]:
     """Return the arrows of one constraint: the force on its first body, or the force on its joints."""
-    model = scene.model
+    model, (name, item, shown) = compiled.model, constraint
     if hasattr(item, "lower"):  # the force of a stop points away from the stop
         way = -1.0 if name.endswith(" upper") else 1.0
         return along(model, motion, name, kind, model.getJointId(item.joint), way * lam[:, 0])
     if shown in (core.DisplayKind.anchor, core.DisplayKind.rod):
-        return _connection_arrows(scene, motion, name, kind, item, shown, lam)
+        return _connection_arrows(compiled, motion, constraint, kind, lam)
     if shown == core.DisplayKind.rolling:
         body = side_of(model, item.frame)
         force, place = _rolling_force(model, motion, item, lam)
@@ -188,19 +191,21 @@ def _reaction(
 
 def _user_gap_arrows(run: Trajectory, motion: Motion, name: str, lam: Array) -> list[Arrow]:
     """Return the arrows of the generalized force A^T lam of a user-defined gap, at the joints."""
-    scene, runner = run.scene, compiled_scene(run.scene).program.runner()
+    compiled = compiled_scene(run.scene)
+    runner = compiled.program.runner()
     states = zip(motion.q, motion.of(run.v), motion.times, lam, strict=True)
-    rows = compiled_scene(scene).slices[name]
+    rows = compiled.slices[name]
     force = np.array([rows_at(runner, q, v, float(t))[0][rows].T @ own for q, v, t, own in states])
-    arrows = _at_joints(scene.model, motion, "total", force)
+    arrows = _at_joints(compiled.model, motion, "total", force)
     return [replace(arrow, name=f"{name}, {arrow.name}") for arrow in arrows]
 
 
 def _connection_arrows(
-    scene: Scene, motion: Motion, name: str, kind: str, item: Any, shown: core.DisplayKind, lam: Array
+    compiled: CompiledScene, motion: Motion, constraint: Constraint, kind: str, lam: Array
 ) -> list[Arrow]:
     """Return the force on the first of two connected frames, and the moment if the constraint has one."""
-    first, second = sides_of(scene, item)
+    name, item, shown = constraint
+    first, second = sides_of(compiled, item)
     origin = motion.point(first.joint, first.point)
     if shown == core.DisplayKind.rod:
         force = lam[:, :1] * _unit(origin - motion.point(second.joint, second.point))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pin_nonideal.scene.scene import compiled_scene
 from pin_nonideal.states.kinematics import frame_on_joint
 from pin_nonideal.trajectory.contact_points import contact_bodies
 from pin_nonideal.types import Array
@@ -127,7 +128,7 @@ def _force(run: Trajectory, touch: ContactPoint) -> Array | None:
     forces, points = getattr(run, "contact_forces", None) or {}, getattr(run, "points", None)
     if touch.name == touch.contact or not forces or points is None:
         return forces.get(touch.name)
-    side = 1.0 if contact_bodies(run.scene, touch.contact).joint == touch.joint else -1.0
+    side = 1.0 if contact_bodies(compiled_scene(run.scene), touch.contact).joint == touch.joint else -1.0
     force: Array = points.forces[:, points.names.index(touch.name)]
     return side * force
 

@@ -10,10 +10,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.contacts import PointContact
 from pin_nonideal.description.forces import SpringDamper
-from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.states.kinematics import frame_on_joint, joint_placements
 from pin_nonideal.types import Array
 
@@ -82,50 +82,46 @@ class Side:
         return np.asarray(np.einsum("nij,nj->ni", turn, local))
 
 
-def marks_of(scene: Scene, held: Sequence[Constraint] | None = None) -> list[Mark]:
+def marks_of(compiled: CompiledScene, held: Sequence[Constraint] | None = None) -> list[Mark]:
     """Return the marks of all anchors, rods, points and spheres on planes, and springs of a scene.
 
     Args:
-        scene: scene of the run.
+        compiled: compiled scene of the run.
         held: its constraints, if they are known.
     """
     marks = [
-        _tie(scene, name, shown.name, item)
-        for name, item, shown in (constraints_of(scene) if held is None else held)
+        _tie(compiled, name, shown.name, item)
+        for name, item, shown in (constraints_of(compiled) if held is None else held)
         if shown in (core.DisplayKind.anchor, core.DisplayKind.rod)
     ]
-    compiled = compiled_scene(scene)
     for name, item in compiled.described.items():
         if isinstance(item, PointContact):
-            side = side_of(scene.model, item.frame)
+            side = side_of(compiled.model, item.frame)
             point, contact = side.placement.act(np.array(item.offset)), compiled.contact_of.get(name, name)
             marks.append(Mark(name, "contact", side.joint, point, side.joint, point, contact=contact))
-    springs = [item for item in scene.forces if isinstance(item, SpringDamper)]
-    return marks + [_tie(scene, item.name or f"spring {item.frame1}", "spring", item) for item in springs]
+    springs = [item for item in compiled.spec.forces if isinstance(item, SpringDamper)]
+    return marks + [_tie(compiled, item.name or f"spring {item.frame1}", "spring", item) for item in springs]
 
 
-def _tie(scene: Scene, name: str, kind: str, item: Any) -> Mark:
+def _tie(compiled: CompiledScene, name: str, kind: str, item: Any) -> Mark:
     """Return the mark of a connection of two frames."""
-    first, second = sides_of(scene, item)
+    first, second = sides_of(compiled, item)
     held = ["xyz".index(axis) for axis in getattr(item, "axes", "xyz")] if kind == "anchor" else []
     axes = np.asarray(second.placement.rotation).T[held]
     return Mark(name, kind, first.joint, first.point, second.joint, second.point, axes)
 
 
-def constraints_of(scene: Scene) -> list[Constraint]:
+def constraints_of(compiled: CompiledScene) -> list[Constraint]:
     """Return the constraints with the names of their rows and their display kinds from the core.
 
     Contacts that are drawn at their points are left out.
 
     Args:
-        scene: scene of the run.
+        compiled: compiled scene of the run.
     """
-    compiled = compiled_scene(scene)
     kinds = ((c.name, c.shown) for c in compiled.program.constraints)
     shown = {name: kind for name, kind in kinds if kind != core.DisplayKind.contact}
-    return [
-        (name, compiled.described[name], shown[name]) for name in scene.constraint_slices if name in shown
-    ]
+    return [(name, compiled.described[name], shown[name]) for name in compiled.rows if name in shown]
 
 
 def side_of(model: pin.Model, frame: str) -> Side:
@@ -138,14 +134,14 @@ def side_of(model: pin.Model, frame: str) -> Side:
     return Side(*frame_on_joint(model, frame))
 
 
-def sides_of(scene: Scene, item: Any) -> tuple[Side, Side]:
+def sides_of(compiled: CompiledScene, item: Any) -> tuple[Side, Side]:
     """Return both sides of a connection of two frames.
 
     Args:
-        scene: scene of the run.
+        compiled: compiled scene of the run.
         item: constraint, contact or spring.
     """
-    model = scene.model
+    model = compiled.model
     if hasattr(item, "joint1_placement"):  # constraint model of Pinocchio
         return (
             Side(int(item.joint1_id), item.joint1_placement),
@@ -154,5 +150,5 @@ def sides_of(scene: Scene, item: Any) -> tuple[Side, Side]:
     first = side_of(model, item.frame1)
     if item.frame2 is not None:
         return first, side_of(model, item.frame2)
-    here = joint_placements(model, scene.q0)[first.joint].act(first.point)
+    here = joint_placements(model, compiled.q0)[first.joint].act(first.point)
     return first, Side(0, pin.SE3(np.eye(3), here))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pinocchio as pin
 
+from pin_nonideal.scene.scene import compiled_scene
 from pin_nonideal.types import Array, Table
 
 from .applied_forces import applied_force_arrows
@@ -74,8 +75,9 @@ def packed_runs(
             `STAGES`.
     """
     run, payload = runs[0], Payload()
-    scene, held, planes = run.scene, constraints_of(run.scene), planes_of(run.scene)
-    marks, motions = marks_of(scene, held), []
+    scene, compiled = run.scene, compiled_scene(run.scene)
+    held, planes = constraints_of(compiled), planes_of(compiled)
+    marks, motions = marks_of(compiled, held), []
     for one in runs:
         stage("motion")
         motions.append(sample(one, fps, share=len(runs)))
@@ -88,7 +90,7 @@ def packed_runs(
     guides = guides_of(finer, motion)
     shapes = Shapes(payload)
     curves = np.vstack([np.zeros((0, 3)), *(guide.points for guide in guides)])
-    looking = view(scene, motion, visuals, ends, curves, planes)
+    looking = view(model, motion, visuals, ends, curves, planes)
     drawn = shapes.add(visuals)
     stage("forces")
     touches = contact_points(finer, motion)
@@ -131,7 +133,7 @@ def packed_runs(
             for element in elements_of(finer, motion, marks, touches)
         ],
         "view": plain_fields(looking),
-        "collisions": shapes.add(collisions_of(scene)),
+        "collisions": shapes.add(collisions_of(scene.collision_model)),
         "signals": [stored_signal(payload, signal, rounding) for signal in signals],
         "relations": stored_relations(payload, run, finer, [x for x in items if names_relation(run, x)]),
     }
@@ -142,7 +144,7 @@ def packed_runs(
 def _drawn(scene: Scene, motion: Motion, ends: list[tuple[int, Array]]) -> tuple[list[Visual], bool]:
     """Return the visuals of a scene or else its collision shapes, and whether it has neither."""
     visuals = visuals_of(scene.visual_model) if scene.visual_model is not None else []
-    visuals = visuals or colored_collisions(scene)
+    visuals = visuals or colored_collisions(scene.collision_model)
     if visuals:
         return visuals, False
     return link_bars(scene.model, ends, link_length(scene.model, ends, motion.size)), True
@@ -150,7 +152,7 @@ def _drawn(scene: Scene, motion: Motion, ends: list[tuple[int, Array]]) -> tuple
 
 def _ghost(payload: Payload, shapes: Shapes, run: Trajectory, motion: Motion, name: str) -> Table:
     """Return a run as a ghost: its motion and its bodies."""
-    marks = marks_of(run.scene)
+    marks = marks_of(compiled_scene(run.scene))
     ends = [(m.joint1, m.point1) for m in marks] + [(m.joint2, m.point2) for m in marks]
     visuals, _ = _drawn(run.scene, motion, ends)
     return {

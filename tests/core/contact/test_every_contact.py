@@ -237,7 +237,7 @@ def test_arrows_act_where_it_touches(case: Case, run: Any) -> None:
 def test_marks_and_modes_are_where_it_touches(case: Case, run: Any) -> None:
     if case.place is None:
         return
-    motion, scene_marks = sample(run), marks_of(run.scene)
+    motion, scene_marks = sample(run), marks_of(run.scene._compiled)
     touches = contact_points(run, motion)
     (mark,) = [*scene_marks, *contact_point_marks(touches, motion, scene_marks)]
     (element,) = elements_of(run, motion, scene_marks, touches)

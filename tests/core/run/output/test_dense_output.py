@@ -156,7 +156,8 @@ def test_a_file_keeps_dense_output(tmp_path):
     run = pn.simulate(pn.load("rough_four_bar"), 0.2, record=("lam", "dense"))
     back = pn.Trajectory.load(run.save(tmp_path / "run.npz"))
     np.testing.assert_array_equal(back.dense.states, run.dense.states)
-    np.testing.assert_array_equal(back.dense.at(run.scene, np.array([0.1]))["lam"], run.at([0.1]).lam)
+    again = back.dense.at(run.scene._compiled, np.array([0.1]), "pendulum")
+    np.testing.assert_array_equal(again["lam"], run.at([0.1]).lam)
 
 
 def test_what_at_refuses():
@@ -170,7 +171,7 @@ def test_what_at_refuses():
     with refuses('at(t) needs a run with record="dense"', pn.InputError):
         pn.simulate(pendulum(), 0.01).at(0.0)
     with refuses('at: the scene "four_bar" is not the one of the run', pn.InputError):
-        run.dense.at(pn.load("four_bar"), np.array([0.1]))
+        run.dense.at(pn.load("four_bar")._compiled, np.array([0.1]), "four_bar")
 
 
 # --- The grid ----------------------------------------------------------------------------------------------
