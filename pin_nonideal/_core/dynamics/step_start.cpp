@@ -79,7 +79,7 @@ static int contradicting_block(const Program& p, Workspace& w, const VecX& v, do
 }
 
 static void choose_rows_anew(const Program& p, Workspace& w, int max_rank = INT_MAX) {
-    choose_rows(p, w, w.state.sticks_anywhere() ? w.state.rank_tolerance : rank_tolerance, max_rank);
+    choose_rows(p, w, w.state.rank_tolerance, max_rank);
     ++w.counters.factorizations;
 }
 
@@ -140,17 +140,20 @@ static double removed_energy_part(const Program& p, Workspace& w, double t, cons
 }
 
 void restore_motion(const Program& p, Workspace& w, double t, const VecX& v) {
-    if (!w.now.rows.redundant || !w.state.sticks_anywhere() || v.cwiseAbs().maxCoeff() <= immobile_speed) return;
+    const bool near_singular = !w.now.closed_gaps.empty() && w.now.rows.distance < near_singular_pivot;
+    const bool may_stop = w.state.sticks_anywhere() ? w.now.rows.redundant : near_singular;
+    if (!may_stop || v.cwiseAbs().maxCoeff() <= immobile_speed) return;
     const auto choose = [&](double tolerance) {
         w.state.rank_tolerance = tolerance;
         choose_rows_anew(p, w);
         continue_step(p, w, t, v, true);
     };
-    double tolerance = w.state.rank_tolerance;
+    const double first_tolerance = w.state.rank_tolerance;
+    double tolerance = first_tolerance;
     while (tolerance < step_start_parameters.max_unheld_part &&
            removed_energy_part(p, w, t, v) > step_start_parameters.max_removed_energy_part)
         choose(tolerance *= step_start_parameters.unheld_growth);
-    if (tolerance >= step_start_parameters.max_unheld_part) choose(rank_tolerance_sticking);
+    if (tolerance >= step_start_parameters.max_unheld_part) choose(first_tolerance);
 }
 
 bool begin_rows(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {

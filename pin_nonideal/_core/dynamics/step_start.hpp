@@ -11,9 +11,8 @@ struct StepStartParameters {
     double consistency_tolerance = 1e-6, background = 1e-3;
     // Factor by which biases of a dependent row's basis rows may enter its own bias.
     double dependence_growth = 10.0;
-    // A change of modes may take at most this fraction of the kinetic energy. If rows held by elements would take more,
-    // rows held with at most `max_unheld_part` of their forces count as dependent. `unheld_growth` is the step of that
-    // search.
+    // A change of modes may take at most this fraction of the kinetic energy. If new rows would take more, rows with at
+    // most the part `max_unheld_part` of their own count as dependent. `unheld_growth` is the step of that search.
     double max_removed_energy_part = 1e-9, max_unheld_part = 1e-3, unheld_growth = 3.0;
 };
 
@@ -35,8 +34,8 @@ bool begin_step_on_rates(const Program& p, Workspace& w, double t, VecX& v);
 // Do the same without a choice of rows: `chosen` is true if the rows were just chosen. Skip the evaluation unless
 // `evaluates`.
 bool begin_step_on_rates(const Program& p, Workspace& w, double t, VecX& v, bool chosen, bool evaluates);
-// Keep bodies moving after a change of modes. If newly chosen rows would stop the motion, rows that sticking elements
-// hold with negligible forces count as dependent from now on. The workspace is evaluated at (q, v) before and after the
+// Keep bodies moving after a change of modes. If newly chosen rows would stop the motion, rows of closed contacts and
+// sticking elements that nearly depend on others count as dependent from now on. The workspace is evaluated at (q, v) before and after the
 // call.
 void restore_motion(const Program& p, Workspace& w, double t, const VecX& v);
 // Project a state onto the rows of newly set modes, with independent rows at this state.

@@ -138,7 +138,7 @@ void select_rows(const Program& p, Workspace& w) {
     }
     w.now.rows.use_required(p.layout, p.blocks, w.now.active_blocks);
     w.state.has_ideal_row_choice = false;
-    w.state.rank_tolerance = rank_tolerance_sticking;
+    w.state.rank_tolerance = w.state.sticks_anywhere() ? rank_tolerance_sticking : rank_tolerance;
 }
 
 void set_modes(const Program& p, Workspace& w, const std::vector<Mode>& modes) {

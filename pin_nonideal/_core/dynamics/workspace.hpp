@@ -52,7 +52,7 @@ struct RunState {
     std::vector<char> is_sticking_deferred;  // keeps its slip mode at rest: only rounding decides the direction
     bool solves_directions = false;  // steps solve for last_direction: slip is too slow to define it
     bool is_hyperstatic = false;   // multipliers of sticking elements are not unique
-    double rank_tolerance = rank_tolerance_sticking;  // tolerance of the rows while elements stick, in these modes
+    double rank_tolerance = pn::rank_tolerance;  // tolerance of the rows in these modes
     VecX z;                       // states of laws, at the last evaluated stage
     VecX held_torque;             // torque of sampled control
     bool has_held = false;

@@ -107,12 +107,13 @@ struct FrictionSwitch {
     void find(const OnsetMotion* joint_motion) {
         const Program& p = system.p;
         Workspace& w = system.w;
+        const bool strikes = event && event->kind == FoundEvent::Kind::touch;  // sticking elements may move
         if (p.frictions.empty()) {
             begin_step(p, w, t, system.q, system.v);
+            if (!strikes) restore_motion(p, w, t, system.v);
             return keep_on_planes();
         }
         const bool known = event && !event->of_gap();
-        const bool strikes = event && event->kind == FoundEvent::Kind::touch;  // sticking elements may move
         mode_query = event && !strikes ? make_mode_query(p, w, system.v, known ? event->index : -1)
                                        : make_first_mode_query(p, w, t, system.q, system.v);
         held = known && before[event->index] == sticking && !is_open(p, w, event->index) ? event->index : -1;
