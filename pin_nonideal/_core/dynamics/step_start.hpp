@@ -35,8 +35,8 @@ bool begin_step_on_rates(const Program& p, Workspace& w, double t, VecX& v);
 // `evaluates`.
 bool begin_step_on_rates(const Program& p, Workspace& w, double t, VecX& v, bool chosen, bool evaluates);
 // Keep bodies moving after a change of modes. If newly chosen rows would stop the motion, rows of closed contacts and
-// sticking elements that nearly depend on others count as dependent from now on. The workspace is evaluated at (q, v) before and after the
-// call.
+// sticking elements that nearly depend on others count as dependent from now on. The workspace is evaluated at (q, v)
+// before and after the call.
 void restore_motion(const Program& p, Workspace& w, double t, const VecX& v);
 // Project a state onto the rows of newly set modes, with independent rows at this state.
 void project_into_modes(const Program& p, Workspace& w, double t, VecX& q, VecX& v);

@@ -120,8 +120,8 @@ def deepest(scene: pn.Scene, shapes: pin.GeometryModel, run: pn.Trajectory) -> f
     return depth
 
 
-# Closed contacts on both sides of an edge. In 10465 and 10477 the residual of the contradiction is negative. In 10897 a
-# rim and a point of a cone have nearly the same row, whose projection would take 7 % of the energy.
+# Closed contacts on both sides of an edge. In 10465 and 10477 the residual of the contradiction is negative.
+# In 10897 a rim and a point of a cone have nearly the same row. Its projection would take 7 % of the energy.
 NEARLY_DEPENDENT = (5, 114, 10465, 10477, 10897)
 FEW = pytest.param(range(3, 9), id="6")  # without the upright cylinder of seed 2, with its many contacts
 

@@ -69,19 +69,38 @@ bool TimeStepping::needs_forces(double end, double t_end) const {
     });
 }
 
-// Take as much of a step to `end` as approaching edges allow, in a scene with unilateral contacts.
+// Take as much of a step to `end` as approaching edges allow, in a scene with unilateral contacts. If an edge passes
+// another, half of it is taken instead.
 void TimeStepping::step_part(double end, double t_end, double least) {
-    double& t = progress_.t;
-    const double left = end - t, h = std::max(moreau_contacts_.allowed(t, left, progress_.y), least);
-    const bool whole = h >= (1.0 - parameters.min_remainder) * left;
-    moreau_contacts_.step(t, whole ? left : h, progress_.y, progress_.numerical_energy, progress_.impact_energy);
-    t = whole ? end : t + h;
+    const double from = progress_.t, numerical = progress_.numerical_energy, impacts = progress_.impact_energy;
+    double h = std::max(moreau_contacts_.allowed(from, end - from, progress_.y), least);
+    y_before_part_ = progress_.y;
+    before_part_ = w.state.mode;
+    closed_before_part_ = w.state.closed;
+    for (;; h = std::max(0.5 * h, least)) {
+        try_part(h, end, t_end);
+        if (h <= least || !moreau_contacts_.passes_edge(progress_.t, progress_.y)) break;
+        progress_.t = from;
+        progress_.y = y_before_part_;
+        progress_.numerical_energy = numerical;
+        progress_.impact_energy = impacts;
+        set_contacts(p, w, closed_before_part_, before_part_);
+    }
     const StepForces::LawMiss& relaxed = moreau_contacts_.law_miss();
     if (relaxed.block >= 0 && !misses_laws_) {
-        out_.events.push_back({t, Event::Kind::relaxed, relaxed.block});
+        out_.events.push_back({progress_.t, Event::Kind::relaxed, relaxed.block});
         out_.events.back().miss = relaxed.miss;
     }
     misses_laws_ = relaxed.block >= 0;
+}
+
+// Take a part of length h of a step to `end`, or the whole step if little would be left.
+void TimeStepping::try_part(double h, double end, double t_end) {
+    double& t = progress_.t;
+    const double left = end - t;
+    const bool whole = h >= (1.0 - parameters.min_remainder) * left;
+    moreau_contacts_.step(t, whole ? left : h, progress_.y, progress_.numerical_energy, progress_.impact_energy);
+    t = whole ? end : t + h;
     const bool needs_forces_here = progress_.has_forces = whole && needs_forces(end, t_end);
     if (moreau_contacts_.project(t, progress_.y, progress_.numerical_energy)) {
         if (needs_forces_here) system_.evaluate_step_end(t, progress_.y, progress_.rate, true);

@@ -35,6 +35,7 @@ private:
     void take(double end, double t_end);
     void step_with_contacts(double end, double t_end);
     void step_part(double end, double t_end, double least);
+    void try_part(double h, double end, double t_end);
     bool needs_forces(double end, double t_end) const;
     double end_of_step(double size, double stop, double t_end) const;
 
@@ -57,6 +58,9 @@ private:
     VecX y_from_;
     Modes before_, before_step_;
     std::vector<char> closed_before_, closed_before_step_;
+    VecX y_before_part_;
+    Modes before_part_;
+    std::vector<char> closed_before_part_;
     bool open_before_ = false;  // the stored modes have no closed contact and no active element
 };
 

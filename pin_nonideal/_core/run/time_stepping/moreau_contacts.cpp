@@ -31,6 +31,7 @@ MoreauContacts::MoreauContacts(System& system, GapWatch& watch)
 }
 
 double MoreauContacts::allowed(double t, double h, const VecX& y) {
+    near_edges_.clear();
     if (!rounded_) return h;
     bool placed = false;
     double shortest = h;
@@ -43,11 +44,24 @@ double MoreauContacts::allowed(double t, double h, const VecX& y) {
         }
         follow_gap(p, w, t, system_.v, i);
         const double width = gap_width(p, w, i), rate = gap_rate(p, w, i);
-        if (!(rate < 0.0) || !has_known_direction(i, width)) continue;
+        if (!has_known_direction(i, width)) continue;
+        near_edges_.push_back(i);
+        if (!(rate < 0.0)) continue;
         const double reach = std::max(width, 0.0) + (width > 0.0 ? 0.5 : 1.0) * depth_left(p, w, i, width);
         shortest = std::min(shortest, reach / -rate);
     }
     return shortest;
+}
+
+bool MoreauContacts::passes_edge(double t, const VecX& y) {
+    if (near_edges_.empty()) return false;
+    system_.read(y);
+    place_bodies(p.mechanism, w.now.terms, system_.q);
+    return std::any_of(near_edges_.begin(), near_edges_.end(), [&](int i) {
+        if (w.state.closed[i]) return false;
+        measure_gap(p, w, t, system_.v, i);
+        return !has_known_direction(i, gap_width(p, w, i));
+    });
 }
 
 void MoreauContacts::step(double t, double h, VecX& y, double& numerical_energy, double& impact_energy) {

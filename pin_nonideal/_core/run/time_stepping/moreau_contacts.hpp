@@ -37,6 +37,9 @@ public:
     // If they already penetrate, the middle of the step may reach half of the remaining rounding. Deeper edges and rims
     // have no defined normal, and may pass through each other.
     double allowed(double t, double h, const VecX& y);
+    // Check if such an edge or rim has lost its normal since the call of `allowed`, at the end y of a step, at t. An impact
+    // inside the step may turn a body toward it.
+    bool passes_edge(double t, const VecX& y);
     // Take one step of size h from y at t. The work of contacts along their normals is added to impact_energy. The
     // energy added by the scheme itself is added to numerical_energy. The modes are set for the step's end. The caller must
     // project and evaluate the end.
@@ -78,6 +81,7 @@ private:
     VecX q0_;
     GapWatch& watch_;
     std::vector<int> touching_;  // gaps that take part
+    std::vector<int> near_edges_;  // gaps of edges and rims with a normal that a step may reach
     StepElements elements_;
     StepForces forces_;
     std::vector<char> was_closed_, closed_, open_;

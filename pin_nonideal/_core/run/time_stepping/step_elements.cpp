@@ -48,7 +48,8 @@ void StepElements::gather(const Program& p, Workspace& w, const std::vector<int>
     for (int i : touching) {
         const Gap& gap = p.gaps[i];
         const int slides = gap.sliding < 0 ? 0 : static_cast<int>(p.blocks[p.frictions[gap.sliding].block].kept.size());
-        Part part{i, gap.sliding, gap.restitution * std::min(0.0, gap_rate(p, w, i))};
+        const bool bears = w.state.percussion[p.blocks[gap.block].row] > 0.0;
+        Part part{i, gap.sliding, bears ? 0.0 : gap.restitution * std::min(0.0, gap_rate(p, w, i))};
         part.rests = gap.sliding >= 0 && (modes[gap.sliding] == sticking ||
                                           slip_velocity(w.now, p.frictions[gap.sliding]).norm() <= still);
         part.strikes = !closed[i];

@@ -30,7 +30,9 @@ public:
     struct Part {
         int gap = -1;          // gap of a contact, -1 if none
         int element = -1;      // friction element: sliding of the contact, or a box
-        double approach = 0.0; // restitution times the closing rate of the gap, at most 0
+        // Restitution times the closing rate of the gap, at most 0. A contact with a load in the last step does not
+        // bounce: turning normals and other forces close its gap anew in each step.
+        double approach = 0.0;
         double middle = 0.0;   // middle of the limits of a box with one direction
         bool rests = false;    // the contact sticks at the step's start
         bool strikes = false;  // the contact was open at the step's start

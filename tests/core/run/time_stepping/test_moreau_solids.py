@@ -81,7 +81,9 @@ class Drop:
             assert self.depth(q) <= fastest + ROUNDED_OFF * rounding
 
 
-@pytest.mark.parametrize("seed", seeds(range(40)))
+# In 617 an impact turns another edge into the cylinder within the step. In 979 and 1032 loaded rims with
+# restitution sank.
+@pytest.mark.parametrize("seed", [*seeds(range(40)), 617, 979, 1032])
 def test_random_solids(seed):
     """Penetration by Coal's distance is below the approach in one step, and no run fails."""
     Drop(seed).check()
