@@ -122,7 +122,8 @@ def deepest(scene: pn.Scene, shapes: pin.GeometryModel, run: pn.Trajectory) -> f
 
 # Closed contacts on both sides of an edge. In 10465 and 10477 the residual of the contradiction is negative.
 # In 10897 a rim and a point of a cone have nearly the same row. Its projection would take 7 % of the energy.
-NEARLY_DEPENDENT = (5, 114, 10465, 10477, 10897)
+# In 31232 and 31817 an approach at the edge that other contacts block came back in 20,000 flights of no time.
+NEARLY_DEPENDENT = (5, 114, 10465, 10477, 10897, 31232, 31817)
 FEW = pytest.param(range(3, 9), id="6")  # without the upright cylinder of seed 2, with its many contacts
 
 
@@ -135,13 +136,13 @@ def test_bodies_leave_edges_by_the_laws(those: range) -> None:
 @pytest.mark.parametrize("seed", NEARLY_DEPENDENT)
 def test_bodies_on_rows_that_nearly_depend(seed: int) -> None:
     """Contacts that contradict each other by 5e-8 m/s^2 are bridged by time stepping."""
-    check(seed)
+    check(seed, max_wall=5.0)
 
 
-def check(seed: int) -> None:
+def check(seed: int, max_wall: float = 60.0) -> None:
     """Check one run against the oracles."""
     scene, shapes, size, straight = scene_of(seed)
-    run = pn.simulate(scene, DURATION, max_wall=60.0)
+    run = pn.simulate(scene, DURATION, max_wall=max_wall)
     assert run.t[-1] == DURATION, seed
     mu = max(contact.mu for contact in scene.contacts)
     energy, momentum = ledger(scene, run)

@@ -15,6 +15,7 @@ struct ReboundParameters {
     // The bouncing dies out if the second half of the flights takes less than this part of the time of the first half.
     // With a restitution of 1 it does not die out, and contacts that land later come to rest.
     double max_time_ratio = 0.9;
+    double state_rounding = 1e-15;  // change of the state that is rounding, relative to 1 + the largest entry
 };
 
 inline constexpr ReboundParameters rebound_parameters{};
