@@ -33,8 +33,9 @@ KINDS = get_args(contacts.Contact)
 G, DROP, SIDEWAYS = 9.81, 0.01, 0.05
 ALL = ("forces", "energy", "laws", "reactions", "tau", "a")
 ROUNDING = 1e-9  # positions and gaps of about 0.3 m, and forces of about 10 N at rest
-# Kinds with and without a contact point: their pages are opened by default, all pages with -m slow.
-SHOWN = (contacts.PointContact, contacts.JointLimit)
+# Kinds with a fixed contact point, with a point while they touch, and without one: their pages are opened by
+# default, all pages with -m slow.
+SHOWN = (contacts.PointContact, contacts.SphereContact, contacts.JointLimit)
 PAGES = [kind if kind in SHOWN else pytest.param(kind, marks=pytest.mark.slow) for kind in KINDS]
 CUBE = [(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-0.2, 0.2)]
 RUBS: dict[str, Any] = {"mu": 0.5, "restitution": 0.3}

@@ -66,7 +66,8 @@ class Elements {
     const { THREE, run } = this, lasting = 0.02 * (run.times[run.times.length - 1] - run.times[0]);
     const near = this.impacts.filter((event) => event.time <= time && time - event.time < lasting).slice(-MAX_FLASHES);
     for (let k = 0; k < MAX_FLASHES; k++) {
-      const mark = near[k] && this.marks.items.find((item) => item.contact === near[k].name && !item.apart);
+      const points = near[k] ? this.marks.items.filter((item) => item.contact === near[k].name) : [];
+      const mark = points.find((item) => !item.apart) || points[0]; // a contact that bounces is open again
       if (!mark) { this.flashes.hide(k); continue; }
       this.flashing += 1;
       const size = 2.5 * radius * (1 - (time - near[k].time) / lasting) * Math.max(Math.sqrt(near[k].impulse / this.hardest), 0.25);
