@@ -85,7 +85,7 @@ def _round_slip(c: Any, name: str, out: core.Builder, resolver: Resolver) -> lis
         return [(name, out.add_cylinder_cylinder_slip(name, f1, f2, first=one, second=other, **radii), c.mu)]
     if isinstance(c, BoxContact):
         f1, f2, half = resolver.box(c, who)
-        return [(name, out.add_point_box_slip(name, f1, f2, half=half, radius1=c.radius1), c.mu)]
+        return [(name, out.add_box_slip(name, f1, f2, solid=half, radius1=c.radius1), c.mu)]
     f1, f2, half1, half2 = resolver.capsules(c, who)
     block = out.add_capsule_capsule_slip(name, f1, f2, half1=half1, half2=half2, radius1=c.radius1)
     return [(name, block, c.mu)]

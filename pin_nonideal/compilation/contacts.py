@@ -120,7 +120,7 @@ def _round_gap(c: RoundContact, name: str, who: str, out: core.Builder, resolver
         return out.add_hull(name, f1, f2, solid=hull, radius=radius)
     if isinstance(c, BoxContact):
         f1, f2, half = resolver.box(c, who)
-        return out.add_point_box(name, f1, f2, half=half, radius=radius)
+        return out.add_box(name, f1, f2, solid=half, radius=radius)
     if isinstance(c, RevolvedContact):
         f1, f2, one, other = resolver.rims(c, who)
         return out.add_cylinder_cylinder(name, f1, f2, first=one, second=other, radius=radius)

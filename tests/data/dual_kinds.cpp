@@ -1,5 +1,5 @@
 // The formulas of constraints between bodies, taken with dual numbers: the derivative of a residual along a motion is
-// its rate, and that of a rate is the drift. Prints each row that is not so.
+// its rate, and that of a rate is the bias. Prints each row that is not so.
 #include <cstdio>
 #include <random>
 
@@ -109,7 +109,7 @@ void place(const Motion& m, TestPose<Dual>& p) {
 
 template <class S>
 struct Rows {
-    S residual[6], rate[6], drift[6], phi_t[6], phi_tt[6];
+    S residual[6], rate[6], bias[6], phi_t[6], phi_tt[6];
     pn::WrenchOf<Vec<S>> wrench[6];
 };
 
@@ -156,7 +156,7 @@ void check(const char* name, const K& kind, int first_position, int end_position
         const bool positions = end_position > first_position;
         const Rows<double> plain = rows_of<double>(kind, m1, m2, positions);
         const Rows<Dual> dual = rows_of<Dual>(kind, m1, m2, positions);
-        for (int k = 0; k < kind.size(); ++k) compare(name, k, dual.rate[k].d, plain.drift[k]);
+        for (int k = 0; k < kind.size(); ++k) compare(name, k, dual.rate[k].d, plain.bias[k]);
         for (int k = first_position; k < end_position; ++k) compare(name, k, dual.residual[k].d, plain.rate[k]);
     }
 }
@@ -168,15 +168,15 @@ void check(const char* name, const K& kind, int first_position, int end_position
 
 // Where they do not touch: a line that passes through a solid is nearest at a kink.
 bool apart(const pn::Hull& hull, double rim, const Motion& m1, const Motion& m2) {
-    return rows_of<double>(pn::DiskHullRow{pn::Frame(), pn::Frame(), hull, rim, 0.0}, m1, m2, true).residual[0] > 1e-9;
+    return rows_of<double>(pn::DiskHullRow{{}, pn::Frame(), pn::Frame(), hull, rim, 0.0}, m1, m2, true).residual[0] > 1e-9;
 }
 bool apart(const pn::Revolved& solid, double half, const Motion& m1, const Motion& m2) {
-    const pn::CapsuleCylinderRow row{pn::Frame(), pn::Frame(), solid, half, 0.0};
+    const pn::CapsuleCylinderRow row{{}, pn::Frame(), pn::Frame(), solid, half, 0.0};
     return rows_of<double>(row, m1, m2, true).residual[0] > 1e-9;
 }
 
 bool apart(const pn::Revolved& first, const pn::Revolved& second, const Motion& m1, const Motion& m2) {
-    const pn::CylinderCylinderRow row{pn::Frame(), pn::Frame(), first, second, 0.0};
+    const pn::CylinderCylinderRow row{{}, pn::Frame(), pn::Frame(), first, second, 0.0};
     const Vec<double> n = rows_of<double>(row, m1, m2, true).wrench[0].force, e1 = m1.R.c[2], e2 = m2.R.c[2];
     return n.dot(m1.x - m2.x) - first.support(-n.dot(e1), n.cross(e1).norm()) -
            second.support(n.dot(e2), n.cross(e2).norm()) > 1e-9;
@@ -185,23 +185,23 @@ bool apart(const pn::Revolved& first, const pn::Revolved& second, const Motion& 
 int main() {
     const pn::Frame f;
     const pn::Vec3 x = pn::Vec3::UnitX(), y = pn::Vec3::UnitY(), z = pn::Vec3::UnitZ();
-    check("point", pn::PointRows{f, f, {0, 1, 2}}, 0, 3);
-    check("contact", pn::PlanePointRow{f, f, z, 0.1}, 0, 1);
-    check("frame", pn::FrameRows{f, f}, 0, 0);
-    check("hinge", pn::HingeRows{f, f, z, x, y}, 0, 3);
-    check("distance", pn::DistanceRows{f, f, pn::Polynomial{{1.0}}}, 0, 1);
-    check("knife", pn::KnifeEdgeRows{f, f, y}, 0, 0);
-    check("rolling disk", pn::RollingRows{f, f, 0.2, false, y, x, y, z}, 2, 3);
-    check("rolling sphere", pn::RollingRows{f, f, 0.2, true, y, x, y, z}, 2, 3);
+    check("point", pn::PointRows{{}, f, f, {0, 1, 2}}, 0, 3);
+    check("contact", pn::PlanePointRow{{}, f, f, z, 0.1}, 0, 1);
+    check("frame", pn::FrameRows{{}, f, f}, 0, 0);
+    check("hinge", pn::HingeRows{{}, f, f, z, x, y}, 0, 3);
+    check("distance", pn::DistanceRows{{}, f, f, pn::Polynomial{{1.0}}}, 0, 1);
+    check("knife", pn::KnifeEdgeRows{{}, f, f, y}, 0, 0);
+    check("rolling disk", pn::RollingRows{{}, f, f, 0.2, false, y, x, y, z}, 2, 3);
+    check("rolling sphere", pn::RollingRows{{}, f, f, 0.2, true, y, x, y, z}, 2, 3);
     check("hinge slip", pn::HingeSlipRows{{}, f, f, z}, 0, 0);
     check("turn slip", pn::SpinSlipRows{{}, f, f, {0, 1, 2}}, 0, 0);
     check("contact slip", pn::PlanePointSlipRows{{}, f, f, 0.2, x, y, z}, 0, 0);
     for (const double half : {0.05, 0.6, 2.0}) {
-        check("box", pn::PointBoxRow{f, f, {half, 0.4, 0.1}, 0.1}, 0, 1);
-        check("box slip", pn::PointBoxSlipRows{{}, f, f, {half, 0.4, 0.1}, 0.1}, 0, 0);
+        check("box", pn::BoxRow{{}, f, f, pn::Box({half, 0.4, 0.1}), 0.1}, 0, 1);
+        check("box slip", pn::BoxSlipRows{{}, f, f, pn::Box({half, 0.4, 0.1}), 0.1}, 0, 0);
     }
     for (const double least : {0.0, 0.05, 0.3}) {
-        check("ellipsoid", pn::PlaneEllipsoidRow{f, f, z, {0.3, 0.4, least}}, 0, 1);
+        check("ellipsoid", pn::PlaneEllipsoidRow{{}, f, f, z, {0.3, 0.4, least}}, 0, 1);
         check("ellipsoid slip", pn::PlaneEllipsoidSlipRows{{}, f, f, {0.3, 0.4, least}, x, y, z}, 0, 0);
     }
     // A corner with its three faces, and the face across it.
@@ -210,10 +210,10 @@ int main() {
         const pn::Hull corner({pn::Vec3::Zero(), edge * x, edge * y, edge * z},
                               {-1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 0, third, third, third, edge * third},
                               {0, 1, 1, 2, 0, 2, 0, 2, 0, 3, 0, 1, 1, 2, 2, 3, 2, 3, 0, 3, 3, 1, 1, 3});
-        check("hull", pn::HullRow{f, f, corner, 0.1}, 0, 1);
+        check("hull", pn::HullRow{{}, f, f, corner, 0.1}, 0, 1);
         check("hull slip", pn::HullSlipRows{{}, f, f, corner, 0.1}, 0, 0);
         for (const pn::Revolved& solid : {pn::Revolved(edge, 0.4, 0.4), pn::Revolved(edge, 0.4, 0.0)}) {
-            check("revolved", pn::RevolvedRow{f, f, solid, 0.1}, 0, 1);
+            check("revolved", pn::RevolvedRow{{}, f, f, solid, 0.1}, 0, 1);
             check("revolved slip", pn::RevolvedSlipRows{{}, f, f, solid, 0.1}, 0, 0);
         }
     }
@@ -232,12 +232,12 @@ int main() {
     const pn::Hull cube(corners, {-1, 0, 0, 0.5, 1, 0, 0, 0.5, 0, -1, 0, 0.5, 0, 1, 0, 0.5, 0, 0, -1, 0.5, 0, 0, 1, 0.5}, edges);
     for (const double size : {0.1, 0.6, 2.0}) {
         const auto apart_from_cube = [&](const auto&... m) { return apart(cube, size, m...); };
-        check("rim", pn::DiskHullRow{f, f, cube, size, 0.1}, 0, 1, apart_from_cube);
+        check("rim", pn::DiskHullRow{{}, f, f, cube, size, 0.1}, 0, 1, apart_from_cube);
         check("rim slip", pn::DiskHullSlipRows{{}, f, f, cube, size}, 0, 0, apart_from_cube);
         for (const double half : {0.0, 0.3, 2.0})
             for (const pn::Revolved& solid : {pn::Revolved(size, 0.4, 0.4), pn::Revolved(size, 0.4, 0.0)}) {
                 const auto apart_from_solid = [&](const auto&... m) { return apart(solid, half, m...); };
-                check("line", pn::CapsuleCylinderRow{f, f, solid, half, 0.1}, 0, 1, apart_from_solid);
+                check("line", pn::CapsuleCylinderRow{{}, f, f, solid, half, 0.1}, 0, 1, apart_from_solid);
                 check("line slip", pn::CapsuleCylinderSlipRows{{}, f, f, solid, half, 0.1}, 0, 0, apart_from_solid);
             }
     }
@@ -245,12 +245,12 @@ int main() {
     for (const pn::Revolved& first : turned)
         for (const pn::Revolved& second : turned) {
             const auto apart_from_other = [&](const auto&... m) { return apart(first, second, m...); };
-            check("rims", pn::CylinderCylinderRow{f, f, first, second, 0.1}, 0, 1, apart_from_other);
+            check("rims", pn::CylinderCylinderRow{{}, f, f, first, second, 0.1}, 0, 1, apart_from_other);
             check("rims slip", pn::CylinderCylinderSlipRows{{}, f, f, first, second, 0.04, 0.06}, 0, 0, apart_from_other);
         }
     for (const double half1 : {0.0, 0.3, 1.5})
         for (const double half2 : {0.0, 0.4, 2.0}) {
-            check("capsules", pn::CapsuleCapsuleRow{f, f, half1, half2, 0.1}, 0, 1);
+            check("capsules", pn::CapsuleCapsuleRow{{}, f, f, half1, half2, 0.1}, 0, 1);
             check("capsules slip", pn::CapsuleCapsuleSlipRows{{}, f, f, half1, half2, 0.1}, 0, 0);
         }
     return wrong != 0;

@@ -12,6 +12,8 @@ namespace pn {
 struct RowValues;
 struct State;
 
+template <class K> constexpr bool is_plane_gap = std::is_base_of_v<PlaneGap, K>;
+template <class K> constexpr bool is_shape_gap = std::is_base_of_v<ShapeGap, K>;
 template <class K, class = void>
 constexpr bool is_geometric = false;
 template <class K>
@@ -67,6 +69,24 @@ constexpr bool is_complete() {
                   "a kind needs `rows`: unit wrenches, or A itself; or `place`: residual and rows at once");
     static_assert(answers<K>([](const auto& k) -> decltype(k.rate_and_bias(given<At>(), given<RowValues&>())) {}),
                   "a kind needs `rate_and_bias`: A v + phi_t, and its rate at zero acceleration");
+    static_assert(!std::is_base_of_v<GapKind, K> || !is_geometric<K> || is_plane_gap<K> || is_shape_gap<K>,
+                  "a gap between bodies needs a base `PlaneGap` or `ShapeGap`, for its bounds over a step");
+    static_assert(!is_plane_gap<K> || answers<K>([](const auto& k) -> decltype(double(k.extent1())) { return 0.0; }),
+                  "a gap needs `double extent1() const`: the distance of the farthest point of shape 1 from frame 1");
+    if constexpr (is_shape_gap<K>) {
+        static_assert(answers<K>([](const auto& k) -> decltype(k.extent1() + k.extent2()) { return 0.0; }),
+                      "a gap needs `extent1`, `extent2`: the distance of the farthest point of each shape from its frame");
+        static_assert(answers<K>([](const auto& k) -> decltype(k.support1(Vec3()) + k.support2(Vec3())) { return 0.0; }),
+                      "a gap needs `support1`, `support2`: largest component of each shape along a direction in its frame");
+        static_assert(answers<K>([](const auto& k) -> decltype(Vec3(k.normal(given<At>()))) { return {}; }),
+                      "a gap needs `normal`: the direction from the nearest point of shape 2 to that of shape 1");
+        static_assert(answers<K>([](const auto& k) -> decltype(double(k.max_depth())) { return 0.0; }),
+                      "a gap needs `double max_depth() const`: the penetration up to which its direction is defined");
+        static_assert(answers<K>([](const auto& k) -> decltype(double(k.depth_to_next_face(Vec3()))) { return 0.0; }),
+                      "a gap needs `double depth_to_next_face(at) const`: the penetration before another face is nearest");
+        static_assert(answers<K>([](const auto& k) -> decltype(double(k.radius)) { return 0.0; }),
+                      "a gap needs `double radius`: the sum of both radii");
+    }
     return true;
 }
 

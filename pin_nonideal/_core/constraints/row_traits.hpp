@@ -31,6 +31,33 @@ enum class DisplayKind {
     gear      // the generalized forces on two joints
 };
 
+// Bases of kinds. A kind declares again the members in which it differs.
+
+// Base of constraints. Only the kind knows if its rows move in time.
+struct ConstraintKind {
+    static constexpr Role role = Role::constraint;
+    static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
+
+    int size() const { return 1; }
+    bool is_holonomic(int) const { return true; }
+};
+
+// Base of gaps, with the contact force as multiplier.
+struct GapKind : ConstraintKind {
+    static constexpr Role role = Role::contact;
+    static constexpr int pressing = 0;
+    static constexpr DisplayKind shown = DisplayKind::contact;
+
+    bool moves_in_time() const { return false; }
+};
+
+// Base of gaps between a shape on body 1 and the plane of frame 2.
+struct PlaneGap : GapKind {};
+
+// Base of gaps between a shape on each body. Shape 1 is a point, segment or disk, or a solid of revolution. Its radius and
+// the radius of shape 2 are part of the gap.
+struct ShapeGap : GapKind {};
+
 // Base of friction directions between two frames. The rates of these rows are slip velocities, and the rows hold no
 // position.
 struct SlipDirections {
@@ -38,6 +65,7 @@ struct SlipDirections {
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr DisplayKind shown = DisplayKind::nothing;
 
+    int size() const { return 2; }
     bool is_holonomic(int) const { return false; }
     bool moves_in_time() const { return false; }
     template <class Sides, class Out>

@@ -8,8 +8,6 @@
 #include <utility>
 #include <variant>
 
-#include "constraints/gaps/point_box.hpp"
-#include "constraints/gaps/point_box_slip.hpp"
 #include "constraints/gaps/capsule_capsule.hpp"
 #include "constraints/gaps/capsule_capsule_slip.hpp"
 #include "constraints/gaps/plane_point.hpp"
@@ -43,10 +41,10 @@
 
 namespace pn {
 
-using Kind = std::variant<PointRows, PlanePointRow, CapsuleCapsuleRow, PointBoxRow, FrameRows, HingeRows, DistanceRows,
+using Kind = std::variant<PointRows, PlanePointRow, CapsuleCapsuleRow, BoxRow, FrameRows, HingeRows, DistanceRows,
                           KnifeEdgeRows, RollingRows, CouplingRows, MotionRows, LimitRow, UserRows, UserGapRow,
                           DofSlipRows, HingeSlipRows, SpinSlipRows, PlanePointSlipRows, CapsuleCapsuleSlipRows,
-                          PointBoxSlipRows, CouplingSlipRow, UserSlipRows, PlaneEllipsoidRow, PlaneEllipsoidSlipRows,
+                          BoxSlipRows, CouplingSlipRow, UserSlipRows, PlaneEllipsoidRow, PlaneEllipsoidSlipRows,
                           HullRow, HullSlipRows, RevolvedRow, RevolvedSlipRows, CapsuleCylinderRow,
                           CapsuleCylinderSlipRows, DiskHullRow, DiskHullSlipRows, CylinderCylinderRow,
                           CylinderCylinderSlipRows>;
@@ -72,6 +70,16 @@ struct State {
     double t;
     const VecX &q, &v;
 };
+
+// Call `f` with the kind if it derives from Base. Return if it does.
+template <class Base, class F>
+bool visit_as(const Kind& kind, F&& f) {
+    return std::visit([&](const auto& k) {
+        constexpr bool derives = std::is_base_of_v<Base, std::decay_t<decltype(k)>>;
+        if constexpr (derives) f(k);
+        return derives;
+    }, kind);
+}
 
 // Properties of a kind of constraint.
 int size(const Kind& kind);

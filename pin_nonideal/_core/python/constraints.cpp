@@ -68,6 +68,11 @@ struct From<Vec3> {
     static Vec3 make(const Argument& x) { return vec3(x); }
 };
 template <>
+struct From<Box> {  // half of its sides
+    using Argument = std::vector<double>;
+    static Box make(const Argument& x) { return Box(vec3(x)); }
+};
+template <>
 struct From<Hull> {  // corners, planes and edges, as flat lists
     using Argument = std::tuple<std::vector<double>, std::vector<double>, std::vector<int>>;
     static Hull make(const Argument& x) {

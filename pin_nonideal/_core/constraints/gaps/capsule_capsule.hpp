@@ -9,12 +9,8 @@
 
 namespace pn {
 
-struct CapsuleCapsuleRow {
+struct CapsuleCapsuleRow : ShapeGap {
     static constexpr const char* name = "capsule_capsule";
-    static constexpr Role role = Role::contact;
-    static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
-    static constexpr int pressing = 0;
-    static constexpr DisplayKind shown = DisplayKind::contact;
 
     Frame frame1, frame2;
     double half1, half2, radius;  // radius: sum of both radii
@@ -24,9 +20,14 @@ struct CapsuleCapsuleRow {
                           Field{"half1", &CapsuleCapsuleRow::half1}, Field{"half2", &CapsuleCapsuleRow::half2},
                           Field{"radius", &CapsuleCapsuleRow::radius});
     }
-    int size() const { return 1; }
-    bool is_holonomic(int) const { return true; }
-    bool moves_in_time() const { return false; }
+    double extent1() const { return half1; }
+    double extent2() const { return half2; }
+    double support1(const Vec3& direction) const { return half1 * std::abs(direction[2]); }
+    double support2(const Vec3& direction) const { return half2 * std::abs(direction[2]); }
+    double max_depth() const { return radius; }
+    double depth_to_next_face(const Vec3&) const { return HUGE_VAL; }
+    template <class Sides>
+    auto normal(const Sides& s) const { return NearestPoints<Sides>(s, half1, half2).n; }
 
     template <class Sides, class Out>
     PN_INLINE void residual(const Sides& s, Out& out) const {

@@ -22,7 +22,6 @@ struct CapsuleCapsuleSlipRows : SlipDirections {
                           Field{"half2", &CapsuleCapsuleSlipRows::half2},
                           Field{"radius1", &CapsuleCapsuleSlipRows::radius1});
     }
-    int size() const { return 2; }
 
     template <class Sides, class Out>
     PN_INLINE void rows(const Sides& s, Out& out) const {

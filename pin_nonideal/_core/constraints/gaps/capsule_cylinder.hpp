@@ -9,12 +9,8 @@
 
 namespace pn {
 
-struct CapsuleCylinderRow {
+struct CapsuleCylinderRow : ShapeGap {
     static constexpr const char* name = "capsule_cylinder";
-    static constexpr Role role = Role::contact;
-    static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
-    static constexpr int pressing = 0;
-    static constexpr DisplayKind shown = DisplayKind::contact;
 
     Frame frame1, frame2;
     Revolved solid;
@@ -25,9 +21,14 @@ struct CapsuleCylinderRow {
                           Field{"solid", &CapsuleCylinderRow::solid}, Field{"half1", &CapsuleCylinderRow::half1},
                           Field{"radius", &CapsuleCylinderRow::radius});
     }
-    int size() const { return 1; }
-    bool is_holonomic(int) const { return true; }
-    bool moves_in_time() const { return false; }
+    double extent1() const { return half1; }
+    double extent2() const { return solid.reach; }
+    double support1(const Vec3& direction) const { return half1 * std::abs(direction[2]); }
+    double support2(const Vec3& direction) const { return solid.support(direction); }
+    double max_depth() const { return radius; }
+    double depth_to_next_face(const Vec3&) const { return HUGE_VAL; }
+    template <class Sides>
+    auto normal(const Sides& s) const { return NearestAlongLine<Sides>(s, solid, half1).at.n; }
 
     template <class Sides, class Out>
     PN_INLINE void residual(const Sides& s, Out& out) const {

@@ -24,7 +24,6 @@ struct CapsuleCylinderSlipRows : SlipDirections {
                           Field{"half1", &CapsuleCylinderSlipRows::half1},
                           Field{"radius1", &CapsuleCylinderSlipRows::radius1});
     }
-    int size() const { return 2; }
 
     template <class Sides, class Out>
     PN_INLINE void rows(const Sides& s, Out& out) const {

@@ -9,11 +9,8 @@
 
 namespace pn {
 
-struct CylinderCylinderRow {
+struct CylinderCylinderRow : ShapeGap {
     static constexpr const char* name = "cylinder_cylinder";
-    static constexpr Role role = Role::contact;
-    static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
-    static constexpr int pressing = 0;
     static constexpr DisplayKind shown = DisplayKind::nothing;
 
     Frame frame1, frame2;
@@ -25,9 +22,14 @@ struct CylinderCylinderRow {
                           Field{"first", &CylinderCylinderRow::first}, Field{"second", &CylinderCylinderRow::second},
                           Field{"radius", &CylinderCylinderRow::radius});
     }
-    int size() const { return 1; }
-    bool is_holonomic(int) const { return true; }
-    bool moves_in_time() const { return false; }
+    double extent1() const { return first.reach; }
+    double extent2() const { return second.reach; }
+    double support1(const Vec3& direction) const { return first.support(direction); }
+    double support2(const Vec3& direction) const { return second.support(direction); }
+    double max_depth() const { return radius; }
+    double depth_to_next_face(const Vec3&) const { return HUGE_VAL; }
+    template <class Sides>
+    auto normal(const Sides& s) const { return NearestOfCylinders<Sides>(s, first, second).n; }
 
     template <class Sides, class Out>
     PN_INLINE void residual(const Sides& s, Out& out) const {

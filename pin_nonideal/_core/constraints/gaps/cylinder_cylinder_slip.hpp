@@ -25,7 +25,6 @@ struct CylinderCylinderSlipRows : SlipDirections {
                           Field{"radius1", &CylinderCylinderSlipRows::radius1},
                           Field{"radius2", &CylinderCylinderSlipRows::radius2});
     }
-    int size() const { return 2; }
 
     template <class Sides, class Out>
     PN_INLINE void rows(const Sides& s, Out& out) const {

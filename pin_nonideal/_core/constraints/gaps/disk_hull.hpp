@@ -9,12 +9,8 @@
 
 namespace pn {
 
-struct DiskHullRow {
+struct DiskHullRow : ShapeGap {
     static constexpr const char* name = "disk_hull";
-    static constexpr Role role = Role::contact;
-    static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
-    static constexpr int pressing = 0;
-    static constexpr DisplayKind shown = DisplayKind::contact;
 
     Frame frame1, frame2;
     Hull solid;
@@ -25,9 +21,14 @@ struct DiskHullRow {
                           Field{"solid", &DiskHullRow::solid}, Field{"rim", &DiskHullRow::rim},
                           Field{"radius", &DiskHullRow::radius});
     }
-    int size() const { return 1; }
-    bool is_holonomic(int) const { return true; }
-    bool moves_in_time() const { return false; }
+    double extent1() const { return rim; }
+    double extent2() const { return solid.reach; }
+    double support1(const Vec3& direction) const { return rim * std::hypot(direction[0], direction[1]); }
+    double support2(const Vec3& direction) const { return solid.support(direction); }
+    double max_depth() const { return radius; }
+    double depth_to_next_face(const Vec3&) const { return HUGE_VAL; }
+    template <class Sides>
+    auto normal(const Sides& s) const { return NearestOnDisk<Sides>(s, solid, rim).n; }
 
     template <class Sides, class Out>
     PN_INLINE void residual(const Sides& s, Out& out) const {

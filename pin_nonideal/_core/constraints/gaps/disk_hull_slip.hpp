@@ -21,7 +21,6 @@ struct DiskHullSlipRows : SlipDirections {
         return std::tuple(Field{"frame1", &DiskHullSlipRows::frame1}, Field{"frame2", &DiskHullSlipRows::frame2},
                           Field{"solid", &DiskHullSlipRows::solid}, Field{"rim", &DiskHullSlipRows::rim});
     }
-    int size() const { return 2; }
 
     template <class Sides, class Out>
     PN_INLINE void rows(const Sides& s, Out& out) const {

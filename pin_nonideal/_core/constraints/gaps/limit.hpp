@@ -9,11 +9,9 @@
 
 namespace pn {
 
-struct LimitRow {
+struct LimitRow : GapKind {
     static constexpr const char* name = "limit";
-    static constexpr Role role = Role::contact;
-    static constexpr bool constant_A = true, affine_rate = true, comparable_rows = false;
-    static constexpr int pressing = 0;
+    static constexpr bool constant_A = true;
     static constexpr DisplayKind shown = DisplayKind::nothing;
 
     int joint;
@@ -23,9 +21,6 @@ struct LimitRow {
         return std::tuple(Field{"joint", &LimitRow::joint}, Field{"bound", &LimitRow::bound},
                           Field{"sign", &LimitRow::sign});
     }
-    int size() const { return 1; }
-    bool is_holonomic(int) const { return true; }
-    bool moves_in_time() const { return false; }
     std::vector<int> dofs(const Mechanism& m) const { return {m.joints[joint].iv}; }
 
     template <class State, class Out>

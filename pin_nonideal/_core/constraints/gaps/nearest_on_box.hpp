@@ -1,9 +1,40 @@
 // The point of a box that is nearest to the origin of frame 1. The box lies along the axes of frame 2, about its origin.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
 #include "constraints/geometry.hpp"
 
 namespace pn {
+
+template <class Sides>
+struct NearestOnBox;
+
+struct Box {
+    static constexpr const char *gap = "box", *slip = "box_slip";
+    template <class Sides>
+    using Nearest = NearestOnBox<Sides>;
+    Vec3 half = Vec3::Zero();
+    double reach = 0.0;  // distance of a corner from the middle
+
+    Box() = default;
+    explicit Box(const Vec3& half_sides) : half(half_sides), reach(half_sides.norm()) {}
+    // Return the largest component of the points along a direction in the box's axes.
+    double support(const Vec3& direction) const { return half.dot(absolute(direction)); }
+    // Return half of the least distance between opposite faces.
+    double half_width() const { return std::min({half[0], half[1], half[2]}); }
+    // Return the two least distances of a point behind the planes of the faces that are nearest to it.
+    std::pair<double, double> nearest_planes(const Vec3& at) const {
+        const Vec3 behind = half - absolute(at);
+        const auto [first, second] = std::minmax({behind[0], behind[1]});
+        return {std::min(first, behind[2]), std::min(second, std::max(first, behind[2]))};
+    }
+
+private:
+    static Vec3 absolute(const Vec3& x) { return {std::abs(x[0]), std::abs(x[1]), std::abs(x[2])}; }
+};
 
 template <class Sides>
 struct NearestOnBox {
@@ -14,8 +45,9 @@ struct NearestOnBox {
     Vec n;                                   // from the nearest point on the box (inside: out of the nearest face)
     Scalar distance;                         // negative inside
 
-    PN_INLINE NearestOnBox(const Sides& s, const Vec3& half)
+    PN_INLINE NearestOnBox(const Sides& s, const Box& box)
         : e{s.b.R * Vec3::UnitX(), s.b.R * Vec3::UnitY(), s.b.R * Vec3::UnitZ()}, n(), distance(0.0) {
+        const Vec3& half = box.half;
         const Vec apart = s.a.x - s.b.x;
         Vec d = Vec();
         int face = 0;

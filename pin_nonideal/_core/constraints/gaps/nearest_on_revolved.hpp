@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "constraints/geometry.hpp"
 
@@ -36,6 +37,10 @@ struct Revolved {
     }
     // Return half of the least distance between opposite surfaces, for a cone in its middle.
     double half_width() const { return std::min(half, middle()); }
+    // Return the distances of a point behind the nearest face and behind the side, the smaller one first.
+    std::pair<double, double> nearest_planes(const Vec3& at) const {
+        return std::minmax({half - std::abs(at[2]), middle() + widening() * at[2] - std::hypot(at[0], at[1])});
+    }
     // Side of the solid: components of its normal away from the axis and along it, radius in the middle, growth along
     // the axis.
     double side_out() const { return 2.0 * half / std::hypot(2.0 * half, below - above); }

@@ -8,12 +8,8 @@
 
 namespace pn {
 
-struct PlanePointRow {
+struct PlanePointRow : PlaneGap {
     static constexpr const char* name = "plane_point";
-    static constexpr Role role = Role::contact;
-    static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
-    static constexpr DisplayKind shown = DisplayKind::contact;
-    static constexpr int pressing = 0;
 
     Frame frame1, frame2;
     Vec3 normal;
@@ -23,9 +19,7 @@ struct PlanePointRow {
         return std::tuple(Field{"frame", &PlanePointRow::frame1}, Field{"plane", &PlanePointRow::frame2},
                           Field{"normal", &PlanePointRow::normal}, Field{"radius", &PlanePointRow::radius});
     }
-    int size() const { return 1; }
-    bool is_holonomic(int) const { return true; }
-    bool moves_in_time() const { return false; }
+    double extent1() const { return 0.0; }
 
     template <class Sides, class Out>
     PN_INLINE void residual(const Sides& s, Out& out) const {

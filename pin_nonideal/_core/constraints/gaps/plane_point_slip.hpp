@@ -22,7 +22,6 @@ struct PlanePointSlipRows : SlipDirections {
                           Field{"tangent2", &PlanePointSlipRows::tangent2},
                           Field{"normal", &PlanePointSlipRows::normal});
     }
-    int size() const { return 2; }
 
     template <class Sides, class Out>
     PN_INLINE void rows(const Sides& s, Out& out) const {

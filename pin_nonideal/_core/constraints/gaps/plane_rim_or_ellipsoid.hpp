@@ -11,12 +11,8 @@
 
 namespace pn {
 
-struct PlaneEllipsoidRow {
+struct PlaneEllipsoidRow : PlaneGap {
     static constexpr const char* name = "plane_ellipsoid";
-    static constexpr Role role = Role::contact;
-    static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
-    static constexpr int pressing = 0;
-    static constexpr DisplayKind shown = DisplayKind::contact;
 
     Frame frame1, frame2;
     Vec3 normal, semiaxes;
@@ -25,10 +21,7 @@ struct PlaneEllipsoidRow {
         return std::tuple(Field{"frame", &PlaneEllipsoidRow::frame1}, Field{"plane", &PlaneEllipsoidRow::frame2},
                           Field{"normal", &PlaneEllipsoidRow::normal}, Field{"semiaxes", &PlaneEllipsoidRow::semiaxes});
     }
-    double reach() const { return std::max({semiaxes[0], semiaxes[1], semiaxes[2]}); }
-    int size() const { return 1; }
-    bool is_holonomic(int) const { return true; }
-    bool moves_in_time() const { return false; }
+    double extent1() const { return std::max({semiaxes[0], semiaxes[1], semiaxes[2]}); }
 
     template <class Sides, class Out>
     PN_INLINE void residual(const Sides& s, Out& out) const {

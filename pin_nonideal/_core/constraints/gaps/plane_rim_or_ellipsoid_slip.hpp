@@ -23,7 +23,6 @@ struct PlaneEllipsoidSlipRows : SlipDirections {
                           Field{"tangent2", &PlaneEllipsoidSlipRows::tangent2},
                           Field{"normal", &PlaneEllipsoidSlipRows::normal});
     }
-    int size() const { return 2; }
 
     template <class Sides, class Out>
     PN_INLINE void rows(const Sides& s, Out& out) const {

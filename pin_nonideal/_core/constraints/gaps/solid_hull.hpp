@@ -5,6 +5,7 @@
 
 #include "constraints/geometry.hpp"
 #include "constraints/row_traits.hpp"
+#include "constraints/gaps/nearest_on_box.hpp"
 #include "constraints/gaps/nearest_on_hull.hpp"
 #include "constraints/gaps/nearest_on_revolved.hpp"
 
@@ -12,12 +13,8 @@ namespace pn {
 
 // Solid: a shape in the axes of frame 2 that computes its nearest point, its reach and its supporting planes.
 template <class Solid>
-struct SolidHullRow {
+struct SolidHullRow : ShapeGap {
     static constexpr const char* name = Solid::gap;
-    static constexpr Role role = Role::contact;
-    static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
-    static constexpr int pressing = 0;
-    static constexpr DisplayKind shown = DisplayKind::contact;
 
     Frame frame1, frame2;
     Solid solid;
@@ -27,9 +24,18 @@ struct SolidHullRow {
         return std::tuple(Field{"frame1", &SolidHullRow::frame1}, Field{"frame2", &SolidHullRow::frame2},
                           Field{"solid", &SolidHullRow::solid}, Field{"radius", &SolidHullRow::radius});
     }
-    int size() const { return 1; }
-    bool is_holonomic(int) const { return true; }
-    bool moves_in_time() const { return false; }
+    double extent1() const { return 0.0; }
+    double extent2() const { return solid.reach; }
+    double support1(const Vec3&) const { return 0.0; }
+    double support2(const Vec3& direction) const { return solid.support(direction); }
+    // A point inside the solid is nearest to another face beyond the middle between two faces.
+    double max_depth() const { return radius + solid.half_width(); }
+    double depth_to_next_face(const Vec3& at) const {
+        const auto [nearest, next] = solid.nearest_planes(at);
+        return radius + (next > 0.0 ? next - std::max(nearest, 0.0) : 0.0);
+    }
+    template <class Sides>
+    auto normal(const Sides& s) const { return nearest(s).n; }
 
     template <class Sides>
     PN_INLINE auto nearest(const Sides& s) const { return typename Solid::template Nearest<Sides>(s, solid); }
@@ -52,6 +58,7 @@ struct SolidHullRow {
     }
 };
 
+using BoxRow = SolidHullRow<Box>;
 using HullRow = SolidHullRow<Hull>;
 using RevolvedRow = SolidHullRow<Revolved>;
 

@@ -5,6 +5,7 @@
 
 #include "constraints/geometry.hpp"
 #include "constraints/row_traits.hpp"
+#include "constraints/gaps/nearest_on_box.hpp"
 #include "constraints/gaps/nearest_on_hull.hpp"
 #include "constraints/gaps/nearest_on_revolved.hpp"
 #include "constraints/gaps/segments.hpp"
@@ -23,7 +24,6 @@ struct SolidHullSlipRows : SlipDirections {
         return std::tuple(Field{"frame1", &SolidHullSlipRows::frame1}, Field{"frame2", &SolidHullSlipRows::frame2},
                           Field{"solid", &SolidHullSlipRows::solid}, Field{"radius1", &SolidHullSlipRows::radius1});
     }
-    int size() const { return 2; }
 
     template <class Sides>
     PN_INLINE auto nearest(const Sides& s) const { return typename Solid::template Nearest<Sides>(s, solid); }
@@ -44,6 +44,7 @@ struct SolidHullSlipRows : SlipDirections {
     }
 };
 
+using BoxSlipRows = SolidHullSlipRows<Box>;
 using HullSlipRows = SolidHullSlipRows<Hull>;
 using RevolvedSlipRows = SolidHullSlipRows<Revolved>;
 

@@ -5,11 +5,8 @@
 
 namespace pn {
 
-struct UserGapRow {
+struct UserGapRow : GapKind {
     static constexpr const char* name = "user_gap";
-    static constexpr Role role = Role::contact;
-    static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
-    static constexpr int pressing = 0;
     static constexpr DisplayKind shown = DisplayKind::nothing;
 
     decltype(UserRows::function) function;
@@ -20,8 +17,6 @@ struct UserGapRow {
         return std::tuple(Field{"rows", &UserGapRow::function}, Field{"gap", &UserGapRow::gap},
                           Field{"rate", &UserGapRow::gap_rate});
     }
-    int size() const { return 1; }
-    bool is_holonomic(int) const { return true; }
     bool moves_in_time() const { return true; }
     std::vector<int> dofs(const Mechanism& m) const { return all_dofs(m); }
 

@@ -9,11 +9,9 @@
 
 namespace pn {
 
-struct CouplingSlipRow {
+struct CouplingSlipRow : SlipDirections {
     static constexpr const char* name = "coupling_slip";
-    static constexpr Role role = Role::direction;
-    static constexpr bool constant_A = true, affine_rate = true, comparable_rows = false;
-    static constexpr DisplayKind shown = DisplayKind::nothing;
+    static constexpr bool constant_A = true;
 
     int joint1, joint2;
     double weight1, weight2;
@@ -23,12 +21,8 @@ struct CouplingSlipRow {
                           Field{"weight1", &CouplingSlipRow::weight1}, Field{"weight2", &CouplingSlipRow::weight2});
     }
     int size() const { return 1; }
-    bool is_holonomic(int) const { return false; }
-    bool moves_in_time() const { return false; }
     std::vector<int> dofs(const Mechanism& m) const { return {m.joints[joint1].iv, m.joints[joint2].iv}; }
 
-    template <class State, class Out>
-    PN_INLINE void residual(const State&, Out&) const {}
     template <class State, class Out>
     PN_INLINE void rows(const State& s, Out& out) const {
         out.A(0, s.mechanism.joints[joint1].iv) = weight1;

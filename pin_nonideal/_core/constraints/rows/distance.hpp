@@ -9,10 +9,8 @@
 
 namespace pn {
 
-struct DistanceRows {
+struct DistanceRows : ConstraintKind {
     static constexpr const char* name = "distance";
-    static constexpr Role role = Role::constraint;
-    static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr DisplayKind shown = DisplayKind::rod;
 
     Frame frame1, frame2;
@@ -22,8 +20,6 @@ struct DistanceRows {
         return std::tuple(Field{"frame1", &DistanceRows::frame1}, Field{"frame2", &DistanceRows::frame2},
                           Field{"length", &DistanceRows::length});
     }
-    int size() const { return 1; }
-    bool is_holonomic(int) const { return true; }
     bool moves_in_time() const { return !is_constant(length); }
 
     template <class Sides, class Out>

@@ -27,10 +27,8 @@ Vec logarithm(const Mat& R) {
     return (wrapped / n) * q.vec();
 }
 
-struct FrameRows {
+struct FrameRows : ConstraintKind {
     static constexpr const char* name = "frame";
-    static constexpr Role role = Role::constraint;
-    static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr DisplayKind shown = DisplayKind::anchor;
 
     Frame frame1, frame2;
@@ -39,7 +37,6 @@ struct FrameRows {
         return std::tuple(Field{"frame1", &FrameRows::frame1}, Field{"frame2", &FrameRows::frame2});
     }
     int size() const { return 6; }
-    bool is_holonomic(int) const { return true; }
     bool moves_in_time() const { return false; }
 
     template <class Sides, class Out>

@@ -13,10 +13,8 @@ namespace pn {
 // Sine of the angle between the axes below which sine and angle are equal to rounding.
 constexpr double small_sine = 1e-9;
 
-struct HingeRows {
+struct HingeRows : ConstraintKind {
     static constexpr const char* name = "hinge";
-    static constexpr Role role = Role::constraint;
-    static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr DisplayKind shown = DisplayKind::anchor;
 
     Frame frame1, frame2;
@@ -28,7 +26,6 @@ struct HingeRows {
                           Field{"normal2", &HingeRows::normal2});
     }
     int size() const { return 5; }
-    bool is_holonomic(int) const { return true; }
     bool moves_in_time() const { return false; }
 
     // The axis e of frame 1 stays normal to n1 and n2 of frame 2. The angle between the axes scales the residual, so

@@ -8,10 +8,8 @@
 
 namespace pn {
 
-struct KnifeEdgeRows {
+struct KnifeEdgeRows : ConstraintKind {
     static constexpr const char* name = "knife_edge";
-    static constexpr Role role = Role::constraint;
-    static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr DisplayKind shown = DisplayKind::edge;
 
     Frame frame1, frame2;  // frame2 is the world's
@@ -20,7 +18,6 @@ struct KnifeEdgeRows {
     static constexpr auto data() {
         return std::tuple(Field{"frame", &KnifeEdgeRows::frame1}, Field{"axis", &KnifeEdgeRows::axis});
     }
-    int size() const { return 1; }
     bool is_holonomic(int) const { return false; }
     bool moves_in_time() const { return false; }
 

@@ -10,10 +10,9 @@
 
 namespace pn {
 
-struct MotionRows {
+struct MotionRows : ConstraintKind {
     static constexpr const char* name = "motion";
-    static constexpr Role role = Role::constraint;
-    static constexpr bool constant_A = true, affine_rate = true, comparable_rows = false;
+    static constexpr bool constant_A = true;
     static constexpr DisplayKind shown = DisplayKind::drive;
 
     int joint;
@@ -24,8 +23,6 @@ struct MotionRows {
         return std::tuple(Field{"joint", &MotionRows::joint}, Field{"function", &MotionRows::function},
                           Field{"period", &MotionRows::period});
     }
-    int size() const { return 1; }
-    bool is_holonomic(int) const { return true; }
     bool moves_in_time() const { return true; }
     std::vector<int> dofs(const Mechanism& m) const { return {m.joints[joint].iv}; }
 

@@ -9,10 +9,9 @@
 
 namespace pn {
 
-struct PointRows {
+struct PointRows : ConstraintKind {
     static constexpr const char* name = "point";
-    static constexpr Role role = Role::constraint;
-    static constexpr bool constant_A = false, affine_rate = true, comparable_rows = true;
+    static constexpr bool comparable_rows = true;
     static constexpr DisplayKind shown = DisplayKind::anchor;
 
     Frame frame1, frame2;
@@ -23,7 +22,6 @@ struct PointRows {
                           Field{"axes", &PointRows::axes});
     }
     int size() const { return static_cast<int>(axes.size()); }
-    bool is_holonomic(int) const { return true; }
     bool moves_in_time() const { return false; }
 
     template <class Sides, class Out>

@@ -8,10 +8,8 @@
 
 namespace pn {
 
-struct RollingRows {
+struct RollingRows : ConstraintKind {
     static constexpr const char* name = "rolling";
-    static constexpr Role role = Role::constraint;
-    static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr DisplayKind shown = DisplayKind::rolling;
     static constexpr int pressing = 2;
 

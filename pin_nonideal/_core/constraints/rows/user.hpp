@@ -10,11 +10,10 @@
 
 namespace pn {
 
-struct UserRows {
+struct UserRows : ConstraintKind {
     static constexpr const char* name = "user";
-    static constexpr Role role = Role::constraint;
     // A may depend on v. The rate is then not A v + phi_t.
-    static constexpr bool constant_A = false, affine_rate = false, comparable_rows = false;
+    static constexpr bool affine_rate = false;
     static constexpr DisplayKind shown = DisplayKind::nothing;
 
     int count = 0;

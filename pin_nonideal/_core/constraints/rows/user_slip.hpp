@@ -14,11 +14,8 @@ namespace pn {
 // Time difference [s] for the rates of the directions. This difference balances rounding against the truncation error.
 constexpr double direction_step = 1e-6;
 
-struct UserSlipRows {
+struct UserSlipRows : SlipDirections {
     static constexpr const char* name = "user_slip";
-    static constexpr Role role = Role::direction;
-    static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
-    static constexpr DisplayKind shown = DisplayKind::nothing;
 
     int count = 1;
     std::function<void(double t, const VecX& q, VecX& rows)> directions;  // in sequence
@@ -27,12 +24,9 @@ struct UserSlipRows {
         return std::tuple(Field{"size", &UserSlipRows::count}, Field{"directions", &UserSlipRows::directions});
     }
     int size() const { return count; }
-    bool is_holonomic(int) const { return false; }
     bool moves_in_time() const { return true; }
     std::vector<int> dofs(const Mechanism& m) const { return all_dofs(m); }
 
-    template <class State, class Out>
-    PN_INLINE void residual(const State&, Out&) const {}
     template <class State, class Out>
     PN_INLINE void rows(const State& s, Out& out) const {
         directions(s.t, s.q, out.scratch);

@@ -60,157 +60,62 @@ CurvatureBounds::Bound CurvatureBounds::frame_bound(const Frame& frame) const {
             body.acceleration + (body.spin_rate + body.spin * body.spin) * apart, body.spin, body.spin_rate};
 }
 
-// g = n . (x1 - x2) - r, with n fixed in body 2, for a point of body 1 at distance `reach` from its frame.
-double CurvatureBounds::over_plane(const Workspace& w, const Frame& frame, const Frame& plane, double reach) const {
+// g = n . (x1 - x2) - r, with n fixed in body 2, for a point of body 1 at distance `extent` from its frame.
+double CurvatureBounds::over_plane(const Workspace& w, const Frame& frame, const Frame& plane, double extent) const {
     const Bound a = frame_bound(frame), b = frame_bound(plane);
-    const double velocity = a.velocity + reach * a.spin + b.velocity;
+    const double velocity = a.velocity + extent * a.spin + b.velocity;
     double turning = 0.0;
     if (b.spin > 0.0 || b.spin_rate > 0.0) {
         const Pose one(p.mechanism, w.now.terms, frame), two(p.mechanism, w.now.terms, plane);
-        const double apart = (one.x - two.x).norm() + reach + h_ * velocity;
+        const double apart = (one.x - two.x).norm() + extent + h_ * velocity;
         turning = 2.0 * b.spin * velocity + (b.spin_rate + b.spin * b.spin) * apart;
     }
-    return a.acceleration + reach * (a.spin_rate + a.spin * a.spin) + b.acceleration + turning;
+    return a.acceleration + extent * (a.spin_rate + a.spin * a.spin) + b.acceleration + turning;
 }
 
-double CurvatureBounds::of(const Workspace& w, const PlanePointRow& kind) const {
-    return over_plane(w, kind.frame1, kind.frame2, 0.0);
-}
-
-// The bound holds for each point of the ellipsoid, whichever is the lowest.
-double CurvatureBounds::of(const Workspace& w, const PlaneEllipsoidRow& kind) const {
-    return over_plane(w, kind.frame1, kind.frame2, kind.reach());
-}
-
-// g = |c1 - c2| - r, minimum over both segments. The bound holds for all pairs of points fixed on their bodies.
-double CurvatureBounds::of(const Workspace&, const CapsuleCapsuleRow& kind) const {
-    const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
-    return a.acceleration + b.acceleration + kind.half1 * (a.spin_rate + a.spin * a.spin) +
-           kind.half2 * (b.spin_rate + b.spin * b.spin);
-}
-
-double CurvatureBounds::of(const Workspace&, const CapsuleCylinderRow& kind) const {
-    return of_points(kind.frame1, kind.half1, kind.frame2, kind.solid.reach);
-}
-
-double CurvatureBounds::of(const Workspace&, const DiskHullRow& kind) const {
-    return of_points(kind.frame1, kind.rim, kind.frame2, kind.solid.reach);
-}
-
-double CurvatureBounds::of(const Workspace&, const CylinderCylinderRow& kind) const {
-    return of_points(kind.frame1, kind.first.reach, kind.frame2, kind.second.reach);
-}
-
-// Bound for any two points at these distances from their frames.
-double CurvatureBounds::of_points(const Frame& frame1, double reach1, const Frame& frame2, double reach2) const {
+// g = |x1 - x2| - r, for any two points at these distances from their frames.
+double CurvatureBounds::of_points(const Frame& frame1, double extent1, const Frame& frame2, double extent2) const {
     const Bound a = frame_bound(frame1), b = frame_bound(frame2);
-    return a.acceleration + b.acceleration + reach1 * (a.spin_rate + a.spin * a.spin) +
-           reach2 * (b.spin_rate + b.spin * b.spin);
+    return a.acceleration + b.acceleration + extent1 * (a.spin_rate + a.spin * a.spin) +
+           extent2 * (b.spin_rate + b.spin * b.spin);
 }
 
-double CurvatureBounds::of(const Workspace&, const PointBoxRow& kind) const {
-    const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
-    return a.acceleration + b.acceleration + kind.half.norm() * (b.spin_rate + b.spin * b.spin);
-}
-
-template <class Solid>
-double CurvatureBounds::of(const Workspace&, const SolidHullRow<Solid>& kind) const {
-    const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
-    return a.acceleration + b.acceleration + kind.solid.reach * (b.spin_rate + b.spin * b.spin);
-}
-
-double CurvatureBounds::of(const Workspace&, const LimitRow& kind) const {
-    return acceleration_[p.mechanism.joints[kind.joint].iv];
-}
-
+// The bound holds for each point or pair of points that is fixed on its body, whichever is the nearest.
 double CurvatureBounds::lower_bound(const Workspace& w, int gap) const {
     const Kind& kind = p.blocks[p.gaps[gap].block].kind;
-    if (const auto* contact = std::get_if<PlanePointRow>(&kind)) return of(w, *contact);
-    if (const auto* capsules = std::get_if<CapsuleCapsuleRow>(&kind)) return of(w, *capsules);
-    if (const auto* box = std::get_if<PointBoxRow>(&kind)) return of(w, *box);
-    if (const auto* ellipsoid = std::get_if<PlaneEllipsoidRow>(&kind)) return of(w, *ellipsoid);
-    if (const auto* hull = std::get_if<HullRow>(&kind)) return of(w, *hull);
-    if (const auto* revolved = std::get_if<RevolvedRow>(&kind)) return of(w, *revolved);
-    if (const auto* line = std::get_if<CapsuleCylinderRow>(&kind)) return of(w, *line);
-    if (const auto* rim = std::get_if<DiskHullRow>(&kind)) return of(w, *rim);
-    if (const auto* rims = std::get_if<CylinderCylinderRow>(&kind)) return of(w, *rims);
-    return of(w, std::get<LimitRow>(kind));
+    double bound = HUGE_VAL;
+    visit_as<ShapeGap>(kind, [&](const auto& k) { bound = of_points(k.frame1, k.extent1(), k.frame2, k.extent2()); });
+    visit_as<PlaneGap>(kind, [&](const auto& k) { bound = over_plane(w, k.frame1, k.frame2, k.extent1()); });
+    visit_as<LimitRow>(kind, [&](const auto& k) { bound = acceleration_[p.mechanism.joints[k.joint].iv]; });
+    return bound;
 }
 
-// Maximum relative speed of the end points of a contact. Infinite if the plane rotates, because planes are unbounded.
-double CurvatureBounds::speed(const PlanePointRow& kind) const {
-    const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
-    return b.spin > 0.0 ? HUGE_VAL : a.velocity + b.velocity;
-}
-
-double CurvatureBounds::speed(const PlaneEllipsoidRow& kind) const {
-    const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
-    return b.spin > 0.0 ? HUGE_VAL : a.velocity + kind.reach() * a.spin + b.velocity;
-}
-
-double CurvatureBounds::speed(const CapsuleCapsuleRow& kind) const {
-    const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
-    return a.velocity + kind.half1 * a.spin + b.velocity + kind.half2 * b.spin;
-}
-
-double CurvatureBounds::speed(const CapsuleCylinderRow& kind) const {
-    const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
-    return a.velocity + kind.half1 * a.spin + b.velocity + kind.solid.reach * b.spin;
-}
-
-double CurvatureBounds::speed(const DiskHullRow& kind) const {
-    const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
-    return a.velocity + kind.rim * a.spin + b.velocity + kind.solid.reach * b.spin;
-}
-
-double CurvatureBounds::speed(const CylinderCylinderRow& kind) const {
-    const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
-    return a.velocity + kind.first.reach * a.spin + b.velocity + kind.second.reach * b.spin;
-}
-
-double CurvatureBounds::speed(const PointBoxRow& kind) const {
-    const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
-    return a.velocity + b.velocity + kind.half.norm() * b.spin;
-}
-
-template <class Solid>
-double CurvatureBounds::speed(const SolidHullRow<Solid>& kind) const {
-    const Bound a = frame_bound(kind.frame1), b = frame_bound(kind.frame2);
-    return a.velocity + b.velocity + kind.solid.reach * b.spin;
-}
-
+// Infinite if a plane rotates, because planes are unbounded.
 double CurvatureBounds::speed(int gap) const {
-    return std::visit([&](const auto& kind) { return speed(kind); }, p.blocks[p.gaps[gap].block].kind);
+    const Kind& kind = p.blocks[p.gaps[gap].block].kind;
+    double speed = HUGE_VAL;
+    visit_as<ShapeGap>(kind, [&](const auto& k) {
+        const Bound a = frame_bound(k.frame1), b = frame_bound(k.frame2);
+        speed = a.velocity + k.extent1() * a.spin + b.velocity + k.extent2() * b.spin;
+    });
+    visit_as<PlaneGap>(kind, [&](const auto& k) {
+        const Bound a = frame_bound(k.frame1), b = frame_bound(k.frame2);
+        if (!(b.spin > 0.0)) speed = a.velocity + k.extent1() * a.spin + b.velocity;
+    });
+    visit_as<LimitRow>(kind, [&](const auto& k) { speed = speed_[p.mechanism.joints[k.joint].iv]; });
+    return speed;
 }
 
 bool CurvatureBounds::has_bounds(const Program& p, int gap) { return !p.is_users(gap); }
 
 // Points that pass each other at distance d with relative speed u separate with acceleration u^2 / d. A change of the
-// nearest points only reduces this. reach1 and reach2 are the extents of the contact's geometry from its frames.
-double CurvatureBounds::upper_bound(double reach1, double reach2, const Frame& frame1, const Frame& frame2,
-                                    double radius) const {
-    const Bound a = frame_bound(frame1), b = frame_bound(frame2);
-    const double velocity = a.velocity + b.velocity + reach1 * a.spin + reach2 * b.spin;
-    return velocity * velocity / radius;
-}
-
+// nearest points only reduces this.
 double CurvatureBounds::upper_bound(const Workspace& w, int gap) const {
-    const Kind& kind = p.blocks[p.gaps[gap].block].kind;
     double passing = 0.0;
-    if (const auto* c = std::get_if<CapsuleCapsuleRow>(&kind))
-        passing = upper_bound(c->half1, c->half2, c->frame1, c->frame2, c->radius);
-    else if (const auto* box = std::get_if<PointBoxRow>(&kind))
-        passing = upper_bound(0.0, box->half.norm(), box->frame1, box->frame2, box->radius);
-    else if (const auto* hull = std::get_if<HullRow>(&kind))
-        passing = upper_bound(0.0, hull->solid.reach, hull->frame1, hull->frame2, hull->radius);
-    else if (const auto* revolved = std::get_if<RevolvedRow>(&kind))
-        passing = upper_bound(0.0, revolved->solid.reach, revolved->frame1, revolved->frame2, revolved->radius);
-    else if (const auto* line = std::get_if<CapsuleCylinderRow>(&kind))
-        passing = upper_bound(line->half1, line->solid.reach, line->frame1, line->frame2, line->radius);
-    else if (const auto* rim = std::get_if<DiskHullRow>(&kind))
-        passing = upper_bound(rim->rim, rim->solid.reach, rim->frame1, rim->frame2, rim->radius);
-    else if (const auto* rims = std::get_if<CylinderCylinderRow>(&kind))
-        passing = upper_bound(rims->first.reach, rims->second.reach, rims->frame1, rims->frame2, rims->radius);
+    visit_as<ShapeGap>(p.blocks[p.gaps[gap].block].kind, [&](const auto& k) {
+        const double velocity = speed(gap);
+        passing = velocity * velocity / k.radius;
+    });
     return lower_bound(w, gap) + passing;
 }
 

@@ -33,28 +33,8 @@ private:
     };
     Bound joint_bound(const Joint& joint) const;
     Bound frame_bound(const Frame& frame) const;
-    double of(const Workspace& w, const PlanePointRow& kind) const;
-    double of(const Workspace& w, const PlaneEllipsoidRow& kind) const;
-    double of(const Workspace& w, const CapsuleCapsuleRow& kind) const;
-    double of(const Workspace& w, const PointBoxRow& kind) const;
-    double of(const Workspace& w, const CapsuleCylinderRow& kind) const;
-    double of(const Workspace& w, const DiskHullRow& kind) const;
-    double of(const Workspace& w, const CylinderCylinderRow& kind) const;
-    template <class Solid> double of(const Workspace& w, const SolidHullRow<Solid>& kind) const;
-    double of(const Workspace& w, const LimitRow& kind) const;
-    double of_points(const Frame& frame1, double reach1, const Frame& frame2, double reach2) const;
-    double over_plane(const Workspace& w, const Frame& frame, const Frame& plane, double reach) const;
-    double speed(const PlanePointRow& kind) const;
-    double speed(const PlaneEllipsoidRow& kind) const;
-    double speed(const CapsuleCapsuleRow& kind) const;
-    double speed(const PointBoxRow& kind) const;
-    double speed(const CapsuleCylinderRow& kind) const;
-    double speed(const DiskHullRow& kind) const;
-    double speed(const CylinderCylinderRow& kind) const;
-    template <class Solid> double speed(const SolidHullRow<Solid>& kind) const;
-    double speed(const LimitRow& kind) const { return speed_[p.mechanism.joints[kind.joint].iv]; }
-    template <class K> double speed(const K&) const { return HUGE_VAL; }
-    double upper_bound(double reach1, double reach2, const Frame& frame1, const Frame& frame2, double radius) const;
+    double of_points(const Frame& frame1, double extent1, const Frame& frame2, double extent2) const;
+    double over_plane(const Workspace& w, const Frame& frame, const Frame& plane, double extent) const;
 
     const Program& p;
     std::vector<int> joints_;  // joints that move contacts, each after its parent

@@ -7,25 +7,6 @@ namespace pn {
 
 namespace {
 
-// Extents of a contact's geometry from its frames, without planes.
-struct Extents { double first = 0.0, second = 0.0; };
-
-Extents extents(const Kind& kind) {
-    if (const auto* capsules = std::get_if<CapsuleCapsuleRow>(&kind)) return {capsules->half1, capsules->half2};
-    if (const auto* box = std::get_if<PointBoxRow>(&kind)) return {0.0, box->half.norm()};
-    if (const auto* ellipsoid = std::get_if<PlaneEllipsoidRow>(&kind)) return {ellipsoid->reach(), 0.0};
-    if (const auto* hull = std::get_if<HullRow>(&kind)) return {0.0, hull->solid.reach};
-    if (const auto* revolved = std::get_if<RevolvedRow>(&kind)) return {0.0, revolved->solid.reach};
-    if (const auto* line = std::get_if<CapsuleCylinderRow>(&kind)) return {line->half1, line->solid.reach};
-    if (const auto* rim = std::get_if<DiskHullRow>(&kind)) return {rim->rim, rim->solid.reach};
-    if (const auto* rims = std::get_if<CylinderCylinderRow>(&kind)) return {rims->first.reach, rims->second.reach};
-    return {};
-}
-
-bool has_plane(const Kind& kind) {
-    return std::holds_alternative<PlanePointRow>(kind) || std::holds_alternative<PlaneEllipsoidRow>(kind);
-}
-
 bool turns(JointKind kind) { return kind != JointKind::prismatic && kind != JointKind::translation; }
 bool slides(JointKind kind) { return kind != JointKind::revolute && kind != JointKind::spherical; }
 
@@ -64,11 +45,17 @@ TravelBound::TravelBound(const Program& program)
         } else if (const auto [first, second] = frames(block.kind); first && !p.is_users(static_cast<int>(gap))) {
             pair.first = ends[0] = first->joint;
             pair.second = ends[1] = second->joint;
-            pair.plane_rotates = has_plane(block.kind) && may_turn[pair.second];
-            const Extents reach = extents(block.kind);
-            pair.reach = reach.first;
-            extent_[pair.first] = std::max(extent_[pair.first], first->p.norm() + reach.first);
-            extent_[pair.second] = std::max(extent_[pair.second], second->p.norm() + reach.second);
+            visit_as<PlaneGap>(block.kind, [&](const auto& k) {
+                pair.plane_rotates = may_turn[pair.second];
+                pair.reach = k.extent1();
+            });
+            double extent2 = 0.0;
+            visit_as<ShapeGap>(block.kind, [&](const auto& k) {
+                pair.reach = k.extent1();
+                extent2 = k.extent2();
+            });
+            extent_[pair.first] = std::max(extent_[pair.first], first->p.norm() + pair.reach);
+            extent_[pair.second] = std::max(extent_[pair.second], second->p.norm() + extent2);
         } else {
             pair.is_unknown = true;
         }

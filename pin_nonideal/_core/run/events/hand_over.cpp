@@ -18,8 +18,7 @@ namespace {
 // Check if a gap belongs to a plane without edges, or to a joint.
 bool has_one_feature(const Program& p, int gap) {
     const Kind& kind = p.blocks[p.gaps[gap].block].kind;
-    return std::holds_alternative<PlanePointRow>(kind) || std::holds_alternative<PlaneEllipsoidRow>(kind) ||
-           std::holds_alternative<LimitRow>(kind);
+    return visit_as<PlaneGap>(kind, [](const auto&) {}) || std::holds_alternative<LimitRow>(kind);
 }
 
 }  // namespace
