@@ -49,7 +49,7 @@ MANY_FREEDOMS = 200
 # Maximum number of starts until a closure is found, and number of further starts if its displacement is
 # longer than FAR_MOVE units (twice as many above VERY_FAR_MOVE). With at most FEW_FREEDOMS coordinates,
 # starts continue up to MAX_STARTS until a closure is found, and until the nearest was found OFTEN times.
-STARTS, FURTHER_STARTS, FAR_MOVE, VERY_FAR_MOVE = 24, 12, 0.05, 0.5
+STARTS, FURTHER_STARTS, FAR_MOVE, VERY_FAR_MOVE = 24, 24, 0.05, 0.5
 MAX_STARTS, OFTEN, FEW_FREEDOMS = 60, 4, 12
 SPREADS = (0.1, 0.3, 0.5, 1.0)  # spreads of the starts before the first closure, in turn [units]
 # Smallest reciprocal condition number of the mass matrix. Closures below it (gimbal lock) are a fallback.

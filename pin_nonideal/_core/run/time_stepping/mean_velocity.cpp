@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "contact/impact.hpp"
+
 namespace pn {
 
 void MeanVelocity::FreeFlyer::turn_axes(VecX& v, const Eigen::Vector3d& angle) const {
@@ -92,10 +94,10 @@ void MeanVelocity::start_rates(const Program& p, Workspace& w, int i) const {
     }
 }
 
-double MeanVelocity::start_speed(const Program& p, Workspace& w, const Friction& friction) const {
+bool MeanVelocity::starts_at_rest(const Program& p, Workspace& w, const Friction& friction) const {
     const Block& block = p.blocks[friction.block];
     start_rates(p, w, friction.block);
-    return w.scratch.r.segment(block.row, block.kept.size()).norm();
+    return w.scratch.r.segment(block.row, block.kept.size()).norm() <= rest_rate(start_);
 }
 
 void MeanVelocity::meet_at_end(const Program& p, Workspace& w, VecX& b) const {

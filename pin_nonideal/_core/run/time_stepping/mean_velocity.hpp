@@ -51,6 +51,7 @@ public:
     // Move the mean to that of the step's start and end for another sweep. Return false if no further sweep is needed.
     bool move();
 
+    bool is_first() const { return moves_ == 0; }  // no sweep has ended
     bool is_predicted() const { return is_predicted_; }  // the first sweep is at another velocity than the start
     const VecX& value() const { return value_; }  // velocity at which the forces are taken
     const VecX& start() const { return start_; }  // velocity of the start, in the axes at the middle of the step
@@ -58,8 +59,8 @@ public:
     // Compute the rates of a block's kept rows at the velocity of the start, and half of their change by turning axes.
     // The rows are evaluated at the mean velocity. The rates are stored in w.scratch.r at the block's rows.
     void start_rates(const Program& p, Workspace& w, int block) const;
-    // Slip speed of a friction element at the velocity of the start.
-    double start_speed(const Program& p, Workspace& w, const Friction& friction) const;
+    // Check if a friction element has no slip at the velocity of the start, up to rounding.
+    bool starts_at_rest(const Program& p, Workspace& w, const Friction& friction) const;
     // Set the right-hand sides b that satisfy the constraints at the end of the step. The rows are evaluated at the
     // middle of the step, so half of their change over the step remains.
     void meet_at_end(const Program& p, Workspace& w, VecX& b) const;

@@ -45,6 +45,8 @@ void Moreau::step(double t, double h, VecX& y, double& numerical_energy) {
     const double middle = t + 0.5 * h;
     t0_ = t;
     q0_ = y.head(system_.nq);
+    holds_.clear();
+    for (const Mode mode : w.state.mode) holds_.push_back(mode == sticking);
     set_modes(p, w, unloaded_);
     mean_.begin(h, v0_, w.state.last_rates);
     system_.read(y);
@@ -72,7 +74,9 @@ void Moreau::sweep(double t, JointDrives::Step& drives, bool anew) {
     solve_without_friction(t);
     if (anew) respond();
     pose_problem();
-    solve_friction(t);
+    if (mean_.is_first()) find_rest();
+    do solve_friction(t);
+    while (give_way());
     end_velocity();
 }
 
@@ -105,6 +109,38 @@ void Moreau::pose_problem() {
     }
 }
 
+// Find the elements without slip at the step's start. Static friction may hold them.
+void Moreau::find_rest() {
+    for (int e = 0; e < system_.ne; ++e) holds_[e] = holds_[e] || mean_.starts_at_rest(p, w, p.frictions[e]);
+}
+
+// Replace static by kinetic friction where static friction does not hold. Return true if it does.
+bool Moreau::give_way() {
+    bool changes = false;
+    alpha_ = problem_.alpha0;
+    alpha_.noalias() += problem_.W * force_;
+    for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e) {
+        if (!holds_[e] || p.frictions[e].static_ratio == 1.0 || is_within_limit(e, at)) continue;
+        if (alpha_.segment(at, problem_.dims[e]).norm() <= slip_rounding()) continue;
+        holds_[e] = false;
+        changes = true;
+    }
+    return changes;
+}
+
+// Check if the force of an element is below its limit. Its forces start at row `at`.
+bool Moreau::is_within_limit(int e, int at) {
+    const int dim = problem_.dims[e];
+    shifted_ = force_.segment(at, dim);
+    if (dim == 1) shifted_[0] -= force_limit_.middle[at];
+    return shifted_.norm() < force_limit_[e] * (1.0 - parameters.limit_rounding);
+}
+
+// Rounding of slip accelerations.
+double Moreau::slip_rounding() const {
+    return parameters.slip_rest_rounding * problem_.alpha0.lpNorm<Eigen::Infinity>();
+}
+
 // Compute the motion under the friction forces.
 void Moreau::apply_forces() {
     problem_.acceleration(p, w, force_, a_friction_);
@@ -125,9 +161,8 @@ double Moreau::update_limits(double t) {
     for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e) {
         const Friction& friction = p.frictions[e];
         const SlipLimits load = load_limits(p, w, friction, t, w.now.terms.q, mean_.value());
-        const bool rests = mean_.start_speed(p, w, friction) == 0.0;
         const double speed = slip_velocity(w.now, friction).norm();
-        const SlipLimits limit = load * (rests ? friction.static_ratio : friction.speed_factor(speed));
+        const SlipLimits limit = load * (holds_[e] ? friction.static_ratio : friction.speed_factor(speed));
         change = std::max({change, std::abs(limit.reach() - limit_[e]), std::abs(limit.middle() - limit_.middle[at])});
         limit_.size[e] = limit.reach();
         limit_.middle[at] = limit.middle();
@@ -171,16 +206,12 @@ void Moreau::end_velocity() {
     a_friction_ += a_free_;
     mean_.end(a_friction_, v1_);
     const EndModes end(v1_);
-    const double rounding = parameters.slip_rest_rounding * problem_.alpha0.lpNorm<Eigen::Infinity>();
     for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e) {
         const int dim = problem_.dims[e];
         w.state.percussion.segment(p.blocks[p.frictions[e].block].row, dim) = force_.segment(at, dim);
-        shifted_ = force_.segment(at, dim);
-        if (dim == 1) shifted_[0] -= force_limit_.middle[at];
         const double slip = alpha_.segment(at, dim).norm();
-        const bool rests = end.is_rest(h_ * slip) && slip <= rounding;
-        const bool holds = shifted_.norm() < force_limit_[e] * (1.0 - parameters.limit_rounding);
-        modes_[e] = EndModes::settle(holds || rests, dim > 1 || alpha_[at] > 0.0, p.blocks[p.frictions[e].block], v1_);
+        const bool sticks = is_within_limit(e, at) || (end.is_rest(h_ * slip) && slip <= slip_rounding());
+        modes_[e] = EndModes::settle(sticks, dim > 1 || alpha_[at] > 0.0, p.blocks[p.frictions[e].block], v1_);
     }
 }
 

@@ -46,6 +46,10 @@ private:
     void respond();
     void pose_problem();
     void solve_friction(double t);
+    void find_rest();
+    bool give_way();
+    bool is_within_limit(int e, int at);
+    double slip_rounding() const;
     void apply_forces();
     double update_limits(double t);
     void end_velocity();
@@ -56,6 +60,7 @@ private:
     Workspace& w;
     FrictionProblem problem_;  // problem of all elements
     std::vector<Mode> modes_, unloaded_;
+    std::vector<char> holds_;  // elements that static friction may hold
     double h_ = 0.0, t0_ = 0.0;  // length and start of the step
     VecX q0_;
     MeanVelocity mean_;

@@ -190,7 +190,7 @@ const VecX& MoreauContacts::path_since_last() {
 void MoreauContacts::gather(double t) {
     move_bodies(p.mechanism, w.now.terms, mean_.start());
     find_touching(t);
-    elements_.gather(p, w, touching_, was_closed_, modes_, v0_);
+    elements_.gather(p, w, touching_, was_closed_, modes_, mean_);
     if (elements_.strike()) mean_.begin(h_, v0_, VelocityRates());
 }
 
@@ -260,7 +260,8 @@ bool MoreauContacts::rest_within_limits(double t) {
            elements_.limits_hold(p, w, t, mean_, forces_.f);
 }
 
-void MoreauContacts::solve(double t) {
+// Find the forces of the step under limits that follow the loads.
+void MoreauContacts::find_forces(double t) {
     const int n = static_cast<int>(elements_.rows.size());
     const bool loads =
         n > 0 && elements_.cones.back().is(ConeElement::Kind::box);  // limits that may depend on the motion
@@ -275,6 +276,19 @@ void MoreauContacts::solve(double t) {
         ++w.counters.iterations;
     }
     if (n == 0) apply();
+}
+
+void MoreauContacts::solve(double t) {
+    const int n = static_cast<int>(elements_.rows.size());
+    find_forces(t);
+    while (elements_.may_give_way(p)) {
+        forces_.measure_end();
+        const double largest = forces_.f.head(n).cwiseAbs().maxCoeff();
+        if (!elements_.give_way(p, w, forces_.f, forces_.end_rows, StepForces::parameters.limit_rounding * largest,
+                                rest_rate(v0_) / h_))
+            break;
+        find_forces(t);
+    }
     keep_percussions();
     if (n == 0) return;
     const ConeResiduals r = forces_.residuals();

@@ -65,6 +65,7 @@ private:
     void find_touching(double t);
     void move_touching(double t);
     bool rest_within_limits(double t);
+    void find_forces(double t);
     void solve(double t);
     void apply();
     void keep_percussions();

@@ -39,12 +39,12 @@ void StepElements::add(const Program& p, const Part& part, int block, int kept, 
 }
 
 void StepElements::gather(const Program& p, Workspace& w, const std::vector<int>& touching,
-                          const std::vector<char>& closed, const std::vector<Mode>& modes, const VecX& v0) {
+                          const std::vector<char>& closed, const std::vector<Mode>& modes, const MeanVelocity& mean) {
     rows.clear();
     parts.clear();
     cones.clear();
     rubbing_ = outside_contacts_;
-    const double still = rest_rate(v0);
+    const double still = rest_rate(mean.start());
     for (int i : touching) {
         const Gap& gap = p.gaps[i];
         const int slides = gap.sliding < 0 ? 0 : static_cast<int>(p.blocks[p.frictions[gap.sliding].block].kept.size());
@@ -61,7 +61,11 @@ void StepElements::gather(const Program& p, Workspace& w, const std::vector<int>
     std::sort(rubbing_.begin(), rubbing_.end());
     for (int e : rubbing_) {
         const int block = p.frictions[e].block, kept = static_cast<int>(p.blocks[block].kept.size());
-        if (kept > 0) add(p, {-1, e, 0.0}, block, kept, ConeElement::box(kept, 0.0));
+        Part part{-1, e};
+        const bool is_still = p.frictions[e].gap < 0 ? mean.starts_at_rest(p, w, p.frictions[e])
+                                                     : slip_velocity(w.now, p.frictions[e]).norm() <= still;
+        part.rests = modes[e] == sticking || is_still;
+        if (kept > 0) add(p, part, block, kept, ConeElement::box(kept, 0.0));
     }
 }
 
@@ -79,11 +83,38 @@ bool StepElements::limits_follow_loads(const Program& p) const {
 // Return the limits of a box under the loads of the current motion.
 SlipLimits StepElements::limits(const Program& p, Workspace& w, double t, const MeanVelocity& mean, size_t e) const {
     const Friction& friction = p.frictions[parts[e].element];
-    const bool rests = mean.start_speed(p, w, friction) == 0.0;
     const double speed = slip_velocity(w.now, friction).norm();
     const SlipLimits load = friction.gap >= 0 ? SlipLimits(friction.constant + friction.mu * w.now.lam[friction.row])
                                               : load_limits(p, w, friction, t, w.now.terms.q, mean.value());
-    return load * (rests ? friction.static_ratio : friction.speed_factor(speed));
+    return load * (parts[e].rests ? friction.static_ratio : friction.speed_factor(speed));
+}
+
+bool StepElements::may_give_way(const Program& p) const {
+    return std::any_of(parts.begin(), parts.end(), [&](const Part& part) {
+        return part.rests && p.frictions[part.element].static_ratio != 1.0;
+    });
+}
+
+bool StepElements::give_way(const Program& p, const Workspace& w, const VecX& f, const VecX& slips, double clear,
+                            double still) {
+    bool changes = false;
+    for (size_t e = 0, at = 0; e < parts.size(); at += cones[e].dim, ++e) {
+        Part& part = parts[e];
+        if (!part.rests || p.frictions[part.element].static_ratio == 1.0) continue;
+        if (limit_left(e, static_cast<int>(at), f) > clear) continue;
+        const int head = part.gap >= 0;
+        if (slips.segment(at + head, cones[e].dim - head).norm() <= still) continue;
+        part.rests = false;
+        changes = true;
+        if (head) cones[e].bound = coefficient(p, w, part);
+    }
+    return changes;
+}
+
+double StepElements::limit_left(size_t e, int at, const VecX& f) const {
+    const int head = parts[e].gap >= 0, dim = cones[e].dim - head;
+    const double size = dim == 1 ? std::abs(f[at + head] - parts[e].middle) : f.segment(at + head, dim).norm();
+    return cones[e].bound * (head ? f[at] : 1.0) - size;
 }
 
 bool StepElements::limits_settle(const Program& p, Workspace& w, double t, const MeanVelocity& mean, double allowed) {

@@ -34,7 +34,7 @@ public:
         // bounce: turning normals and other forces close its gap anew in each step.
         double approach = 0.0;
         double middle = 0.0;   // middle of the limits of a box with one direction
-        bool rests = false;    // the contact sticks at the step's start
+        bool rests = false;    // the element sticks at the step's start
         bool strikes = false;  // the contact was open at the step's start
     };
 
@@ -45,9 +45,9 @@ public:
     explicit StepElements(const Program& p);
 
     // Collect the elements of the contacts `touching` with their sliding, then other dry friction. The step starts with
-    // the given closed contacts and modes at the velocity v0.
+    // the given closed contacts and modes, and contacts are evaluated at the velocity of its start.
     void gather(const Program& p, Workspace& w, const std::vector<int>& touching, const std::vector<char>& closed,
-                const std::vector<Mode>& modes, const VecX& v0);
+                const std::vector<Mode>& modes, const MeanVelocity& mean);
     // Check if a contact was open at the step's start.
     bool strike() const {
         return std::any_of(parts.begin(), parts.end(), [](const Part& part) { return part.strikes; });
@@ -62,6 +62,13 @@ public:
     // Update the limits of dry friction to the loads of the current motion. Return true if they have converged, or if
     // they change by at most `allowed` and do not converge.
     bool limits_settle(const Program& p, Workspace& w, double t, const MeanVelocity& mean, double allowed);
+    // Check if static friction holds an element that kinetic friction may not hold.
+    bool may_give_way(const Program& p) const;
+    // Replace static by kinetic friction where the forces f are at their limit, up to `clear`, and the element slips
+    // faster than `still`. Return true if it does.
+    bool give_way(const Program& p, const Workspace& w, const VecX& f, const VecX& slips, double clear, double still);
+    // Return the force that is left to the limit of an element with forces f from row `at` on.
+    double limit_left(size_t e, int at, const VecX& f) const;
     // Reduce the limits of dry friction to a part of them.
     void reduce_limits();
     // Set the limits of dry friction to the loads of the current motion. Return true if the forces f are within them.
