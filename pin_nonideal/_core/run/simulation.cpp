@@ -93,6 +93,7 @@ void Simulation::run() {
         }
         accept(proposal, event);
         record(event);
+        modes.bridge_stalled_steps();
     }
     if (progress.t < t_end) {  // ended by the user: record a last sample
         system.read(progress.y);

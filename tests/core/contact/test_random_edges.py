@@ -123,7 +123,8 @@ def deepest(scene: pn.Scene, shapes: pin.GeometryModel, run: pn.Trajectory) -> f
 # Closed contacts on both sides of an edge. In 10465 and 10477 the residual of the contradiction is negative.
 # In 10897 a rim and a point of a cone have nearly the same row. Its projection would take 7 % of the energy.
 # In 31232 and 31817 an approach at the edge that other contacts block came back in 20,000 flights of no time.
-NEARLY_DEPENDENT = (5, 114, 10465, 10477, 10897, 31232, 31817)
+# In 30880 steps of 1e-10 s follow a contact that nearly sticks.
+NEARLY_DEPENDENT = (5, 114, 10465, 10477, 10897, 30880, 31232, 31817)
 FEW = pytest.param(range(3, 9), id="6")  # without the upright cylinder of seed 2, with its many contacts
 
 

@@ -35,6 +35,14 @@ bool ChatterDetector::is_zeno() const {
     return last.size() == parameters.dwindling_events && progress_.t - last.front() <= parameters.window;
 }
 
+bool ChatterDetector::is_stalled() {
+    if (++progress_.counted_steps < parameters.stalled_steps) return false;
+    const bool stalls = progress_.t - progress_.counted_from <= parameters.stalled_time;
+    progress_.counted_steps = 0;
+    progress_.counted_from = progress_.t;
+    return stalls;
+}
+
 // Return the length [s] of the next stretch: twice the last one if events accumulated again right after it.
 double ChatterDetector::next_stretch() const {
     const std::vector<double>& recent = progress_.recent_event_times;

@@ -1,4 +1,4 @@
-// Chatter: time stepping, which locates no events, bridges accumulations of events.
+// Chatter: time stepping, which locates no events, bridges accumulations of events and of short steps.
 #pragma once
 
 #include "run/integrators/stiffness.hpp"
@@ -12,6 +12,10 @@ struct ChatterParameters {
     // Number of instants with mode changes within `window` that counts as an accumulation (Zeno) if the last one
     // finds no motion.
     size_t dwindling_events = 6;
+    // Number of successive steps that together advance the time by at most `stalled_time` [s], until time stepping bridges
+    // a stretch.
+    int stalled_steps = 2000;
+    double stalled_time = 1e-6;
     int steps = 50;  // steps of a stretch
     // Growth of the stretch if events accumulate again right after it, and longest stretch [s].
     double growth = 2.0, longest = 1e-2;
@@ -36,6 +40,8 @@ public:
     // Check if an event without a known motion ends an accumulation of mode changes. A step cannot resolve the
     // remaining time until rest.
     bool is_zeno() const;
+    // Count an accepted step. Return true if many steps have advanced the time by almost nothing.
+    bool is_stalled();
     // Bridge one stretch by time stepping.
     void bridge_stretch(int element, double t_end);
 

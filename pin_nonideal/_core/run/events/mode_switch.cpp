@@ -128,15 +128,25 @@ bool ModeChanges::bridge_with_time_stepping(const Failure& failure, bool of_hand
                              !failure.elements.empty();
     const int element = of_elements ? failure.elements.front() : 0;
     if (!(of_hand_over || is_undecided(failure) || chatter_.is_zeno() || is_creeping())) return false;
-    for (;;) {
+    bridge(element);
+    return true;
+}
+
+void ModeChanges::bridge_stalled_steps() {
+    const bool bridges = options_.method.adaptive() && !options_.method.outside() && (system_.ne > 0 || system_.ng > 0);
+    if (bridges && chatter_.is_stalled()) bridge(0);
+}
+
+// Bridge stretches by time stepping until modes are found. The solver may fail again a little later, or the contacts may
+// still contradict each other.
+void ModeChanges::bridge(int element) {
+    do {
         chatter_.bridge_stretch(element, options_.end());
         const auto again = attempt([&] { select_new_modes(); });
-        if (!again) return true;
-        // The solver fails again a little later, or the contacts still contradict each other.
+        if (!again) return;
         const bool goes_on = (is_of_modes(*again) && is_recoverable(*again)) || is_of_contradicting_contacts(*again);
         if (system_.ng == 0 || !goes_on) throw *again;
-        if (progress_.t >= options_.end()) return true;
-    }
+    } while (progress_.t < options_.end());
 }
 
 // Check if all slipping elements are about to rest.

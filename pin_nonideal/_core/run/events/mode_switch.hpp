@@ -44,8 +44,11 @@ public:
     bool is_of_contradicting_contacts(const Failure& failure) const;
     // Bridge an accumulation of events, and select modes at the new state.
     void bridge_chatter(int element);
+    // Bridge steps that no longer advance the time, and select modes at the new state.
+    void bridge_stalled_steps();
 
 private:
+    void bridge(int element);
     void end_bouncing();
     bool was_released(int gap) const;
     void restore_last(const RunState& before, bool has_impact);

@@ -55,13 +55,14 @@ static void fields(Archive& a, GapState& x) {
 
 static void fields(Archive& a, Progress& x) {
     auto& [t, h, y, rate, configured_t, configured_y, numerical_energy, samples, next_period, detected_break,
-           recent_event_times, mode_change_times, event_signs, bridged_time, bridged_end, slip_at_start, in_tension, gaps,
-           forced_switch_time, impact_energy, several_motions, stiff_steps, quiet_steps, rounding, next_rounding_check,
-           growth_times, growth_speeds, growth_steps, is_stationary, has_forces, turning_steps, may_hand_over,
-           hand_over_time] = x;
+           recent_event_times, mode_change_times, event_signs, counted_steps, counted_from, bridged_time, bridged_end,
+           slip_at_start, in_tension, gaps, forced_switch_time, impact_energy, several_motions, stiff_steps, quiet_steps,
+           rounding, next_rounding_check, growth_times, growth_speeds, growth_steps, is_stationary, has_forces,
+           turning_steps, may_hand_over, hand_over_time] = x;
     a(t, h, y, rate, configured_t, configured_y, numerical_energy, samples, next_period, detected_break, event_signs,
-      bridged_time, bridged_end, slip_at_start, in_tension, forced_switch_time, impact_energy, several_motions, stiff_steps,
-      quiet_steps, rounding, next_rounding_check, is_stationary, has_forces, turning_steps, may_hand_over, hand_over_time);
+      counted_steps, counted_from, bridged_time, bridged_end, slip_at_start, in_tension, forced_switch_time, impact_energy,
+      several_motions, stiff_steps, quiet_steps, rounding, next_rounding_check, is_stationary, has_forces, turning_steps,
+      may_hand_over, hand_over_time);
     fields(a, gaps);
     a.list(recent_event_times);
     a.list(growth_times);

@@ -23,6 +23,8 @@ struct Progress {
     std::vector<double> recent_event_times;  // times of recent events, for the detection of chatter
     std::vector<double> mode_change_times;  // times of the last instants at which modes changed
     std::vector<double> event_signs;  // signs of the values of value events
+    int counted_steps = 0;      // accepted steps since `counted_from`, for the detection of stalled steps
+    double counted_from = -HUGE_VAL;  // time [s]
     double bridged_time = 0.0, bridged_end = 0.0;  // length and end of the last bridged stretch [s]
     std::vector<double> slip_at_start;  // slip speed at the step's start, by element
     std::vector<char> in_tension;  // true for each bilateral contact in tension
