@@ -12,10 +12,8 @@ struct ChatterParameters {
     // Number of instants with mode changes within `window` that counts as an accumulation (Zeno) if the last one
     // finds no motion.
     size_t dwindling_events = 6;
-    // Number of successive steps that together advance the time by at most `stalled_time` [s], until time stepping bridges
-    // a stretch.
-    int stalled_steps = 2000;
-    double stalled_time = 1e-6;
+    int stalled_steps = 2000;     // successive steps that stall if they take at most `stalled_time` together
+    double stalled_time = 1e-6;   // time that this number of steps advances, or less [s]
     int steps = 50;  // steps of a stretch
     // Growth of the stretch if events accumulate again right after it, and longest stretch [s].
     double growth = 2.0, longest = 1e-2;
