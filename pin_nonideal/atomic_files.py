@@ -139,8 +139,8 @@ def _keep_owner(target: Path, temporary: str) -> None:
     """Copy owner and group of the existing file, as far as this process is allowed to."""
     if hasattr(os, "chown"):
         with suppress(OSError):
-            there = target.stat()
-            os.chown(temporary, there.st_uid, there.st_gid)
+            status = target.stat()
+            os.chown(temporary, status.st_uid, status.st_gid)
 
 
 def _part(target: Path, process: int) -> str:

@@ -12,7 +12,7 @@ from pin_nonideal.description.contacts.pair_of_shapes import PairOfShapes, point
 from pin_nonideal.description.drive_kinds import delayed_control, switching_drives
 from pin_nonideal.description.scene_spec import SceneSpec
 from pin_nonideal.errors import InputError, RunError
-from pin_nonideal.states.held import NOTHING_HELD, Held
+from pin_nonideal.states.held_entries import NOTHING_HELD, Held
 from pin_nonideal.states.joint_layout import joint_places
 from pin_nonideal.states.projection import Projection
 from pin_nonideal.states.report import ProjectionReport

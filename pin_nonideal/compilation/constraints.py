@@ -166,14 +166,14 @@ def _(c: Rolling, name: str, out: core.Builder, resolver: Resolver) -> None:
     frame = resolver.frame(c.frame, who)
     t1, t2, n = axis_triad(unit_axis(who, c.normal))
     sphere = c.axis is None
-    axle = (0.0, 0.0, 1.0) if c.axis is None else unit_axis(who, c.axis)
+    axis = (0.0, 0.0, 1.0) if c.axis is None else unit_axis(who, c.axis)
     out.add_rolling(
         name,
         frame,
         plane,
         radius=c.radius,
         sphere=sphere,
-        axle=axle,
+        axis=axis,
         tangent1=t1,
         tangent2=t2,
         normal=n,

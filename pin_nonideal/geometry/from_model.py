@@ -218,9 +218,9 @@ def _check_models(who: str, model: object, collision_model: object) -> None:
         ("collision_model", collision_model, pin.GeometryModel),
     ):
         if not isinstance(value, kind):
-            own = f"; pass scene.{what}" if hasattr(value, what) else ""
+            hint = f"; pass scene.{what}" if hasattr(value, what) else ""
             raise InputError(
-                f"{who}: {what} must be a pinocchio.{kind.__name__}; got {short_repr(value)}{own}"
+                f"{who}: {what} must be a pinocchio.{kind.__name__}; got {short_repr(value)}{hint}"
             )
 
 
@@ -246,14 +246,14 @@ def _shapes_of_links(
     known = [str(f.name) for f in model.frames if f.type == pin.FrameType.BODY] + list(model.names)[1:]
     link_of_shape: dict[int, str] = {}
     for link in sequence(f"{who}: links", links):
-        own = [i for i, names in enumerate(carriers) if text(f"{who}: link", link) in names]
-        if not own and link not in known:
+        indices = [i for i, names in enumerate(carriers) if text(f"{who}: link", link) in names]
+        if not indices and link not in known:
             raise UnknownNameError(f'{who}: no link or joint "{link}" in the model{nearest(link, known)}')
-        if not own:
+        if not indices:
             raise InputError(
                 f'{who}: link "{link}" has no shape in the collision model{_shaped(link, model, carriers)}'
             )
-        link_of_shape |= {i: link for i in own if i not in link_of_shape}
+        link_of_shape |= {i: link for i in indices if i not in link_of_shape}
     return link_of_shape
 
 

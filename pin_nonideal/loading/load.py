@@ -21,7 +21,7 @@ from pin_nonideal.loading.urdf.xml import quote_names
 from pin_nonideal.loading.yaml.assembly import scene_arguments
 from pin_nonideal.loading.yaml.initial_state import Start, held_entries
 from pin_nonideal.scene.scene import Scene, compiled_scene, with_origin
-from pin_nonideal.states.held import Held
+from pin_nonideal.states.held_entries import Held
 from pin_nonideal.types import Table
 from pin_nonideal.validation import flag
 
@@ -203,10 +203,12 @@ def _origin(text: str, parameters: Table) -> Table | None:
     if folders is not None:
         quote_names = [folders] if isinstance(folders, (str, Path)) else folders
         recorded["package_dirs"] = [str(Path(folder).resolve()) for folder in quote_names]
-    own = text in (*robot_folders(), *example_names()) or not path.exists()
+    is_library_name = text in (*robot_folders(), *example_names()) or not path.exists()
     try:
         return dict(
-            json.loads(json.dumps({"name": text if own else str(path.resolve()), "parameters": recorded}))
+            json.loads(
+                json.dumps({"name": text if is_library_name else str(path.resolve()), "parameters": recorded})
+            )
         )
     except (TypeError, ValueError):
         return None

@@ -79,8 +79,8 @@ def robots() -> list[tuple[str, str]]:
 
 def robot_folders() -> dict[str, Path]:
     """Return the folders of this package's robots by name: of the installed package, or of the checkout."""
-    here = Path(__file__).resolve().parent.parent
-    for base in (here / "robots", here.parent / "robots"):
+    package = Path(__file__).resolve().parent.parent
+    for base in (package / "robots", package.parent / "robots"):
         if base.is_dir():
             return {p.name: p for p in sorted(base.iterdir()) if (p / "robot.yaml").is_file()}
     return {}

@@ -21,7 +21,7 @@ from pin_nonideal.description.laws import Law
 from pin_nonideal.description.scene_spec import SceneSpec
 from pin_nonideal.errors import InputError
 from pin_nonideal.geometry.from_model import GeometryContact, with_manifolds
-from pin_nonideal.states.held import Held
+from pin_nonideal.states.held_entries import Held
 from pin_nonideal.states.loop_closure import CLOSURE_TOLERANCE
 from pin_nonideal.types import GeometryModel, Model, State, Table
 from pin_nonideal.validation import choice, nonnegative, optional_text, sequence

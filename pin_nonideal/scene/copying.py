@@ -7,7 +7,7 @@ import pickle
 from typing import Any
 
 from pin_nonideal.errors import InputError
-from pin_nonideal.states.held import Held
+from pin_nonideal.states.held_entries import Held
 from pin_nonideal.states.joint_order import file_order, remember_order
 from pin_nonideal.types import Table
 from pin_nonideal.validation import label

@@ -11,7 +11,7 @@ from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.compilation.resolver import unique_names
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
 from pin_nonideal.geometry.ground import lowest_height
-from pin_nonideal.states.held import Held
+from pin_nonideal.states.held_entries import Held
 from pin_nonideal.states.kinematics import frame_index, joint_placements
 from pin_nonideal.states.parsing import named_coordinates, named_entries
 from pin_nonideal.types import Array, Model, Placement, State, Table

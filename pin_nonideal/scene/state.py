@@ -7,7 +7,7 @@ import pinocchio as pin
 
 from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.errors import InputError
-from pin_nonideal.states.held import Held, change_note, changes, held_notes
+from pin_nonideal.states.held_entries import Held, change_note, changes, held_notes
 from pin_nonideal.states.joint_layout import require_resolved, unit_parts
 from pin_nonideal.states.parsing import named_configuration, named_coordinates, named_entries, named_velocity
 from pin_nonideal.states.report import ProjectionReport

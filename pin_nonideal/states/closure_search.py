@@ -62,22 +62,22 @@ class ClosureSearch:
         """
         mass, unit = mass_function(self.model, self._runner), self._unit_at(q)
         try:
-            own = np.ones(self.model.nv, dtype=bool) if free is None else free
-            block = np.ix_(own, own)
-            loops = self._rows(q, unit, self._loops, own)
+            is_free = np.ones(self.model.nv, dtype=bool) if free is None else free
+            block = np.ix_(is_free, is_free)
+            loops = self._rows(q, unit, self._loops, is_free)
             arguments = (
                 self.model,
                 loops,
                 lambda q: mass(q)[block],
                 metric(mass(q), self.unit)[block],
-                unit[own],
-                np.logical_not(self._slides)[own],
+                unit[is_free],
+                np.logical_not(self._slides)[is_free],
                 q,
                 free,
             )
             if not self._gaps.any():
                 return Search(*arguments).nearest()
-            return UnilateralClosure(self._rows(q, unit, self._gaps, own), *arguments).nearest()
+            return UnilateralClosure(self._rows(q, unit, self._gaps, is_free), *arguments).nearest()
         except np.linalg.LinAlgError:  # a number overflowed: no closure
             return Closure(q, np.inf, 0.0, False, 0), False
 

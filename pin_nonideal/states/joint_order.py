@@ -26,9 +26,9 @@ def remember_order(model: Model, names: Sequence[str]) -> None:
         model: pinocchio.Model.
         names: joint names in the order of the file; names that the model does not have are ignored.
     """
-    own = [str(name) for name in model.names][1:]
-    filed = [name for name in names if name in own]
-    if filed != [name for name in own if name in filed]:
+    model_names = [str(name) for name in model.names][1:]
+    filed = [name for name in names if name in model_names]
+    if filed != [name for name in model_names if name in filed]:
         _file_order[id(model)] = tuple(filed)
         weakref.finalize(model, _file_order.pop, id(model), None)
 
@@ -51,10 +51,10 @@ def order_words(model: Model) -> str | None:
     filed = file_order(model)
     if filed is None:
         return None
-    own = [str(name) for name in model.names][1:]
+    model_names = [str(name) for name in model.names][1:]
     return (
-        f"a list is taken in the order of the model ({', '.join(own)}), which is not the order of the file "
-        f"({', '.join(filed)})"
+        f"a list is taken in the order of the model ({', '.join(model_names)}), which is not the order of "
+        f"the file ({', '.join(filed)})"
     )
 
 

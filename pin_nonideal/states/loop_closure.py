@@ -370,12 +370,12 @@ class Search:
         n = open_directions.shape[1]
         if n == 0 or n > MANY_FREEDOMS:
             return np.ones(n), open_directions
-        here, H = self._gradient(iterate, lam), np.empty((n, n))
+        gradient, H = self._gradient(iterate, lam), np.empty((n, n))
         for k in range(n):
             x = open_directions[:, k]
             h = DIFFERENCE_STEP * self._unit_length(iterate, x)
-            there = self._gradient(self._place(self._displace(iterate, h * x)), lam)
-            H[:, k] = open_directions.T @ np.linalg.solve(iterate.half.T, (there - here) / h)
+            moved_gradient = self._gradient(self._place(self._displace(iterate, h * x)), lam)
+            H[:, k] = open_directions.T @ np.linalg.solve(iterate.half.T, (moved_gradient - gradient) / h)
         values, vectors = np.linalg.eigh(0.5 * (H + H.T))
         return values, open_directions @ vectors
 

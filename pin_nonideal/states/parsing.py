@@ -248,18 +248,18 @@ def named_coordinates(model: Model, state: State | None) -> NDArray[np.bool_] | 
     named = np.zeros(model.nv, dtype=bool)
     for name, value in table.items():
         j = find_joint(model, name, "q")
-        own = named[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]]
+        is_named = named[model.idx_vs[j] : model.idx_vs[j] + model.nvs[j]]
         if not isinstance(value, Mapping):
-            own[:] = True
+            is_named[:] = True
             continue
-        places = len(own) - 3 if model.joints[j].shortname().startswith("JointModelFreeFlyer") else 0
+        places = len(is_named) - 3 if model.joints[j].shortname().startswith("JointModelFreeFlyer") else 0
         for key in value:
             if key in ("xyz", "xy"):
-                own[: len(key)] = True
+                is_named[: len(key)] = True
             elif key == "angle":
-                own[2] = True
+                is_named[2] = True
             else:  # an orientation
-                own[places:] = True
+                is_named[places:] = True
     return named
 
 

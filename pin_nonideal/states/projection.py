@@ -17,7 +17,7 @@ from pin_nonideal.types import Array, Model
 
 from .closure_search import ClosureSearch, mass_function, metric
 from .errors import open_loops, penetration_error, refuse_deep_starts, velocity_error, widest_loop
-from .held import (
+from .held_entries import (
     NOTHING_HELD,
     Held,
     changes,
@@ -208,10 +208,10 @@ class Projection:
         if moves(self.model, q, on, held, self.unit):
             closure, nearest = self._search(runner, q, t, None, ~held)
             search = closure.iterations, nearest
-            there = polish_free(self.model, runner, closure.q, ~held, self._loops, t)
-            phi = self._residuals(runner, there, t)
-            if _largest(phi[self._loops]) <= self._closed and self._is_outside(there, phi):
-                on = there
+            polished = polish_free(self.model, runner, closure.q, ~held, self._loops, t)
+            phi = self._residuals(runner, polished, t)
+            if _largest(phi[self._loops]) <= self._closed and self._is_outside(polished, phi):
+                on = polished
             elif firm:
                 require_rounding(self.model, q, on, held, REPORTED_MOVE * self.unit, t)
         return with_entries(self.model, on, q, held & ~moved_mask(self.model, q, on, self.unit)), search
@@ -289,13 +289,13 @@ class Projection:
         if self._has_gaps:
             sure &= (after <= PENETRATION_ROUNDING) & (on == q).all(axis=1)
         for i in map(int, np.flatnonzero(~sure)):
-            own = copy(self)
+            copied = copy(self)
             if names:
-                own.program = core.with_numbers(self.program, names, values[i : i + 1])
+                copied.program = core.with_numbers(self.program, names, values[i : i + 1])
             is_valid = after[i] <= self._closed and met[i] and self._is_nearby(q[i], on[i])
-            if not (is_valid and own._stays_outside(own.program.runner(), q[i], on[i], t)):
+            if not (is_valid and copied._stays_outside(copied.program.runner(), q[i], on[i], t)):
                 try:
-                    on[i], v_on[i], _ = own.nearest(q[i], v[i], t)
+                    on[i], v_on[i], _ = copied.nearest(q[i], v[i], t)
                 except (PinNonidealError, core.CoreFailure) as failure:
                     failures[i] = failure
         return on, v_on, failures

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pin_nonideal.types import Array, Model
 
-from .held import Held
+from .held_entries import Held
 from .scales import coordinate
 
 

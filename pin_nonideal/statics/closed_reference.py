@@ -11,7 +11,7 @@ from pin_nonideal.description.scene_spec import SceneSpec
 from pin_nonideal.errors import InputError, PinNonidealError
 from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.states.errors import widest_loop
-from pin_nonideal.states.held import Held, polish_free
+from pin_nonideal.states.held_entries import Held, polish_free
 from pin_nonideal.states.reference_motion import TIME_ROUNDING, ReferenceMotion
 from pin_nonideal.states.rows import MIN_SINGULAR_VALUE, holonomic_rows, residuals_at, rows_at
 from pin_nonideal.states.scales import coordinate, slides

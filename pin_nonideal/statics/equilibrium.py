@@ -213,9 +213,9 @@ class _Search:
 
     def polished(self, q: Array, now: Balance, move: Array) -> tuple[Array, Balance]:
         """Return the state after one more step if its unbalanced force is smaller, else the given state."""
-        there = self.states.project(pin.integrate(self.model, q, move), self.rest.still, self.rest.t)[0]
-        then = self.rest.balance(there)
-        return (there, then) if np.linalg.norm(then.left) < np.linalg.norm(now.left) else (q, now)
+        moved = self.states.project(pin.integrate(self.model, q, move), self.rest.still, self.rest.t)[0]
+        then = self.rest.balance(moved)
+        return (moved, then) if np.linalg.norm(then.left) < np.linalg.norm(now.left) else (q, now)
 
     def stiffness(self, q: Array, now: Balance) -> Array:
         """Compute - free^T d(F + A^T lam)/dq free at constant lam, by central differences."""

@@ -212,8 +212,8 @@ def _with_gain(model: Model, gain: Array) -> Mask:
     """Return the mask of the degrees of freedom of joints with a nonzero gain, (nv,)."""
     mask = np.zeros(model.nv, dtype=bool)
     for place in joint_places(model):
-        own = slice(place.v_first, place.v_first + place.nv)
-        mask[own] = (gain[own] != 0.0).any()
+        dofs = slice(place.v_first, place.v_first + place.nv)
+        mask[dofs] = (gain[dofs] != 0.0).any()
     return mask
 
 

@@ -82,13 +82,13 @@ def law_record(run: RunFields, name: str) -> LawRecord:
         power = np.einsum("ij,ij->i", force, run.v)
     if run.power:  # after three columns of the scene
         power = list(run.power.values())[len(run.power) - len(run.law_names) + index]
-    own = [e for e, law in enumerate(run.element_laws) if law == index]
-    columns = own[0] if len(own) == 1 else own
-    limit = missing_array(f"{owner}.limit", REASONS["limits"]) if own else None
-    if own and run.recorded("limits"):
+    elements = [e for e, law in enumerate(run.element_laws) if law == index]
+    columns = elements[0] if len(elements) == 1 else elements
+    limit = missing_array(f"{owner}.limit", REASONS["limits"]) if elements else None
+    if elements and run.recorded("limits"):
         limit = run.limits[:, columns]
-    mode = run.modes[:, columns] if own and run.modes is not None else None
-    return LawRecord(name, force, power, limit, mode, functools.partial(_slip_velocity, run, own))
+    mode = run.modes[:, columns] if elements and run.modes is not None else None
+    return LawRecord(name, force, power, limit, mode, functools.partial(_slip_velocity, run, elements))
 
 
 def _slip_velocity(run: RunFields, elements: list[int]) -> Array | None:

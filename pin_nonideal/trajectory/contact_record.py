@@ -54,5 +54,5 @@ def _loads(run: RunFields, name: str) -> tuple[Array, list[str]]:
     if run.points is not None and (columns := run.points.of(name)):
         return run.points.loads[:, columns], [run.points.names[k] for k in columns]
     last = run.rows[name][1] - 1
-    own = [] if name in compiled_scene(run.scene).points else [name]
-    return run.lam[:, last : last + len(own)], own
+    plain_names = [] if name in compiled_scene(run.scene).points else [name]
+    return run.lam[:, last : last + len(plain_names)], plain_names

@@ -190,11 +190,11 @@ def read_from(stream: Any, source: Path) -> tuple[Table, Table | None]:
 
 def _points(arrays: Table, names: list[str], contacts: list[str]) -> PointSamples:
     """Return the samples of contact points in a file; invalid arrays raise one of `READ_ERRORS`."""
-    own = {key.removeprefix("points/"): x for key, x in arrays.items() if key.startswith("points/")}
-    own["closed"] = own["closed"].astype(bool)
-    if any(x.shape[1] not in (0, len(names)) for x in own.values()) or len(names) != len(contacts):
+    point_arrays = {key.removeprefix("points/"): x for key, x in arrays.items() if key.startswith("points/")}
+    point_arrays["closed"] = point_arrays["closed"].astype(bool)
+    if any(x.shape[1] not in (0, len(names)) for x in point_arrays.values()) or len(names) != len(contacts):
         raise ValueError("contact points do not fit together")
-    return PointSamples([str(n) for n in names], [str(n) for n in contacts], **own)
+    return PointSamples([str(n) for n in names], [str(n) for n in contacts], **point_arrays)
 
 
 def reason_of(error: Exception) -> str:

@@ -95,9 +95,9 @@ def frame_reaction(run: RunFields, name: str, index: int) -> Array:
         motions = BodyMotions(model, run.q[k], run.v[k], accelerations[k])
         for body in bodies:
             _require_balance(run, k, motions, body, who)
-        own = place.actInv(_balance(run, k, motions, part)[0])
+        wrench = place.actInv(_balance(run, k, motions, part)[0])
         R = motions.placement(joint).rotation @ place.rotation
-        wrenches[k] = np.concatenate([own.linear, own.angular, R @ own.linear, R @ own.angular])
+        wrenches[k] = np.concatenate([wrench.linear, wrench.angular, R @ wrench.linear, R @ wrench.angular])
     return wrenches
 
 
@@ -265,9 +265,9 @@ def _shape_beyond(
     Each shape of a `GeometryContact` belongs to a link. Another contact lies on the link of the joint itself,
     unless shapes on that body lie beyond the frame.
     """
-    own = [] if shapes is None else [g for g in shapes.geometryObjects if g.parentJoint == joint]
-    named = [g for g in own if g.name in names]
-    sides = {_is_beyond(model, int(g.parentFrame), index) for g in named or own}
+    body_shapes = [] if shapes is None else [g for g in shapes.geometryObjects if g.parentJoint == joint]
+    named = [g for g in body_shapes if g.name in names]
+    sides = {_is_beyond(model, int(g.parentFrame), index) for g in named or body_shapes}
     if named:
         return sides.pop() if len(sides) == 1 else None
     return None if sides - {False} else False

@@ -46,13 +46,13 @@ class LazyFields(_DictBase):
         raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}", name=name, obj=self)
 
     def _fields(self) -> Table:
-        own = _own(self)
-        if FACTORY in own:
+        lazy = _own(self)
+        if FACTORY in lazy:
             with _one_at_a_time:
-                if FACTORY in own:
-                    own.update({**own[FACTORY](), **own})
-                    del own[FACTORY]
-        return own
+                if FACTORY in lazy:
+                    lazy.update({**lazy[FACTORY](), **lazy})
+                    del lazy[FACTORY]
+        return lazy
 
     # `vars` and similar functions return all fields.
     __dict__ = property(_fields)

@@ -77,10 +77,10 @@ class PointSamples:
             return None
         table = {}
         for contact in dict.fromkeys(self.contacts):
-            own = self.of(contact)
-            names = [self.names[k] for k in own]
-            vectors = self.places[..., own, :], self.forces[..., own, :]
-            parts = self.closed[..., own], self.gaps[..., own], *vectors
+            point_names = self.of(contact)
+            names = [self.names[k] for k in point_names]
+            vectors = self.places[..., point_names, :], self.forces[..., point_names, :]
+            parts = self.closed[..., point_names], self.gaps[..., point_names], *vectors
             table[contact] = ContactPoints(contact, names, *parts)
         return table
 

@@ -29,8 +29,8 @@ def contact_forces(compiled: CompiledScene, outcome: core.Outcome, points: Point
     raw = outcome.contact_forces.reshape(nt, len(names), 3)
     places = _places(compiled, outcome, points)
     forces, torques = {}, {}
-    for name, own in Groups(names, compiled.contact_of).slices().items():
-        forces[name], torques[name] = raw[:, own.start], np.zeros((nt, 3))
+    for name, resultant in Groups(names, compiled.contact_of).slices().items():
+        forces[name], torques[name] = raw[:, resultant.start], np.zeros((nt, 3))
         if name in compiled.points and points is not None:
             columns = points.of(name)
             parts, loads = points.forces[:, columns], points.loads[:, columns]

@@ -232,13 +232,13 @@ def viewer_library() -> tuple[bytes, str]:
     bundle = viewer / "dist" / "main.min.js"
     try:
         library = bundle.read_bytes()
-        own = (viewer / "LICENSE").read_text(encoding="utf-8").strip()
+        license_text = (viewer / "LICENSE").read_text(encoding="utf-8").strip()
         packages = json.loads(Path(f"{bundle}.THIRD_PARTY_LICENSES.json").read_text(encoding="utf-8"))
     except OSError as error:
         raise OutputError(
             f'a replay needs the viewer "{error.filename}", which cannot be read: pip install meshcat==0.3.2'
         ) from error
-    texts = [f"meshcat, the viewer of this page\n\n{own}"]
+    texts = [f"meshcat, the viewer of this page\n\n{license_text}"]
     for package in packages:
         heading = f"{package['name']} {package['version']} ({package['license']}), inside meshcat"
         texts.append(f"{heading}\n\n{(package.get('licenseText') or package.get('author') or '').strip()}")

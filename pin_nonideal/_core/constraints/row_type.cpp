@@ -56,16 +56,16 @@ DisplayKind shown(const Kind& kind) {
 }
 
 std::vector<const TimeFunction*> time_functions(const Kind& kind) {
-    std::vector<const TimeFunction*> found;
+    std::vector<const TimeFunction*> functions;
     std::visit([&](const auto& k) {
         std::apply([&](const auto&... datum) {
             const auto take = [&](const auto& value) {
-                if constexpr (std::is_same_v<std::decay_t<decltype(value)>, TimeFunction>) found.push_back(&value);
+                if constexpr (std::is_same_v<std::decay_t<decltype(value)>, TimeFunction>) functions.push_back(&value);
             };
             (take(k.*datum.member), ...);
         }, std::decay_t<decltype(k)>::data());
     }, kind);
-    return found;
+    return functions;
 }
 
 std::pair<const Frame*, const Frame*> frames(const Kind& kind) {

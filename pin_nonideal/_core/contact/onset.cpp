@@ -62,21 +62,21 @@ bool with_problem(const Program& p, Workspace& w, double t, const VecX& q, const
         else if (p.frictions[e].dim > 1) return false;
         else modes[e] = slip_velocity(w.now, p.frictions[e])[0] > 0.0 ? slip_plus : slip_minus;
     }
-    bool found = false;
+    bool has_motion = false;
     attempt([&] {  // the caller's own evaluation reports failures of other rows
         release_contacts(p, w, t, q, v, query.rest, modes);
         if (rests_at_once(p, w, v, query, gaps, others)) {
             rest(others);
-            found = true;
+            has_motion = true;
         } else {
             RestingProblem problem(p, w, v, gaps, others, query, before);
-            found = act(problem);
+            has_motion = act(problem);
         }
     });
     set_closed(p, w, before.closed);
     set_modes(p, w, before.mode);
     w.state = before;
-    return found;
+    return has_motion;
 }
 
 }  // namespace
@@ -94,13 +94,13 @@ std::optional<OnsetMotion> onset_motion(const Program& p, Workspace& w, double t
         for (int e : others) out.modes[e] = sticking;
         out.shared = true;
     };
-    const bool found = with_problem(p, w, t, q, v, query, rest, [&](RestingProblem& problem) {
+    const bool has_motion = with_problem(p, w, t, q, v, query, rest, [&](RestingProblem& problem) {
         if (!problem.solve(out.shared)) return false;
         problem.read(out);
         out.several = problem.several;
         return true;
     });
-    if (!found) return std::nullopt;
+    if (!has_motion) return std::nullopt;
     return out;
 }
 

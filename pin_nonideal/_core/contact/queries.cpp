@@ -114,16 +114,16 @@ int pulling_contact(const Program& p, Workspace& w) {
     if (r.loads_are_feasible && w.now.rows.redundant) return -1;
     VecX lam = r.lam;
     if (w.now.rows.redundant) share_multipliers(p.blocks, w.now.B, p.described, w.now.rows, w.now.lam, lam);
-    int found = -1;
+    int pulling = -1;
     double most = 0.0;
     for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
         if (!w.state.closed[i] || is_bare(p, i)) continue;
         const double pull = -lam[p.blocks[p.gaps[i].block].row] / load_rounding(p, w, i);
         if (!(pull > 1.0) || pull <= most) continue;
         most = pull;
-        found = i;
+        pulling = i;
     }
-    return found;
+    return pulling;
 }
 
 }  // namespace pn

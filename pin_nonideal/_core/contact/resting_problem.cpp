@@ -148,12 +148,12 @@ bool RestingProblem::solve(bool& shared) {
     if (!solve_cones(false, shared)) return false;
     if (!shared || dragging.isZero(0.0)) return true;
     const MatX coupled = W;
-    const VecX found = f;
+    const VecX shared_forces = f;
     W = plain;
     if (alternate(free)) return true;
     W = coupled;
     w0 = free;
-    f = found;
+    f = shared_forces;
     return true;
 }
 

@@ -100,9 +100,9 @@ void solve_acceleration(const Program& p, Workspace& w, const VecX& force, const
 
 void solve_motion(const Program& p, Workspace& w, bool with_laws, const VecX& b, VecX& a, VecX& lam) {
     const bool deep = !p.mechanism.deep_dofs.empty();
-    const VecX& given = deep ? w.now.joint_F : w.now.F;
-    if (with_laws) w.scratch.trial = given + w.now.C;
-    solve_acceleration(p, w, with_laws ? w.scratch.trial : given, b, a, lam, deep ? &w.now.wrench : nullptr);
+    const VecX& force = deep ? w.now.joint_F : w.now.F;
+    if (with_laws) w.scratch.trial = force + w.now.C;
+    solve_acceleration(p, w, with_laws ? w.scratch.trial : force, b, a, lam, deep ? &w.now.wrench : nullptr);
 }
 
 void solve_motion(const Program& p, Workspace& w, bool with_laws) {

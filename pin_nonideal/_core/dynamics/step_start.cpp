@@ -45,7 +45,7 @@ static double unseen(const Program& p, Workspace& w, const VecX& v) {
 
 // Find the block with the largest residual of its dependent rows. Return -1 if all dependent rows are met.
 static int contradicting_block(const Program& p, Workspace& w, const VecX& v, double& worst) {
-    int found = -1;
+    int worst_block = -1;
     double excess = 1.0;
     std::optional<double> lacking;  // for a row of unit length
     const double reach = w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm() +
@@ -71,11 +71,11 @@ static int contradicting_block(const Program& p, Workspace& w, const VecX& v, do
             if (std::abs(sum) > allowed * excess) {
                 excess = std::abs(sum) / allowed;
                 worst = sum;
-                found = i;
+                worst_block = i;
             }
         }
     }
-    return found;
+    return worst_block;
 }
 
 static void choose_rows_anew(const Program& p, Workspace& w, int max_rank = INT_MAX) {

@@ -88,7 +88,7 @@ bool pulls(const Unknowns& u, const VecX& y) {
 void decide_over_zero_load_sets(Unknowns& u, const VecX& start, VecX& y, const Failure& failure) {
     const std::vector<std::vector<char>> sets = zero_load_sets(u.p, u.w);
     if (sets.empty()) throw Failure(Failure::Kind::not_converged, u.t, u.elements());
-    std::vector<VecX> found;
+    std::vector<VecX> motions;
     ReactionEquation equation;
     bool complete = true;
     for (const std::vector<char>& has_zero_load : sets) {
@@ -102,12 +102,12 @@ void decide_over_zero_load_sets(Unknowns& u, const VecX& start, VecX& y, const F
         complete &= roots.complete && !roots.at_edge;
         for (const VecX& root : roots.y)
             if (u.is_motion(root) && determinant_at(equation, root) > uniqueness_parameters.min_determinant)
-                found.push_back(root);
+                motions.push_back(root);
     }
-    if (found.empty() && !complete) throw Failure(Failure::Kind::not_converged, u.t, u.elements());
-    if (found.empty()) throw failure;
+    if (motions.empty() && !complete) throw Failure(Failure::Kind::not_converged, u.t, u.elements());
+    if (motions.empty()) throw failure;
     const auto distance = [&](const VecX& root) { return (root - start).norm(); };
-    y = *std::min_element(found.begin(), found.end(),
+    y = *std::min_element(motions.begin(), motions.end(),
                           [&](const VecX& one, const VecX& other) { return distance(one) < distance(other); });
     u.w.state.unique = Uniqueness::not_shown;
 }

@@ -40,8 +40,8 @@ void Unknowns::image(const VecX& y, VecX& g) {
     ++w.counters.iterations;
     // Do not evaluate laws, above all user laws, for a diverged stage. Diverged unknowns give no motion.
     if (!std::isfinite(w.now.a.squaredNorm())) {
-        const bool given = std::isfinite(w.now.F.squaredNorm() + w.now.base_C.squaredNorm());
-        throw Failure(given ? Failure::Kind::not_converged : Failure::Kind::not_finite, t, elements());
+        const bool has_finite_forces = std::isfinite(w.now.F.squaredNorm() + w.now.base_C.squaredNorm());
+        throw Failure(has_finite_forces ? Failure::Kind::not_converged : Failure::Kind::not_finite, t, elements());
     }
     const int nv = p.mechanism.nv;
     int k = 0;

@@ -108,9 +108,9 @@ VecX nonnegative_least_squares(const MatX& A, const VecX& b) {
             for (size_t k = 0; k < used.size(); ++k)
                 if (s[k] <= 0.0) part = std::min(part, x[used[k]] > 0.0 ? x[used[k]] / (x[used[k]] - s[k]) : 0.0);
             for (size_t k = 0; k < used.size(); ++k) x[used[k]] += part * (s[k] - x[used[k]]);
-            const double least = nnls_parameters.rounding * largest(x);
+            const double min_used = nnls_parameters.rounding * largest(x);
             for (size_t k = used.size(); k-- > 0;) {
-                if (x[used[k]] > least) continue;
+                if (x[used[k]] > min_used) continue;
                 x[used[k]] = 0.0;
                 is_used[used[k]] = 0;
                 used.erase(used.begin() + static_cast<std::ptrdiff_t>(k));
@@ -151,26 +151,26 @@ static std::vector<char> binding(const MatX& Z, const VecX& N) {
     MatX both(Z.cols() + 1, Z.rows());
     both << Z.transpose(), -N.transpose() / std::max(largest(N), min_scale);
     const VecX u = nonnegative_least_squares(both, VecX::Unit(both.rows(), both.rows() - 1));
-    std::vector<char> found(N.size());
-    for (int i = 0; i < N.size(); ++i) found[i] = u[i] > 0.0;
-    return found;
+    std::vector<char> is_binding(N.size());
+    for (int i = 0; i < N.size(); ++i) is_binding[i] = u[i] > 0.0;
+    return is_binding;
 }
 
 NonnegativeSum shortest_nonnegative(const MatX& Z, const VecX& N) {
-    NonnegativeSum found{VecX::Zero(Z.cols()), std::vector<char>(N.size(), 0), true};
-    const auto violated = [&](double allowed) { return (N + Z * found.z).minCoeff() < -allowed; };
-    const auto noise = [&] { return nnls_parameters.met_rounding * (largest(N) + largest(found.z)); };
-    if (N.size() == 0 || !violated(0.0)) return found;
-    found.held = binding(Z, N);
-    found.z = shortest_with_zeros(Z, N, found.held);
-    found.is_feasible = !violated(noise());
-    if (found.is_feasible) return found;
+    NonnegativeSum sum{VecX::Zero(Z.cols()), std::vector<char>(N.size(), 0), true};
+    const auto violated = [&](double allowed) { return (N + Z * sum.z).minCoeff() < -allowed; };
+    const auto noise = [&] { return nnls_parameters.met_rounding * (largest(N) + largest(sum.z)); };
+    if (N.size() == 0 || !violated(0.0)) return sum;
+    sum.held = binding(Z, N);
+    sum.z = shortest_with_zeros(Z, N, sum.held);
+    sum.is_feasible = !violated(noise());
+    if (sum.is_feasible) return sum;
     const VecX violation = min_violation(Z, N);
-    found.held = binding(Z, N + violation + VecX::Constant(N.size(), nnls_parameters.binding_slack * largest(N)));
+    sum.held = binding(Z, N + violation + VecX::Constant(N.size(), nnls_parameters.binding_slack * largest(N)));
     for (int i = 0; i < N.size(); ++i)
-        if (violation[i] > 0.0) found.held[i] = 1;
-    found.z = shortest_with_zeros(Z, N, found.held);
-    return found;
+        if (violation[i] > 0.0) sum.held[i] = 1;
+    sum.z = shortest_with_zeros(Z, N, sum.held);
+    return sum;
 }
 
 MaxMin max_min(const MatX& Z, const VecX& N) {

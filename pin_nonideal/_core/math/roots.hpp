@@ -27,16 +27,16 @@ double root_between(double low, double margin_low, double high, double margin_hi
     for (int it = 0; it < root_search_parameters.max_root_passes && high - low > root_search_parameters.root_width; ++it) {
         double mid = (low * margin_high - high * margin_low) / (margin_high - margin_low);
         if (!(mid > low && mid < high)) mid = 0.5 * (low + high);
-        const double here = margin(mid);
-        if (std::abs(here) < root_search_parameters.root_margin) return mid;
-        if (here > 0.0) {
+        const double margin_mid = margin(mid);
+        if (std::abs(margin_mid) < root_search_parameters.root_margin) return mid;
+        if (margin_mid > 0.0) {
             low = mid;
-            margin_low = here;
+            margin_low = margin_mid;
             if (side == 1) margin_high *= 0.5;
             side = 1;
         } else {
             high = mid;
-            margin_high = here;
+            margin_high = margin_mid;
             if (side == -1) margin_low *= 0.5;
             side = -1;
         }
@@ -70,10 +70,10 @@ inline double min_inside(double u0, double a0, double u1, double a1) {
     const double b = 3.0 * (u1 - u0) - 2.0 * a0 - a1, c = a0 + a1 - 2.0 * (u1 - u0);
     const double root = std::sqrt(b * b - 3.0 * a0 * c);  // NaN: no extremum
     const double q = -(b + std::copysign(root, b));
-    double least = HUGE_VAL;
+    double lowest = HUGE_VAL;
     for (double x : {q / (3.0 * c), a0 / q})  // maximum and minimum in either order
-        if (x > 0.0 && x < 1.0) least = std::min(least, u0 + x * (a0 + x * (b + x * c)));
-    return least;
+        if (x > 0.0 && x < 1.0) lowest = std::min(lowest, u0 + x * (a0 + x * (b + x * c)));
+    return lowest;
 }
 
 // Return the height of the parabola through three points above the highest of them, or 0 if none lies between them.

@@ -71,13 +71,13 @@ Outcome samples_inside(const Program& p, const Options& options, const Array& t,
         inside.directions.emplace_back(map(directions).row(k));
         if (torque.shape(0) > 0) inside.torque.emplace_back(map(torque).row(k));
         std::vector<Mode> held(elements);
-        std::vector<char> found(elements);
+        std::vector<char> is_sought(elements);
         for (size_t e = 0; e < elements; ++e) {
             held[e] = static_cast<Mode>(static_cast<int>(map(modes)(k, e)));
-            found[e] = map(sought)(k, e) != 0.0;
+            is_sought[e] = map(sought)(k, e) != 0.0;
         }
         inside.modes.push_back(std::move(held));
-        inside.sought.push_back(std::move(found));
+        inside.sought.push_back(std::move(is_sought));
     }
     Workspace w(p);
     w.continues = options.continues;

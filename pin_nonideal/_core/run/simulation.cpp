@@ -265,7 +265,7 @@ bool Simulation::control_error(const Proposal& proposal, std::optional<double> e
 void Simulation::find_event() {
     event.reset();
     if (system.has_events())
-        if (const auto found = locator.locate()) event = *found;
+        if (const auto located = locator.locate()) event = *located;
     if (!value_events.empty() && value_events.locate(event.has_value()))
         event = FoundEvent{FoundEvent::Kind::user, value_events.found().front(), stepper.t0 + stepper.h};
     // A motion that violates a law ends here, and modes are selected anew.

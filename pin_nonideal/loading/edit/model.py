@@ -248,12 +248,12 @@ def reduced_model(
         ]
         if parent_frames:
             fixed.parentFrame = parent_frames[0]
-        own = model.inertias[j].toDynamicParameters()
+        parameters = model.inertias[j].toDynamicParameters()
         for frame in model.frames:
             if frame.parentJoint == j and frame.inertia.mass > 0.0:
-                own = own - frame.placement.act(frame.inertia).toDynamicParameters()
-        massive = own[0] > ROUNDING * model.inertias[j].mass
-        fixed.inertia = pin.Inertia.FromDynamicParameters(own) if massive else pin.Inertia.Zero()
+                parameters = parameters - frame.placement.act(frame.inertia).toDynamicParameters()
+        massive = parameters[0] > ROUNDING * model.inertias[j].mass
+        fixed.inertia = pin.Inertia.FromDynamicParameters(parameters) if massive else pin.Inertia.Zero()
     return new, list(copies)
 
 

@@ -91,15 +91,15 @@ class OnSite:
     def rows(self, q: Array) -> tuple[float, Array]:
         """Return length and moment arms, (nv,)."""
         self.motion.update(q)
-        here = self.motion.place(*self.site)
-        frame = here if self.reference is None else self.motion.place(*self.reference)
+        placement = self.motion.place(*self.site)
+        frame = placement if self.reference is None else self.motion.place(*self.reference)
         force, moment = frame.rotation @ self.gear[:3], frame.rotation @ self.gear[3:]
         forces = [(*self.site, force, moment)]
         if self.reference is None:
             return 0.0, self.motion.generalized(q, forces)
         row = self.motion.generalized(q, [*forces, (*self.reference, -force, -moment)])
         row[self.shared] = 0.0
-        between = frame.actInv(here)
+        between = frame.actInv(placement)
         length = between.translation @ self.gear[:3] + pin.log3(between.rotation) @ self.gear[3:]
         return float(length), row
 

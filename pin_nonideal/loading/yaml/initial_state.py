@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pin_nonideal.errors import InputError, LoadingError, UnknownNameError, nearest, short_repr
 from pin_nonideal.loading.urdf.reader import RobotFile
-from pin_nonideal.states.held import Held
+from pin_nonideal.states.held_entries import Held
 from pin_nonideal.states.joint_order import describe_order, order_words
 from pin_nonideal.states.parsing import (
     find_joint,

@@ -200,9 +200,9 @@ def _extreme_points(points: Array) -> Array:
     for first in range(0, len(cloud), CLOUD_PART):
         reach = ways @ cloud[first : first + CLOUD_PART].T
         for side, best in enumerate((reach.argmax(axis=1), reach.argmin(axis=1))):
-            own = np.take_along_axis(reach, best[:, None], axis=1)[:, 0] * (1.0 - 2.0 * side)
-            farther = own > far[side]
-            far[side, farther], chosen[side, farther] = own[farther], first + best[farther]
+            nearest = np.take_along_axis(reach, best[:, None], axis=1)[:, 0] * (1.0 - 2.0 * side)
+            farther = nearest > far[side]
+            far[side, farther], chosen[side, farther] = nearest[farther], first + best[farther]
     return np.asarray(cloud[np.unique(chosen)])
 
 
@@ -239,17 +239,17 @@ def pattern_spacings(motion: Motion, visuals: list[Visual], axes: dict[int, Arra
     """
     spacings: dict[int, float] = {}
     for joint, axis in axes.items():
-        own = [k for k, visual in enumerate(visuals) if visual.joint == joint]
-        if len(own) < 4:
+        body_visuals = [k for k, visual in enumerate(visuals) if visual.joint == joint]
+        if len(body_visuals) < 4:
             continue
-        along = np.array([visuals[k].placement.translation @ axis for k in own])
+        along = np.array([visuals[k].placement.translation @ axis for k in body_visuals])
         if _diagonal(motion.poses[:, joint, :3]) <= np.ptp(along):
             continue
         same: dict[Any, list[float]] = {}
-        for k, place in zip(own, along, strict=True):
+        for k, place in zip(body_visuals, along, strict=True):
             shape = visuals[k].shape
             same.setdefault((shape.kind, shape.size, len(shape.vertices)), []).append(float(place))
         steps = [np.diff(sorted(places)) for places in same.values() if len(places) >= 3]
         if steps and all(np.ptp(step) < 1e-3 * step.mean() for step in steps):
-            spacings |= dict.fromkeys(own, max(float(step.mean()) for step in steps))
+            spacings |= dict.fromkeys(body_visuals, max(float(step.mean()) for step in steps))
     return spacings

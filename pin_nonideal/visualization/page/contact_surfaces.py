@@ -187,7 +187,7 @@ def _stop(model: pin.Model, motion: Motion, name: str, joint: int, at: float) ->
     across = (
         across / length if np.linalg.norm(across) > 0.0 else np.array(axis_triad(unit_axis("axis", way))[0])
     )
-    there = pin.AngleAxis(at, way).toRotationMatrix() @ across
-    turn = pin.Quaternion.FromTwoVectors(z, there).matrix()
+    normal_of_angle = pin.AngleAxis(at, way).toRotationMatrix() @ across
+    turn = pin.Quaternion.FromTwoVectors(z, normal_of_angle).matrix()
     bar = Shape("capsule", (0.5 * thick, 0.5 * length))
-    return Visual(name, parent, base * pin.SE3(turn, 0.55 * length * there), bar, STOP)
+    return Visual(name, parent, base * pin.SE3(turn, 0.55 * length * normal_of_angle), bar, STOP)

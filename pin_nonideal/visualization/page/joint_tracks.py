@@ -153,13 +153,13 @@ class Tracks:
         gap = np.abs(one - other)
         total = np.zeros((len(gap), len(self.joints)))
         for number, track in self.moving():
-            own = gap[:, track.columns]
+            joint_gap = gap[:, track.columns]
             if track.axis is None:
-                moved = np.linalg.norm(own[:, :3], axis=1) + 2.0 * reach[number] * np.linalg.norm(
-                    own[:, 3:], axis=1
+                moved = np.linalg.norm(joint_gap[:, :3], axis=1) + 2.0 * reach[number] * np.linalg.norm(
+                    joint_gap[:, 3:], axis=1
                 )
             else:
-                moved = own[:, 0] * (reach[number] if track.turning else 1.0)
+                moved = joint_gap[:, 0] * (reach[number] if track.turning else 1.0)
             total[:, number] = total[:, track.parent] + moved
         return np.asarray(total.max(axis=1))
 

@@ -150,5 +150,5 @@ def sides_of(compiled: CompiledScene, item: Any) -> tuple[Side, Side]:
     first = side_of(model, item.frame1)
     if item.frame2 is not None:
         return first, side_of(model, item.frame2)
-    here = joint_placements(model, compiled.q0)[first.joint].act(first.point)
-    return first, Side(0, pin.SE3(np.eye(3), here))
+    placement = joint_placements(model, compiled.q0)[first.joint].act(first.point)
+    return first, Side(0, pin.SE3(np.eye(3), placement))

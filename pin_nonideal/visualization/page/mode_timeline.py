@@ -109,5 +109,5 @@ def gaps_of(run: Trajectory, names: Sequence[str] | None = None) -> tuple[Array,
     count = int(np.clip(MAX_GAP_VALUES / max(1, len(points)), MIN_GAP_SAMPLES, MAX_GAP_SAMPLES))
     chosen = np.unique(np.linspace(0, len(t) - 1, min(len(t), count)).astype(int))
     gaps = gaps_of_points(compiled, run.q[chosen], t[chosen], points)
-    least = Groups(points, compiled.contact_of).least(gaps, axis=1)
-    return t[chosen], dict(zip(names, least.T, strict=True))
+    smallest_gaps = Groups(points, compiled.contact_of).least(gaps, axis=1)
+    return t[chosen], dict(zip(names, smallest_gaps.T, strict=True))

@@ -45,9 +45,9 @@ def stored_relations(
     each = min(MAX_CURVE_POINTS, MAX_POINTS // max(len(requested) + len(more), 1))
     stored = []
     for name in [*requested, *more]:
-        own = finer if name.split(" ", 1)[0] == "phase" else run
-        for relation in relations_of(own, name):
-            stored.append(_store(payload, own, name, relation, each) | {"shown": name in requested})
+        source = finer if name.split(" ", 1)[0] == "phase" else run
+        for relation in relations_of(source, name):
+            stored.append(_store(payload, source, name, relation, each) | {"shown": name in requested})
     return stored
 
 

@@ -57,17 +57,17 @@ def link_bars(model: pin.Model, ends: list[tuple[int, Array]], size: float) -> l
 
 def _solid(joint: int, ends: list[tuple[int, Array]]) -> Shape | None:
     """Return the convex hull of the given points of a body, or None if they span no solid."""
-    own = np.array([point for other, point in ends if other == joint]).reshape(-1, 3)
-    if len(own) < 4:
+    joint_ends = np.array([point for other, point in ends if other == joint]).reshape(-1, 3)
+    if len(joint_ends) < 4:
         return None
     from scipy.spatial import ConvexHull, QhullError  # imported for solids only, because the import is slow
 
     try:
-        hull = ConvexHull(own)
+        hull = ConvexHull(joint_ends)
     except QhullError:  # coplanar points
         return None
     number = {old: new for new, old in enumerate(hull.vertices)}
-    corners = own[hull.vertices]
+    corners = joint_ends[hull.vertices]
     triangles = np.array([[number[corner] for corner in face] for face in hull.simplices])
     a, b, c = corners[triangles].transpose(1, 0, 2)
     inward = np.sum(np.cross(b - a, c - a) * (a - corners.mean(axis=0)), axis=1) < 0.0

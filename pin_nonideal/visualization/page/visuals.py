@@ -119,26 +119,26 @@ def shape_of(geometry: GeometryObject, mesh_path: str | None = None) -> tuple[Sh
         mesh_path: file of a mesh, for the colors of its parts.
     """
     kind = type(geometry).__name__
-    here = pin.SE3.Identity()
+    placement = pin.SE3.Identity()
     if kind == "Box":
-        return Shape("box", _tuple(2.0 * geometry.halfSide)), here
+        return Shape("box", _tuple(2.0 * geometry.halfSide)), placement
     if kind == "Sphere":
-        return Shape("ellipsoid", (float(geometry.radius),) * 3), here
+        return Shape("ellipsoid", (float(geometry.radius),) * 3), placement
     if kind == "Ellipsoid":
-        return Shape("ellipsoid", _tuple(geometry.radii)), here
+        return Shape("ellipsoid", _tuple(geometry.radii)), placement
     if kind in ("Cylinder", "Capsule", "Cone"):
-        return Shape(kind.lower(), (float(geometry.radius), 2.0 * float(geometry.halfLength))), here
+        return Shape(kind.lower(), (float(geometry.radius), 2.0 * float(geometry.halfLength))), placement
     if kind in ("Plane", "Halfspace"):
         turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), geometry.n).matrix()
         return Shape("plane"), pin.SE3(turn, geometry.n * geometry.d)
     if kind == "TriangleP":
-        return _mesh(np.array([geometry.a, geometry.b, geometry.c]), np.array([[0, 1, 2]])), here
+        return _mesh(np.array([geometry.a, geometry.b, geometry.c]), np.array([[0, 1, 2]])), placement
     if hasattr(geometry, "num_tris") and geometry.num_tris > 0:
         corners = [(t[0], t[1], t[2]) for t in map(geometry.tri_indices, range(geometry.num_tris))]
-        return _mesh(geometry.vertices(), np.array(corners), mesh_path), here
+        return _mesh(geometry.vertices(), np.array(corners), mesh_path), placement
     if hasattr(geometry, "num_polygons") and geometry.num_polygons > 0:
         corners = [(t[0], t[1], t[2]) for t in map(geometry.polygons, range(geometry.num_polygons))]
-        return _mesh(geometry.points(), np.array(corners)), here
+        return _mesh(geometry.points(), np.array(corners)), placement
     geometry.computeLocalAABB()
     box = geometry.aabb_local
     return Shape("box", _tuple(box.max_ - box.min_)), pin.SE3(np.eye(3), (box.max_ + box.min_) / 2.0)

@@ -131,13 +131,13 @@ void ConeInteriorPoint::direction(const ConeProblem& p, double target, double ke
 }
 
 double ConeInteriorPoint::length(const ConeProblem& p) const {
-    double least = HUGE_VAL;
+    double longest = HUGE_VAL;
     const Eigen::Map<const VecX> step = step_.vector(p.n);
     for (int e = 0; e < p.size(); ++e) {
         if (!in_path(p.elements[e]) || (p.elements[e].is(ConeKind::box) && tail_rows(p.elements[e]) == 0)) continue;
-        least = std::min({least, room(states_[e].z, force(p, e, step, 0.0)), room(states_[e].y, states_[e].dy)});
+        longest = std::min({longest, room(states_[e].z, force(p, e, step, 0.0)), room(states_[e].y, states_[e].dy)});
     }
-    return least;
+    return longest;
 }
 
 double ConeInteriorPoint::gap(const ConeProblem& p) const {

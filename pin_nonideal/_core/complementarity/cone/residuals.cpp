@@ -22,9 +22,9 @@ bool add_energy(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const VecX>& w
 
 void add_residuals(const ConeElement& e, const double* f, const double* w, double force, double speed,
                    ConeResiduals& out) {
-    constexpr double least = std::numeric_limits<double>::min();
-    force = std::max(force, least);
-    speed = std::max(speed, least);
+    constexpr double min_size = std::numeric_limits<double>::min();
+    force = std::max(force, min_size);
+    speed = std::max(speed, min_size);
     const int head = e.is(ConeKind::contact);
     double limit = e.bound, ft = 0.0, wt = 0.0, product = 0.0;
     if (head) {

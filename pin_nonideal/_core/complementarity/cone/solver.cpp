@@ -15,14 +15,14 @@ ConeStatus ConeComplementarity::solve(const Eigen::Ref<const MatX>& W, const Eig
     auto x = even_.vector(n);
     if (warm) x = f.cwiseQuotient(problem_.scale()) / problem_.force_unit();
     else x.setZero();
-    bool found = search(x);
-    if (!found && brief_) return ConeStatus::failed;
-    const ConeStatus status = found ? ConeStatus::solved : find_certificate(problem_, certificate_);
-    if (status == ConeStatus::failed) found = random_restarts(x);
-    if (found && uniform_compliance_) compliance_continuation(x);
+    bool is_solved = search(x);
+    if (!is_solved && brief_) return ConeStatus::failed;
+    const ConeStatus status = is_solved ? ConeStatus::solved : find_certificate(problem_, certificate_);
+    if (status == ConeStatus::failed) is_solved = random_restarts(x);
+    if (is_solved && uniform_compliance_) compliance_continuation(x);
     unique_shares_ = newton_.regular();
     const bool as_it_was = warm && may_keep_shares && newton_.steps() == steps;
-    if (found && !unique_shares_ && !as_it_was) {
+    if (is_solved && !unique_shares_ && !as_it_was) {
         auto even = f_.vector(n);
         even = x;
         const bool shorter = minimum_norm_.minimize_norm(problem_, even);
@@ -30,9 +30,9 @@ ConeStatus ConeComplementarity::solve(const Eigen::Ref<const MatX>& W, const Eig
         if (shorter && newton_.solve(problem_, even, parameters.few_steps) <= allowed)
             x = even;
     }
-    if (found) tidy(x);
+    if (is_solved) tidy(x);
     f = problem_.force_unit() * problem_.scale().cwiseProduct(x);
-    if (found) return ConeStatus::solved;
+    if (is_solved) return ConeStatus::solved;
     if (certificate_.size() > 0) certificate_ = problem_.scale().cwiseProduct(certificate_).eval();
     return status;
 }

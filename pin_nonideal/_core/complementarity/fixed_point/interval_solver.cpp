@@ -77,12 +77,12 @@ void Search::divide() {
     for (int i = 0; i < n_; ++i) following_.push_back(i);
     while (!following_.empty() && spectral_bound(among(L_, following_, following_)) > parameters.max_followed_growth) {
         size_t best = 0;
-        double least = HUGE_VAL;
+        double min_bound = HUGE_VAL;
         for (size_t i = 0; i < following_.size(); ++i) {
             std::vector<int> rest = following_;
             rest.erase(rest.begin() + i);
             const double left = rest.empty() ? 0.0 : spectral_bound(among(L_, rest, rest));
-            if (left < least) { least = left; best = i; }
+            if (left < min_bound) { min_bound = left; best = i; }
         }
         halved_.push_back(following_[best]);
         following_.erase(following_.begin() + best);

@@ -210,7 +210,7 @@ double RestEquation::determinant_far_away() const {
     respond(VecX::Zero(n), alpha, limits);
     MatX dalpha, dlimits, dmiddle;
     const int count = static_cast<int>(elements.size());
-    double least = HUGE_VAL;
+    double min_determinant = HUGE_VAL;
     for (int signs = 0; signs < 1 << std::min(count, parameters.max_signed_elements); ++signs) {
         VecX x = VecX::Zero(n);
         for (int i = 0; i < count; ++i) {
@@ -228,9 +228,9 @@ double RestEquation::determinant_far_away() const {
             for (int j = 0; j < count; ++j)
                 slope(i, j) =
                     dlimits.row(i).segment(elements[j].row, elements[j].dim).dot(part(x, elements[j]).normalized());
-        least = std::min(least, determinant(MatX::Identity(count, count) - slope));
+        min_determinant = std::min(min_determinant, determinant(MatX::Identity(count, count) - slope));
     }
-    return least;
+    return min_determinant;
 }
 
 double contraction_bound(const RestEquation& equation) {

@@ -206,10 +206,10 @@ bool solve_rest(const RestEquation& equation, VecX& x) {
     if (equation.n == 0) return true;
     const VecX guess = x;
     if (Alternation(equation).iterate(x)) return true;
-    bool found = refine_rest(equation, x);
-    if (!found) found = refine_rest(equation, x = guess);
-    if (!found) found = follow_path(equation, x = guess);
-    if (!found) return false;
+    bool is_solved = refine_rest(equation, x);
+    if (!is_solved) is_solved = refine_rest(equation, x = guess);
+    if (!is_solved) is_solved = follow_path(equation, x = guess);
+    if (!is_solved) return false;
     const VecX at_limits = Alternation(equation).next(x);  // slipping forces are exactly at their limits
     if (equation.error(at_limits) <= load_dependent_parameters.tolerance + equation.error(x)) x = at_limits;
     return true;

@@ -16,13 +16,13 @@ struct RollingRows : ConstraintKind {
     Frame frame1, frame2;
     double radius;
     bool sphere;
-    Vec3 axle;  // unit vector along the axis of the disk, in frame 1; unused for a sphere
+    Vec3 axis;  // unit vector along the axis of the disk, in frame 1; unused for a sphere
     Vec3 tangent1, tangent2, normal;  // in frame 2
 
     static constexpr auto data() {
         return std::tuple(Field{"frame", &RollingRows::frame1}, Field{"plane", &RollingRows::frame2},
                           Field{"radius", &RollingRows::radius}, Field{"sphere", &RollingRows::sphere},
-                          Field{"axle", &RollingRows::axle}, Field{"tangent1", &RollingRows::tangent1},
+                          Field{"axis", &RollingRows::axis}, Field{"tangent1", &RollingRows::tangent1},
                           Field{"tangent2", &RollingRows::tangent2}, Field{"normal", &RollingRows::normal});
     }
     int size() const { return 3; }
@@ -59,7 +59,7 @@ private:
             const Vec n = s.b.R * c.normal, dn = s.b.omega().cross(n);
             Vec down = -n, ddown = -dn;  // unit vector from the center to the contact, and its rate
             if (!c.sphere) {
-                const Vec e = s.a.R * c.axle, de = s.a.omega().cross(e);
+                const Vec e = s.a.R * c.axis, de = s.a.omega().cross(e);
                 const auto ne = n.dot(e);
                 const Vec w = n - ne * e, dw = dn - (dn.dot(e) + n.dot(de)) * e - ne * de;
                 support = w.norm();

@@ -78,8 +78,8 @@ void Breaks::enter(double time) {
 
 double Breaks::next(double after) const {
     const auto next_break = std::upper_bound(p.breaks.begin(), p.breaks.end(), after);
-    const double found = progress_.detected_break > after ? progress_.detected_break : HUGE_VAL;
-    return std::min(found, next_break == p.breaks.end() ? HUGE_VAL : *next_break);
+    const double detected = progress_.detected_break > after ? progress_.detected_break : HUGE_VAL;
+    return std::min(detected, next_break == p.breaks.end() ? HUGE_VAL : *next_break);
 }
 
 std::vector<double> Breaks::rates(double t) const {
@@ -157,23 +157,23 @@ void Breaks::find_in_step(double end, bool adaptive) {
         if (!is_users(f)) continue;
         const double begin = w.now.row_time(progress_.t);
         if (!(begin < end)) return;
-        std::optional<Probe> found;
+        std::optional<Probe> jump;
         Probe before = probe(f, begin);
-        for (int k = 1; k <= intervals && !found; ++k) {
+        for (int k = 1; k <= intervals && !jump; ++k) {
             const Probe a = before, b = probe(f, begin + (end - begin) * k / intervals);
             if (!(a.t < b.t)) break;
             if (rate_defect(a, b) > parameters.unexplained * rate_size(a, b))
-                found = find_jump(f, before, b, rate_defect);
-            if (found) break;
+                jump = find_jump(f, before, b, rate_defect);
+            if (jump) break;
             before = a;
             if (acceleration_change(a, b) > parameters.uneven * std::max(std::abs(a.f[2]), std::abs(b.f[2])))
-                found = find_jump(f, before, b, acceleration_change);
-            if (!found) before = b;
+                jump = find_jump(f, before, b, acceleration_change);
+            if (!jump) before = b;
         }
-        if (!found) continue;
-        if (std::abs(found->f[0] - before.f[0]) > parameters.value_jump)
-            throw Failure(Failure::Kind::closure, found->t, {motion.block}, std::abs(found->f[0] - before.f[0]));
-        if (found->t < progress_.detected_break) progress_.detected_break = found->t;
+        if (!jump) continue;
+        if (std::abs(jump->f[0] - before.f[0]) > parameters.value_jump)
+            throw Failure(Failure::Kind::closure, jump->t, {motion.block}, std::abs(jump->f[0] - before.f[0]));
+        if (jump->t < progress_.detected_break) progress_.detected_break = jump->t;
         enter();
         end = w.now.row_time(end);
     }

@@ -135,11 +135,11 @@ bool EventLocator::passes_by_rest(int e) const {
 }
 
 std::optional<FoundEvent> EventLocator::locate() {
-    const auto found = [&](FoundKind kind, int index) {
+    const auto event_of = [&](FoundKind kind, int index) {
         return FoundEvent{kind, index, stepper_.t0 + stepper_.h};
     };
     for (auto e = w.now.slipping.rbegin(); e != w.now.slipping.rend(); ++e)
-        if (has_arrived(*e)) return found(FoundKind::rest_or_limit, *e);
+        if (has_arrived(*e)) return event_of(FoundKind::rest_or_limit, *e);
     time_to_rest_.reset();
     std::optional<Crossing> crossing = search_.first();
     if (crossing) step_onto(*crossing);
@@ -154,10 +154,10 @@ std::optional<FoundEvent> EventLocator::locate() {
     const Watch& watch = crossing->watch;
     const bool reverses = watch.kind == Watch::Kind::slip && passes_by_rest(watch.index);
     if (const auto released = releases_.release_together()) return released;  // which may be earlier
-    if (watch.kind == Watch::Kind::gap) return found(FoundKind::touch, watch.index);
-    if (watch.kind == Watch::Kind::load) return found(FoundKind::lift, watch.index);
-    if (watch.kind == Watch::Kind::contact) return found(FoundKind::pull, watch.index);
-    return found(reverses ? FoundKind::reversal : FoundKind::rest_or_limit, watch.index);
+    if (watch.kind == Watch::Kind::gap) return event_of(FoundKind::touch, watch.index);
+    if (watch.kind == Watch::Kind::load) return event_of(FoundKind::lift, watch.index);
+    if (watch.kind == Watch::Kind::contact) return event_of(FoundKind::pull, watch.index);
+    return event_of(reverses ? FoundKind::reversal : FoundKind::rest_or_limit, watch.index);
 }
 
 }  // namespace pn

@@ -83,7 +83,7 @@ void GapWatch::skip_wide() {
 void GapWatch::recheck_skipped() {
     const TravelState& here = gaps.travel;
     gaps.recheck_travel = HUGE_VAL;
-    bool found = false;
+    bool has_unsampled = false;
     for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
         if (!gaps.skipped[i]) continue;
         const TravelBound::Pair& pair = travel.pair(i);
@@ -99,12 +99,12 @@ void GapWatch::recheck_skipped() {
             gaps.recheck_travel = std::min(gaps.recheck_travel, until);
             continue;
         }
-        found = true;
+        has_unsampled = true;
         gaps.skipped[i] = 0;
         gaps.monitored[i] = is_open(1.0, 1.0) ? GapState::from_step_end : 1;
         if (gaps.monitored[i] == 1) unsampled_.push_back(i);
     }
-    if (found) gaps.list_monitored();
+    if (has_unsampled) gaps.list_monitored();
 }
 
 // Undo the last step, which is repeated: gaps to be sampled at its end were not sampled.

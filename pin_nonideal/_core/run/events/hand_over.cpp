@@ -76,12 +76,12 @@ bool HandOver::find(int gap, double& size) {
 }
 
 std::optional<HandOver::Found> HandOver::first(double size) {
-    std::optional<Found> found;
+    std::optional<Found> next;
     for (int gap : w.now.closed_gaps) {
         if (is_bare(p, gap) || p.is_users(gap) || has_one_feature(p, gap)) continue;
-        if (find(gap, size)) found = Found{size, gap};
+        if (find(gap, size)) next = Found{size, gap};
     }
-    return found;
+    return next;
 }
 
 bool HandOver::is_unloaded(int gap) {

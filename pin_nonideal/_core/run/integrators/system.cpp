@@ -141,11 +141,11 @@ void System::evaluate_step_end(double t, const VecX& y, VecX& dy, bool may_lack_
     w.now.no_motion = false;
     begin_rows(p, w, t, q, v);
     // Closed contacts that others hold apart may contradict each other.
-    const bool found = attempt_motion(t, may_lack_motion, [&] {
+    const bool has_motion = attempt_motion(t, may_lack_motion, [&] {
         assemble_forces(p, w, t, v);
         solve_dynamics(p, w, t, v);
     });
-    write_rate(t, dy, found && !may_lack_motion);
+    write_rate(t, dy, has_motion && !may_lack_motion);
 }
 
 void System::settle(double t, VecX& y, VecX& dy, bool evaluates, bool may_lack_motion) {
@@ -177,11 +177,11 @@ void System::settle(double t, VecX& y, VecX& dy, bool evaluates, bool may_lack_m
     require_closed(p, w, t);
     if (past_sticking || (moved && evaluates)) chosen = configure_step(p, w);
     moved |= past_sticking;
-    const bool found =
+    const bool has_motion =
         attempt_motion(t, may_lack_motion, [&] { moved |= begin_step_on_rates(p, w, t, v, chosen, evaluates); });
-    moved |= !found;
+    moved |= !has_motion;
     write(y);
-    if (evaluates) write_rate(t, dy, found && !may_lack_motion);
+    if (evaluates) write_rate(t, dy, has_motion && !may_lack_motion);
     if (moved && energy) numerical_energy = total() - before;
 }
 

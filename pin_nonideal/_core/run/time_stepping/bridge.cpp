@@ -112,14 +112,14 @@ void TimeStepping::try_part(double h, double end, double t_end) {
 
 // A step that starts and ends at rest with the same contacts and modes leaves the state unchanged.
 void TimeStepping::step_with_contacts(double end, double t_end) {
-    const double least = parameters.min_cut * (end - progress_.t);
+    const double min_size = parameters.min_cut * (end - progress_.t);
     const bool may_stand = is_autonomous_ && (system_.velocity(progress_.y).array() == 0.0).all();
     if (may_stand) {
         y_from_ = progress_.y;
         before_step_ = w.state.mode;
         closed_before_step_ = w.state.closed;
     }
-    while (progress_.t < end) step_part(end, t_end, least);
+    while (progress_.t < end) step_part(end, t_end, min_size);
     progress_.is_stationary = may_stand && !misses_laws_ && progress_.y == y_from_ &&
                               same_bytes<Mode>(before_step_, w.state.mode) &&
                               same_bytes(closed_before_step_, w.state.closed);

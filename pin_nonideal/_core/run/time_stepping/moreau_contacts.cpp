@@ -146,8 +146,8 @@ void MoreauContacts::sweep(double t, JointDrives::Step& drives, bool first) {
 // with that of the first sweep.
 bool MoreauContacts::correct(double t, JointDrives::Step& drives) {
     const bool relaxed_before = forces_.law_miss().block >= 0;
-    const bool found = !attempt({Failure::Kind::not_converged}, [&] { sweep(t, drives, false); });
-    if (found && (relaxed_before || forces_.law_miss().block < 0)) return true;
+    const bool is_solved = !attempt({Failure::Kind::not_converged}, [&] { sweep(t, drives, false); });
+    if (is_solved && (relaxed_before || forces_.law_miss().block < 0)) return true;
     if (!relaxed_before) forces_.clear_miss();
     mean_.restart();
     sweep(t, drives, false);

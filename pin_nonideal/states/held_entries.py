@@ -132,12 +132,12 @@ def with_entries(model: Model, q: Array, source: Array, held: NDArray[np.bool_])
     """
     out = np.array(q)
     for place in joint_places(model):
-        own = held[place.v_first : place.v_first + place.nv]
-        if own.all():
+        entries = held[place.v_first : place.v_first + place.nv]
+        if entries.all():
             part = slice(place.q_first, place.q_first + place.nq)
             out[part] = source[part]
             continue
-        for k in np.flatnonzero(own[: _coordinate_count(place)]):
+        for k in np.flatnonzero(entries[: _coordinate_count(place)]):
             out[place.q_first + k] = source[place.q_first + k]
     return out
 
