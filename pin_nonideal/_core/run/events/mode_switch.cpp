@@ -133,7 +133,7 @@ bool ModeChanges::bridge_with_time_stepping(const Failure& failure, bool of_hand
 }
 
 void ModeChanges::bridge_stalled_steps() {
-    const bool bridges = options_.method.adaptive() && !options_.method.outside() && (system_.ne > 0 || system_.ng > 0);
+    const bool bridges = options_.method.adaptive() && !options_.method.outside() && !w.now.closed_gaps.empty();
     if (bridges && chatter_.is_stalled()) bridge(0);
 }
 

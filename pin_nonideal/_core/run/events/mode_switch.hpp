@@ -44,7 +44,7 @@ public:
     bool is_of_contradicting_contacts(const Failure& failure) const;
     // Bridge an accumulation of events, and select modes at the new state.
     void bridge_chatter(int element);
-    // Bridge steps that no longer advance the time, and select modes at the new state.
+    // Bridge steps with closed contacts that no longer advance the time, and select modes at the new state.
     void bridge_stalled_steps();
 
 private:

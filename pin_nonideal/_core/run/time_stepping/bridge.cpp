@@ -85,6 +85,7 @@ void TimeStepping::step_part(double end, double t_end, double least) {
         progress_.numerical_energy = numerical;
         progress_.impact_energy = impacts;
         set_contacts(p, w, closed_before_part_, before_part_);
+        moreau_contacts_.repeat();
     }
     const StepForces::LawMiss& relaxed = moreau_contacts_.law_miss();
     if (relaxed.block >= 0 && !misses_laws_) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "contact/queries.hpp"
 #include "dynamics/evaluation.hpp"
@@ -83,6 +84,7 @@ void MoreauContacts::step(double t, double h, VecX& y, double& numerical_energy,
         has_unknown_percussions_ = true;
         watch_.begin_time_steps(parameters.width_rounding * scene_size(p, w));
     }
+    if (!std::exchange(repeats_, false)) find_loaded();
     t0_ = t;
     q0_ = y.head(system_.nq);
     select(open_, unloaded_, true);
@@ -190,8 +192,22 @@ const VecX& MoreauContacts::path_since_last() {
 void MoreauContacts::gather(double t) {
     move_bodies(p.mechanism, w.now.terms, mean_.start());
     find_touching(t);
-    elements_.gather(p, w, touching_, was_closed_, modes_, mean_);
+    elements_.gather(p, w, touching_, was_closed_, modes_, loaded_, mean_);
     if (elements_.strike()) mean_.begin(h_, v0_, VelocityRates());
+}
+
+// Find the contacts with a load in the last step.
+void MoreauContacts::find_loaded() {
+    loaded_.clear();
+    const auto add = [&](int block) {
+        if (w.state.percussion[p.blocks[block].row] > 0.0) loaded_.push_back(block);
+    };
+    if (has_unknown_percussions_)
+        for (const Gap& gap : p.gaps) add(gap.block);
+    else
+        for (const StepRow& row : rows_of_percussions_)
+            if (row.k == 0) add(row.block);
+    std::sort(loaded_.begin(), loaded_.end());
 }
 
 // Find the contacts whose gap is closed at the step's middle, and contacts that were closed before. Their loads decide

@@ -44,6 +44,8 @@ public:
     // energy added by the scheme itself is added to numerical_energy. The modes are set for the step's end. The caller must
     // project and evaluate the end.
     void step(double t, double h, VecX& y, double& numerical_energy, double& impact_energy);
+    // The next step is another attempt from the state of the last step: the loads before the first attempt count.
+    void repeat() { repeats_ = true; }
     // Project the end y of the last step, at t, tree by tree. Return false if constraints join the trees: the rows of
     // the scene must project it then.
     bool project(double t, VecX& y, double& numerical_energy);
@@ -68,6 +70,7 @@ private:
     void find_forces(double t);
     void solve(double t);
     void apply();
+    void find_loaded();
     void keep_percussions();
     void end_velocity();
     void book_work(VecX& y, double& numerical_energy, double& impact_energy);
@@ -92,6 +95,8 @@ private:
     bool had_contacts_ = false;  // the last step had a closed contact or an active element
     bool has_unknown_percussions_ = true;  // other rows than these may have percussions
     std::vector<StepRow> rows_of_percussions_;
+    std::vector<int> loaded_;  // blocks of the contacts with a load before the step, ascending
+    bool repeats_ = false;     // the next step is another attempt
     VecX q_mid_, q_sampled_, v0_, v1_, a_free_, lam_free_, power_;
     ContactProjection projection_;
     VecX b_, force_;

@@ -39,7 +39,8 @@ void StepElements::add(const Program& p, const Part& part, int block, int kept, 
 }
 
 void StepElements::gather(const Program& p, Workspace& w, const std::vector<int>& touching,
-                          const std::vector<char>& closed, const std::vector<Mode>& modes, const MeanVelocity& mean) {
+                          const std::vector<char>& closed, const std::vector<Mode>& modes,
+                          const std::vector<int>& loaded, const MeanVelocity& mean) {
     rows.clear();
     parts.clear();
     cones.clear();
@@ -48,7 +49,7 @@ void StepElements::gather(const Program& p, Workspace& w, const std::vector<int>
     for (int i : touching) {
         const Gap& gap = p.gaps[i];
         const int slides = gap.sliding < 0 ? 0 : static_cast<int>(p.blocks[p.frictions[gap.sliding].block].kept.size());
-        const bool bears = w.state.percussion[p.blocks[gap.block].row] > 0.0;
+        const bool bears = std::binary_search(loaded.begin(), loaded.end(), gap.block);
         Part part{i, gap.sliding, bears ? 0.0 : gap.restitution * std::min(0.0, gap_rate(p, w, i))};
         part.rests = gap.sliding >= 0 && (modes[gap.sliding] == sticking ||
                                           slip_velocity(w.now, p.frictions[gap.sliding]).norm() <= still);

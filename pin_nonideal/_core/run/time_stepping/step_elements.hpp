@@ -45,9 +45,10 @@ public:
     explicit StepElements(const Program& p);
 
     // Collect the elements of the contacts `touching` with their sliding, then other dry friction. The step starts with
-    // the given closed contacts and modes, and contacts are evaluated at the velocity of its start.
+    // the given closed contacts and modes, and contacts are evaluated at the velocity of its start. `loaded`: blocks of the
+    // contacts with a load in the last step, ascending.
     void gather(const Program& p, Workspace& w, const std::vector<int>& touching, const std::vector<char>& closed,
-                const std::vector<Mode>& modes, const MeanVelocity& mean);
+                const std::vector<Mode>& modes, const std::vector<int>& loaded, const MeanVelocity& mean);
     // Check if a contact was open at the step's start.
     bool strike() const {
         return std::any_of(parts.begin(), parts.end(), [](const Part& part) { return part.strikes; });
