@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import get_args
 
 import numpy as np
@@ -39,7 +39,10 @@ NO_LIMIT = np.finfo(float).max
 
 
 def lower_contacts(
-    contacts: Sequence[tuple[str, Contact]], out: core.Builder, resolver: Resolver
+    contacts: Sequence[tuple[str, Contact]],
+    contact_of: Mapping[str, str],
+    out: core.Builder,
+    resolver: Resolver,
 ) -> Iterator[tuple[str, Contact]]:
     """Add the normal rows of all contacts; `lower_contact_friction` adds their friction after all rows.
 
@@ -47,6 +50,7 @@ def lower_contacts(
 
     Args:
         contacts: unique names and descriptions.
+        contact_of: contact of each point of the pairs of shapes with several points.
         out: the program under construction.
         resolver: frames and joints by name.
 
@@ -69,7 +73,12 @@ def lower_contacts(
             if getattr(c, "unilateral", True) is opens:
                 blocks[i] = lower_gaps(c, name, out, resolver)
                 yield name, c
-    out.order_contacts([block for i in range(len(contacts)) for block in blocks[i]])
+    pairs = {name: k for k, name in enumerate(dict.fromkeys(contact_of.values()))}
+    pair_of = [pairs.get(contact_of.get(name, ""), -1) for name, _ in contacts]
+    out.order_contacts(
+        [block for i in range(len(contacts)) for block in blocks[i]],
+        [pair_of[i] for i in range(len(contacts)) for _ in blocks[i]],
+    )
 
 
 def lower_gaps(c: Contact, name: str, out: core.Builder, resolver: Resolver) -> list[int]:

@@ -90,11 +90,13 @@ def lower_stepwise(spec: SceneSpec, builder: core.Builder, resolver: Resolver) -
     for c, name in zip(spec.constraints, constraint_names, strict=True):
         lower_constraint(c, name, builder, resolver)
         yield LoweredItem("constraint", name, c, partial(_relower, lower_constraint, name, resolver))
-    for name, contact in lower_contacts(list(zip(contact_names, contacts, strict=True)), builder, resolver):
+    contact_of = contacts_of_points(points_by_pair(spec.contacts))
+    named = list(zip(contact_names, contacts, strict=True))
+    for name, contact in lower_contacts(named, contact_of, builder, resolver):
         yield LoweredItem("contact", name, contact, partial(_relower, lower_gaps, name, resolver))
     joints = {name: i for i, name in enumerate(resolver.model.names) if i}
     blocks = {name: block for block, name in enumerate(builder.block_names)}
-    multipliers = grouped_rows(row_slices(builder), contacts_of_points(points_by_pair(spec.contacts)))
+    multipliers = grouped_rows(row_slices(builder), contact_of)
     names = ReactionNames(multipliers, blocks, joints)
     context = LoweringContext(resolver, dict(zip(constraint_names, spec.constraints, strict=True)), names)
     for law, name in zip(spec.laws, law_names, strict=True):

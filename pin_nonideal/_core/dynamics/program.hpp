@@ -20,6 +20,7 @@ struct Gap {
     std::vector<int> elements;  // friction elements of the contact
     int sliding = -1;           // sliding element along the contact plane, with forces in Coulomb's cone
     int same_geometry_as = -1;  // first gap with the same geometry, or the gap itself
+    int pair = -1;              // pair of convex shapes that the gap is part of, -1 if none
 };
 
 // Meaning of the restitution e of a contact in an impact: ratio of gap rates (Newton) or of impulses (Poisson).

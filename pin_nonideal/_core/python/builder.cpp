@@ -37,8 +37,11 @@ void Builder::set_unilateral(double restitution) {
     p->first_gap = p->gaps.front().block;
 }
 
-void Builder::order_contacts(const std::vector<int>& blocks) {
+void Builder::order_contacts(const std::vector<int>& blocks, const std::vector<int>& pairs) {
     p->all_contacts = blocks;
+    std::vector<int> pair_of(p->blocks.size(), -1);
+    for (size_t i = 0; i < blocks.size(); ++i) pair_of[blocks[i]] = pairs.at(i);
+    for (Gap& gap : p->gaps) gap.pair = pair_of[gap.block];
     int row = p->user_rows;
     for (int block : blocks) row = std::min(row, p->blocks[block].user_row);
     for (int block : blocks) {
@@ -229,7 +232,7 @@ nb::class_<Builder> bind_builder(nb::module_& m) {
         }, "times"_a)
         .def("set_unilateral", &Builder::set_unilateral, "restitution"_a)
         .def("set_impact", [](Builder& b, ImpactLaw law) { b.p->impact_law = law; }, "law"_a)
-        .def("order_contacts", &Builder::order_contacts, "blocks"_a)
+        .def("order_contacts", &Builder::order_contacts, "blocks"_a, "pairs"_a)
         .def("finish", &Builder::finish);
     bind_friction(builder);
     bind_laws(builder);

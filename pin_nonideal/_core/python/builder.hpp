@@ -20,7 +20,7 @@ struct Builder {
     // Make the contact that was added last unilateral. Unilateral contacts follow all bilateral contacts.
     void set_unilateral(double restitution);
     // Order the rows of contacts like these blocks.
-    void order_contacts(const std::vector<int>& blocks);
+    void order_contacts(const std::vector<int>& blocks, const std::vector<int>& pairs);
     // Return an independent program, which later additions do not change.
     std::shared_ptr<const Program> finish() const;
 };

@@ -76,6 +76,13 @@ inline double rounded_by(const Kind& kind) {
     return depth;
 }
 
+// Check if a gap is between lines, such as edges and rims. Its rounding alone bounds its penetration.
+inline bool is_between_lines(const Kind& kind) {
+    bool is_line = false;
+    visit_as<ShapeGap>(kind, [&](const auto& k) { is_line = k.max_depth() <= k.radius; });
+    return is_line;
+}
+
 // Further penetration over which the direction out of contact stays defined, for a gap of a width with `rounded_by`.
 inline double depth_left(const Program& p, const Workspace& w, int gap, double width) {
     double depth = HUGE_VAL;

@@ -25,7 +25,10 @@ MoreauContacts::MoreauContacts(System& system, GapWatch& watch)
       a_free_(v0_), power_(VecX::Zero(system.nw)), projection_(system.p), force_(v0_) {
     projection_.energy = system.energy;
     if (system.ng == 0) return;
-    for (const Gap& gap : p.gaps) rounded_by_.push_back(rounded_by(p.blocks[gap.block].kind));
+    for (const Gap& gap : p.gaps) {
+        rounded_by_.push_back(rounded_by(p.blocks[gap.block].kind));
+        between_lines_.push_back(is_between_lines(p.blocks[gap.block].kind));
+    }
     rounded_ = std::any_of(rounded_by_.begin(), rounded_by_.end(), [](double r) { return r < HUGE_VAL; });
     lam_free_ = VecX::Zero(p.layout.rows);
     touching_.reserve(system.ng);
@@ -210,6 +213,25 @@ void MoreauContacts::find_loaded() {
     std::sort(loaded_.begin(), loaded_.end());
 }
 
+// Skip edges and rims that meet the other shape's from inside, because a corner of the same pair penetrates. Contacts of
+// two convex shapes push apart in one direction, and an edge from inside would push the other way.
+void MoreauContacts::drop_opposed() {
+    const auto normal = [&](int gap) {
+        const Block& block = p.blocks[p.gaps[gap].block];
+        const Vec3& n = w.now.values[p.gaps[gap].block].wrench[block.kept[0]].force;
+        return block.joint1 < block.joint2 ? n : -n;
+    };
+    const auto is_opposed = [&](int gap) {
+        if (!between_lines_[gap] || was_closed_[gap] || p.gaps[gap].pair < 0) return false;
+        const Vec3 n = normal(gap);
+        return std::any_of(touching_.begin(), touching_.end(), [&](int other) {
+            return p.gaps[other].pair == p.gaps[gap].pair && !between_lines_[other] && n.dot(normal(other)) < 0.0;
+        });
+    };
+    // Faces are never opposed, so the order of the removals does not matter.
+    touching_.erase(std::remove_if(touching_.begin(), touching_.end(), is_opposed), touching_.end());
+}
+
 // Find the contacts whose gap is closed at the step's middle, and contacts that were closed before. Their loads decide
 // if they stay closed.
 void MoreauContacts::find_touching(double t) {
@@ -227,6 +249,7 @@ void MoreauContacts::find_touching(double t) {
         evaluate_block(p, w, t, mean_.start(), p.gaps[i].block);
         for (int e : p.gaps[i].elements) evaluate_block(p, w, t, mean_.start(), p.frictions[e].block);
     }
+    if (touching_.size() > 1) drop_opposed();
     if (touching_.size() > 1)
         remove_coincident(p, w, touching_, [&](int i, int other) { return was_closed_[i] && !was_closed_[other]; });
 }

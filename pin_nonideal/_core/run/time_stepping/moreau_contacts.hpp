@@ -71,6 +71,7 @@ private:
     void solve(double t);
     void apply();
     void find_loaded();
+    void drop_opposed();
     void keep_percussions();
     void end_velocity();
     void book_work(VecX& y, double& numerical_energy, double& impact_energy);
@@ -91,6 +92,7 @@ private:
     std::vector<char> was_closed_, closed_, open_;
     std::vector<Mode> modes_, unloaded_;
     std::vector<double> rounded_by_;   // rounding of each gap
+    std::vector<char> between_lines_;  // true for each gap between edges or rims
     bool rounded_ = false;             // a gap has rounding
     bool had_contacts_ = false;  // the last step had a closed contact or an active element
     bool has_unknown_percussions_ = true;  // other rows than these may have percussions
