@@ -203,7 +203,7 @@ void MoreauContacts::gather(double t) {
 void MoreauContacts::find_loaded() {
     loaded_.clear();
     const auto add = [&](int block) {
-        if (w.state.percussion[p.blocks[block].row] > 0.0) loaded_.push_back(block);
+        if (!p.blocks[block].kept.empty() && w.state.percussion[p.blocks[block].row] > 0.0) loaded_.push_back(block);
     };
     if (has_unknown_percussions_)
         for (const Gap& gap : p.gaps) add(gap.block);
@@ -213,23 +213,31 @@ void MoreauContacts::find_loaded() {
     std::sort(loaded_.begin(), loaded_.end());
 }
 
-// Skip edges and rims that meet the other shape's from inside, because a corner of the same pair penetrates. Contacts of
-// two convex shapes push apart in one direction, and an edge from inside would push the other way.
+// Skip edges and rims that meet those of the other shape from inside. Contacts of two convex shapes push apart in about
+// one direction, and an edge from inside would push the other way. A face is right, else an edge that was closed before,
+// else the one that approaches faster.
 void MoreauContacts::drop_opposed() {
     const auto normal = [&](int gap) {
         const Block& block = p.blocks[p.gaps[gap].block];
         const Vec3& n = w.now.values[p.gaps[gap].block].wrench[block.kept[0]].force;
         return block.joint1 < block.joint2 ? n : -n;
     };
-    const auto is_opposed = [&](int gap) {
-        if (!between_lines_[gap] || was_closed_[gap] || p.gaps[gap].pair < 0) return false;
+    const auto precedes = [&](int other, int gap) {
+        if (!between_lines_[other]) return true;
+        if (was_closed_[other] != was_closed_[gap]) return was_closed_[other] != 0;
+        return gap_rate(p, w, other) < gap_rate(p, w, gap);
+    };
+    if (std::none_of(touching_.begin(), touching_.end(), [&](int gap) { return between_lines_[gap]; })) return;
+    const std::vector<int> all = touching_;
+    const auto is_inside = [&](int gap) {
+        if (!between_lines_[gap] || p.gaps[gap].pair < 0 || is_bare(p, gap)) return false;
         const Vec3 n = normal(gap);
-        return std::any_of(touching_.begin(), touching_.end(), [&](int other) {
-            return p.gaps[other].pair == p.gaps[gap].pair && !between_lines_[other] && n.dot(normal(other)) < 0.0;
+        return std::any_of(all.begin(), all.end(), [&](int other) {
+            return p.gaps[other].pair == p.gaps[gap].pair && !is_bare(p, other) &&
+                   n.dot(normal(other)) < parameters.opposed && precedes(other, gap);
         });
     };
-    // Faces are never opposed, so the order of the removals does not matter.
-    touching_.erase(std::remove_if(touching_.begin(), touching_.end(), is_opposed), touching_.end());
+    touching_.erase(std::remove_if(touching_.begin(), touching_.end(), is_inside), touching_.end());
 }
 
 // Find the contacts whose gap is closed at the step's middle, and contacts that were closed before. Their loads decide

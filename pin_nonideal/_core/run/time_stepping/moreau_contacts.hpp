@@ -19,6 +19,7 @@ struct MoreauContactsParameters {
     double width_rounding = 1e-12;  // uncertainty of a gap at rest, relative to the scene's size
     // Maximum penetration of edges and rims with a defined normal, relative to their rounding.
     double nearly_all = 0.999;
+    double opposed = -0.7;  // cosine below which the normals of two contacts of one pair are opposite
 };
 
 class MoreauContacts {
