@@ -100,7 +100,7 @@ def _program(scene: Any, names: list[str]) -> Any:
     for name, c in zip(names, scene.constraints, strict=False):
         lower_constraint(c, name, builder, where)
     contacts = list(zip(names[len(scene.constraints) :], scene.contacts, strict=True))
-    list(lower_contacts(contacts, builder, where))
+    list(lower_contacts(contacts, {}, builder, where))
     return builder.finish()
 
 
