@@ -90,14 +90,32 @@ class Cones:
         """
         import clarabel
 
+        status = clarabel.SolverStatus
+        for equilibrates in (True, False):  # some programs that stop early end in their own scales
+            solution = self._solve(goal, equilibrates)
+            if solution.status in (status.Solved, status.AlmostSolved):
+                return np.array(solution.x), np.array(solution.z)
+            if solution.status in (status.PrimalInfeasible, status.DualInfeasible):
+                return None
+        raise FrictionConvergenceError(
+            "the program of friction cones found neither forces nor a proof that there are none; it ended "
+            f'with status "{solution.status}"; choose units in which masses and lengths are closer to 1',
+            element="",
+        )
+
+    def _solve(self, goal: Array, equilibrates: bool) -> Any:
+        """Return Clarabel's solution, with or without its scaling of the rows and columns."""
+        import clarabel
+
         rows, columns, values = zip(*self._entries, strict=True) if self._entries else ((), (), ())
         settings = clarabel.DefaultSettings()
         settings.verbose = False
         settings.max_threads = 1
+        settings.equilibrate_enable = equilibrates
         for kind in ("gap_abs", "gap_rel", "feas"):
             setattr(settings, f"tol_{kind}", SOLVER_TOL)
             setattr(settings, f"reduced_tol_{kind}", REDUCED_TOL)
-        solution = clarabel.DefaultSolver(
+        return clarabel.DefaultSolver(
             csc_matrix((self.count, self.count)),
             goal,
             csc_matrix((values, (rows, columns)), shape=(self.rows, self.count)),
@@ -105,16 +123,6 @@ class Cones:
             self._cones,
             settings,
         ).solve()
-        status = clarabel.SolverStatus
-        if solution.status in (status.Solved, status.AlmostSolved):
-            return np.array(solution.x), np.array(solution.z)
-        if solution.status in (status.PrimalInfeasible, status.DualInfeasible):
-            return None
-        raise FrictionConvergenceError(
-            "the program of friction cones found neither forces nor a proof that there are none; it ended "
-            f'with status "{solution.status}"; choose units in which masses and lengths are closer to 1',
-            element="",
-        )
 
     def _add(self, bounds: list[float], cone: Any) -> None:
         if bounds:

@@ -137,7 +137,7 @@ def test_the_margin_of_a_stack_is_that_of_its_slope(shape, count, tilt, yaw):
     assert held == pytest.approx(carried * np.tan(tilt), rel=1e-8, abs=1e-8)
 
 
-@pytest.mark.parametrize("seed", seeds(range(60)))
+@pytest.mark.parametrize("seed", seeds(range(60), always=[56]))
 def test_the_margin_of_a_bridge_of_balls_is_exact(seed):
     """One ball on two needs a friction coefficient of tan(theta/2) between the balls, and less on the floor.
 
