@@ -31,23 +31,24 @@ enum class DisplayKind {
     gear      // the generalized forces on two joints
 };
 
-// Bases of kinds. A kind declares again the members in which it differs.
+// Bases of kinds. They hold what their kinds share by definition, and the properties that are safe to assume: other kinds
+// declare these again.
 
-// Base of constraints. Only the kind knows if its rows move in time.
+// Base of constraints.
 struct ConstraintKind {
     static constexpr Role role = Role::constraint;
-    static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
-
-    int size() const { return 1; }
-    bool is_holonomic(int) const { return true; }
+    static constexpr bool constant_A = false, comparable_rows = false;
 };
 
-// Base of gaps, with the contact force as multiplier.
-struct GapKind : ConstraintKind {
+// Base of gaps: one row with a position, and the contact force as multiplier.
+struct GapKind {
     static constexpr Role role = Role::contact;
+    static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr int pressing = 0;
     static constexpr DisplayKind shown = DisplayKind::contact;
 
+    int size() const { return 1; }
+    bool is_holonomic(int) const { return true; }
     bool moves_in_time() const { return false; }
 };
 
@@ -65,11 +66,15 @@ struct SlipDirections {
     static constexpr bool constant_A = false, affine_rate = true, comparable_rows = false;
     static constexpr DisplayKind shown = DisplayKind::nothing;
 
-    int size() const { return 2; }
     bool is_holonomic(int) const { return false; }
     bool moves_in_time() const { return false; }
     template <class Sides, class Out>
     void residual(const Sides&, Out&) const {}
+};
+
+// Base of the two directions along the plane of a contact.
+struct ContactSlip : SlipDirections {
+    int size() const { return 2; }
 };
 
 }  // namespace pn

@@ -19,7 +19,7 @@ struct Builder {
     int add_law(const std::string& name);
     // Make the contact that was added last unilateral. Unilateral contacts follow all bilateral contacts.
     void set_unilateral(double restitution);
-    // Order the rows of contacts like these blocks.
+    // Order the rows of contacts like these blocks. `pairs`: pair of convex shapes of each block, -1 if none.
     void order_contacts(const std::vector<int>& blocks, const std::vector<int>& pairs);
     // Return an independent program, which later additions do not change.
     std::shared_ptr<const Program> finish() const;

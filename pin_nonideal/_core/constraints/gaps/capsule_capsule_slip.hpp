@@ -9,7 +9,7 @@
 
 namespace pn {
 
-struct CapsuleCapsuleSlipRows : SlipDirections {
+struct CapsuleCapsuleSlipRows : ContactSlip {
     static constexpr const char* name = "capsule_capsule_slip";
 
     Frame frame1, frame2;

@@ -10,7 +10,7 @@
 
 namespace pn {
 
-struct CapsuleCylinderSlipRows : SlipDirections {
+struct CapsuleCylinderSlipRows : ContactSlip {
     static constexpr const char* name = "capsule_cylinder_slip";
 
     Frame frame1, frame2;

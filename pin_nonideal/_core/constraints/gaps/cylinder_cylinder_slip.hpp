@@ -10,7 +10,7 @@
 
 namespace pn {
 
-struct CylinderCylinderSlipRows : SlipDirections {
+struct CylinderCylinderSlipRows : ContactSlip {
     static constexpr const char* name = "cylinder_cylinder_slip";
 
     Frame frame1, frame2;

@@ -10,7 +10,7 @@
 
 namespace pn {
 
-struct DiskHullSlipRows : SlipDirections {
+struct DiskHullSlipRows : ContactSlip {
     static constexpr const char* name = "disk_hull_slip";
 
     Frame frame1, frame2;

@@ -12,6 +12,7 @@ namespace pn {
 template <class Sides>
 struct NearestOnBox;
 
+// Box about the origin of its axes, by half of its sides.
 struct Box {
     static constexpr const char *gap = "box", *slip = "box_slip";
     template <class Sides>

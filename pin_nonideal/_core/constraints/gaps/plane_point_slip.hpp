@@ -8,7 +8,7 @@
 
 namespace pn {
 
-struct PlanePointSlipRows : SlipDirections {
+struct PlanePointSlipRows : ContactSlip {
     static constexpr const char* name = "plane_point_slip";
 
     Frame frame1, frame2;

@@ -9,7 +9,7 @@
 
 namespace pn {
 
-struct PlaneEllipsoidSlipRows : SlipDirections {
+struct PlaneEllipsoidSlipRows : ContactSlip {
     static constexpr const char* name = "plane_ellipsoid_slip";
 
     Frame frame1, frame2;

@@ -13,7 +13,7 @@
 namespace pn {
 
 template <class Solid>
-struct SolidHullSlipRows : SlipDirections {
+struct SolidHullSlipRows : ContactSlip {
     static constexpr const char* name = Solid::slip;
 
     Frame frame1, frame2;

@@ -11,7 +11,7 @@ namespace pn {
 
 struct CouplingRows : ConstraintKind {
     static constexpr const char* name = "coupling";
-    static constexpr bool constant_A = true;
+    static constexpr bool constant_A = true, affine_rate = true;
     static constexpr DisplayKind shown = DisplayKind::gear;
 
     int joint1, joint2;
@@ -23,6 +23,8 @@ struct CouplingRows : ConstraintKind {
                           Field{"ratio", &CouplingRows::ratio}, Field{"offset", &CouplingRows::offset},
                           Field{"period", &CouplingRows::period}, Field{"position", &CouplingRows::position});
     }
+    int size() const { return 1; }
+    bool is_holonomic(int) const { return true; }
     bool moves_in_time() const { return false; }
     std::vector<int> dofs(const Mechanism& m) const { return {m.joints[joint1].iv, m.joints[joint2].iv}; }
 

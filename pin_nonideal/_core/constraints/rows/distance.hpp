@@ -11,6 +11,7 @@ namespace pn {
 
 struct DistanceRows : ConstraintKind {
     static constexpr const char* name = "distance";
+    static constexpr bool affine_rate = true;
     static constexpr DisplayKind shown = DisplayKind::rod;
 
     Frame frame1, frame2;
@@ -20,6 +21,8 @@ struct DistanceRows : ConstraintKind {
         return std::tuple(Field{"frame1", &DistanceRows::frame1}, Field{"frame2", &DistanceRows::frame2},
                           Field{"length", &DistanceRows::length});
     }
+    int size() const { return 1; }
+    bool is_holonomic(int) const { return true; }
     bool moves_in_time() const { return !is_constant(length); }
 
     template <class Sides, class Out>

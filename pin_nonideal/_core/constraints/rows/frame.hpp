@@ -29,6 +29,7 @@ Vec logarithm(const Mat& R) {
 
 struct FrameRows : ConstraintKind {
     static constexpr const char* name = "frame";
+    static constexpr bool affine_rate = true;
     static constexpr DisplayKind shown = DisplayKind::anchor;
 
     Frame frame1, frame2;
@@ -37,6 +38,7 @@ struct FrameRows : ConstraintKind {
         return std::tuple(Field{"frame1", &FrameRows::frame1}, Field{"frame2", &FrameRows::frame2});
     }
     int size() const { return 6; }
+    bool is_holonomic(int) const { return true; }
     bool moves_in_time() const { return false; }
 
     template <class Sides, class Out>

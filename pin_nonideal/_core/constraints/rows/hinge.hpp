@@ -15,6 +15,7 @@ constexpr double small_sine = 1e-9;
 
 struct HingeRows : ConstraintKind {
     static constexpr const char* name = "hinge";
+    static constexpr bool affine_rate = true;
     static constexpr DisplayKind shown = DisplayKind::anchor;
 
     Frame frame1, frame2;
@@ -26,6 +27,7 @@ struct HingeRows : ConstraintKind {
                           Field{"normal2", &HingeRows::normal2});
     }
     int size() const { return 5; }
+    bool is_holonomic(int) const { return true; }
     bool moves_in_time() const { return false; }
 
     // The axis e of frame 1 stays normal to n1 and n2 of frame 2. The angle between the axes scales the residual, so

@@ -10,6 +10,7 @@ namespace pn {
 
 struct KnifeEdgeRows : ConstraintKind {
     static constexpr const char* name = "knife_edge";
+    static constexpr bool affine_rate = true;
     static constexpr DisplayKind shown = DisplayKind::edge;
 
     Frame frame1, frame2;  // frame2 is the world's
@@ -18,6 +19,7 @@ struct KnifeEdgeRows : ConstraintKind {
     static constexpr auto data() {
         return std::tuple(Field{"frame", &KnifeEdgeRows::frame1}, Field{"axis", &KnifeEdgeRows::axis});
     }
+    int size() const { return 1; }
     bool is_holonomic(int) const { return false; }
     bool moves_in_time() const { return false; }
 

@@ -12,7 +12,7 @@ namespace pn {
 
 struct MotionRows : ConstraintKind {
     static constexpr const char* name = "motion";
-    static constexpr bool constant_A = true;
+    static constexpr bool constant_A = true, affine_rate = true;
     static constexpr DisplayKind shown = DisplayKind::drive;
 
     int joint;
@@ -23,6 +23,8 @@ struct MotionRows : ConstraintKind {
         return std::tuple(Field{"joint", &MotionRows::joint}, Field{"function", &MotionRows::function},
                           Field{"period", &MotionRows::period});
     }
+    int size() const { return 1; }
+    bool is_holonomic(int) const { return true; }
     bool moves_in_time() const { return true; }
     std::vector<int> dofs(const Mechanism& m) const { return {m.joints[joint].iv}; }
 

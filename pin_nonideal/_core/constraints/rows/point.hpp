@@ -11,7 +11,7 @@ namespace pn {
 
 struct PointRows : ConstraintKind {
     static constexpr const char* name = "point";
-    static constexpr bool comparable_rows = true;
+    static constexpr bool affine_rate = true, comparable_rows = true;
     static constexpr DisplayKind shown = DisplayKind::anchor;
 
     Frame frame1, frame2;
@@ -22,6 +22,7 @@ struct PointRows : ConstraintKind {
                           Field{"axes", &PointRows::axes});
     }
     int size() const { return static_cast<int>(axes.size()); }
+    bool is_holonomic(int) const { return true; }
     bool moves_in_time() const { return false; }
 
     template <class Sides, class Out>

@@ -10,6 +10,7 @@ namespace pn {
 
 struct RollingRows : ConstraintKind {
     static constexpr const char* name = "rolling";
+    static constexpr bool affine_rate = true;
     static constexpr DisplayKind shown = DisplayKind::rolling;
     static constexpr int pressing = 2;
 

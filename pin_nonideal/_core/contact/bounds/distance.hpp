@@ -14,7 +14,7 @@ struct Separation {
     Vec3 centers;        // from frame 2 to frame 1
     Mat3 axes1, axes2;   // of both frames
     Vec3 normal;         // from the nearest point of shape 2 to the nearest point of shape 1
-    double radius = 0.0; // sum of both radii
+    double radius = 0.0;  // sum of both radii
 
     // Check if the gap is between two shapes.
     static bool has(const Program& p, int gap) {

@@ -257,9 +257,10 @@ void MoreauContacts::find_touching(double t) {
         evaluate_block(p, w, t, mean_.start(), p.gaps[i].block);
         for (int e : p.gaps[i].elements) evaluate_block(p, w, t, mean_.start(), p.frictions[e].block);
     }
-    if (touching_.size() > 1) drop_opposed();
-    if (touching_.size() > 1)
+    if (touching_.size() > 1) {
+        drop_opposed();
         remove_coincident(p, w, touching_, [&](int i, int other) { return was_closed_[i] && !was_closed_[other]; });
+    }
 }
 
 // Evaluate the contacts that take part at a new mean velocity.
