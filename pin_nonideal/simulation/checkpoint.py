@@ -36,7 +36,7 @@ from pin_nonideal.version import __version__
 
 from .options import RunOptions
 
-FORMAT = 4
+FORMAT = 5
 # Largest interval, longer than any run [s].
 MAX_INTERVAL = 1e8
 

@@ -31,6 +31,8 @@ Limits = tuple[Array, Array]  # least and largest torque of each driven degree o
 # Tolerance of A a = b, relative to its terms.
 ACCELERATION_TOL = 1e-6
 ROUNDING = 1e-6  # acceleration scale without weight [m/s^2 or rad/s^2], multiplied by ACCELERATION_TOL
+# Rounding of a row, relative to its length and to the accelerations of all bodies in the metric of M^-1.
+MOTION_ROUNDING = 1e-13
 # Slip rates and slip accelerations below this part of 1 + the largest velocity or acceleration count as zero.
 AT_REST = 1e-9
 # Maximum number of iterations for load-dependent friction, and their relative tolerance.
@@ -124,7 +126,7 @@ def torques_of_motion(
     """Return the torques of a motion with the time and the contacts of `rest`, see `inverse_dynamics`."""
     A, b, _, rate = rows_at(rest.runner, q, v, rest.t)
     if len(A):
-        allowed = _allowed_residual(rest, q, A, b, a)
+        allowed = _allowed_residual(rest, q, v, a, A, b)
         _open_contacts(rest, A, b, rate, a, allowed)
         _check_follows(rest, A, b, a, allowed)
     result = _Torques(rest, q, v, a, dofs).solve(limits, name)
@@ -176,10 +178,29 @@ def _bounds(model: Model, bounds: object, dofs: list[int]) -> Limits:
     return lower, upper
 
 
-def _allowed_residual(rest: AtRest, q: Array, A: Array, b: Array, a: Array) -> Array:
+def _allowed_residual(rest: AtRest, q: Array, v: Array, a: Array, A: Array, b: Array) -> Array:
     """Return the allowed residual of each row of A a = b, relative to its terms and to gravity, (m,)."""
-    falls = rest.scaled_rows(q, rest.root(q))[1] * weight(rest.compiled.model)
-    return np.asarray(ACCELERATION_TOL * (np.abs(A) @ np.abs(a) + np.abs(b) + falls + ROUNDING))
+    lengths = rest.scaled_rows(q, rest.root(q))[1]
+    terms = np.abs(A) @ np.abs(a) + np.abs(b) + lengths * weight(rest.compiled.model) + ROUNDING
+    rounding = MOTION_ROUNDING * lengths * _size_of_accelerations(rest.compiled.model, q, v, a)
+    return np.asarray(ACCELERATION_TOL * terms + rounding)
+
+
+def _size_of_accelerations(model: Model, q: Array, v: Array, a: Array) -> float:
+    """Return the size of the accelerations of all bodies, weighted by their inertia [sqrt(kg) m/s^2].
+
+    The square is sum m |a_c|^2 + max(I) (|alpha|^2 + |omega|^4), with the acceleration a_c of the center of
+    mass, so steady rotation counts too.
+    """
+    data, square = model.createData(), 0.0
+    pin.forwardKinematics(model, data, q, v, a)
+    for body, speed, change in zip(model.inertias, data.v, data.a, strict=True):
+        omega, alpha, lever = speed.angular, change.angular, body.lever
+        center = change.linear + np.cross(alpha, lever)
+        center += np.cross(omega, speed.linear + np.cross(omega, lever))
+        spin = float(alpha @ alpha + (omega @ omega) ** 2)
+        square += float(body.mass * center @ center + np.trace(body.inertia) * spin)
+    return float(np.sqrt(square))
 
 
 def _open_contacts(rest: AtRest, A: Array, b: Array, rate: Array, a: Array, allowed: Array) -> None:
@@ -212,10 +233,10 @@ class _Torques:
         self.arms = rest.units(self.M, self.free, dofs)
         # Lengths of the unit torques in the metric of M^-1.
         self.lengths = np.sqrt(np.diag(np.linalg.inv(self.M))[dofs]) / self.arms
-        self.modes, self.slipping = self._modes()
+        self.modes, self.directions = self._modes()
 
     def _modes(self) -> tuple[list[Any], Array]:
-        """Return modes from slip, or its acceleration at rest, and a velocity at which all elements slip."""
+        """Return modes and unit directions, from slip or from its acceleration at rest, (d,)."""
         runner, t, v, model = self.rest.runner, self.rest.t, self.v, self.rest.compiled.model
         rows = [
             runner.slip_rows(pin.integrate(model, self.q, s * DIFFERENCE_STEP * v), v, t).reshape(-1, len(v))
@@ -225,18 +246,24 @@ class _Torques:
         slip, change = rows[1] @ v, rows[1] @ self.a + gained
         quiet = AT_REST * (1.0 + np.abs(v).max(initial=0.0))
         quiet_change = AT_REST * (1.0 + np.abs(self.a).max(initial=0.0))
-        modes, first, begins = [], 0, False
+        modes, directions, first = [], np.zeros(len(slip)), 0
         for size in self.rest.program.element_sizes:
             own = slice(first, first + size)
             first += size
             moving = np.linalg.norm(slip[own]) > quiet
-            starting = np.linalg.norm(change[own]) > quiet_change
-            along = slip[own][0] if moving else change[own][0]
-            mode = core.Mode.slip_minus if size == 1 and along < 0.0 else core.Mode.slip_plus
-            modes.append(mode if moving or starting else core.Mode.unloaded)
-            begins |= starting and not moving and size > 1
-        ahead = 10.0 * quiet / max(quiet_change, float(np.abs(self.a).max(initial=0.0)))
-        return modes, v + ahead * self.a if begins else v
+            along = slip[own] if moving else change[own]
+            if not moving and np.linalg.norm(along) <= quiet_change:
+                modes.append(core.Mode.unloaded)
+                continue
+            directions[own] = along / np.linalg.norm(along)
+            modes.append(core.Mode.slip_minus if size == 1 and along[0] < 0.0 else core.Mode.slip_plus)
+        return modes, directions
+
+    def _motion(self, tau: Array) -> core.Instant:
+        """Solve Eq. (40) for given torques, with the modes and slip directions of the motion."""
+        return self.rest.runner.solve(
+            self.q, self.v, self.rest.t, tau, self.modes, directions=self.directions
+        )
 
     def solve(self, limits: Limits | None, name: str) -> InverseDynamics:
         """Iterate torques of least norm, within their limits, until friction agrees with the reactions."""
@@ -246,7 +273,7 @@ class _Torques:
         moments = None if limits is None else (limits[0] * self.arms, limits[1] * self.arms)
         tau, before = np.zeros(len(self.v)), np.inf
         for _ in range(MAX_PASSES):
-            now = self.rest.runner.solve(self.q, self.slipping, self.rest.t, tau, self.modes)
+            now = self._motion(tau)
             undriven = now.F - tau + now.C  # forces without the torques
             needed = self.free.T @ (self.M @ self.a - undriven)
             u = _bounded_least_squares(scaled, np.linalg.solve(root, needed), self.lengths, moments)
@@ -267,7 +294,7 @@ class _Torques:
                 f'of "{name}" depends too much on the torques here',
                 element=", ".join(self.rest.compiled.elements.names),
             )
-        lam = self.rest.runner.solve(self.q, self.slipping, self.rest.t, tau, self.modes).lam
+        lam = self._motion(tau).lam
         left = float(np.abs(self.free @ (G @ u - needed)).max(initial=0.0))
         rows = self.rest.compiled.multipliers.groups
         return InverseDynamics(tau, rows.sum(np.asarray(lam)), left)

@@ -43,6 +43,9 @@ class Balance(NamedTuple):
 # A contact touches if its gap is below this part of the scene's length, or of 1 m if the scene is shorter, as
 # at starts of runs.
 TOUCHING_GAP = 1e-10
+# A coordinate cannot move if its mobility is below this part of its mobility without constraints. Mobilities
+# are squares of rates: rounding leaves 1e-32, and linkages of usual proportions 1e-10.
+MIN_MOBILITY = 1e-20
 
 
 class AtRest:
@@ -211,9 +214,9 @@ class AtRest:
     def units(self, M: Array, free: Array, dofs: Collection[int] | None = None) -> Array:
         """Return unit displacements of coordinates: 1 rad for angles, and a length for slides, (k,).
 
-        The length is the root mean square radius of gyration along the motions that the constraints admit.
-        This length is independent of the unit of length and of the mount. The length is 1 if all coordinates
-        are angles or all are slides.
+        The length is the root mean square radius of gyration along the motions that the constraints admit,
+        over the coordinates that can move. This length is independent of the unit of length and of the mount.
+        The length is 1 if all these coordinates are angles or all are slides.
 
         Args:
             M: mass matrix, (nv, nv).
@@ -225,8 +228,11 @@ class AtRest:
         if not along.any() or along.all():
             return np.ones(len(own))
         light = np.einsum("ij,ji->i", free, np.linalg.solve(free.T @ M @ free, free.T))[own]
-        slide, turn = light[along].mean(), light[~along].mean()
-        return np.where(along, np.sqrt(slide / turn) if min(slide, turn) > 0.0 else 1.0, 1.0)
+        movable = light > MIN_MOBILITY * np.diag(np.linalg.inv(M))[own]
+        slides_light, turns_light = light[along & movable], light[~along & movable]
+        if not len(slides_light) or not len(turns_light):
+            return np.ones(len(own))
+        return np.where(along, np.sqrt(slides_light.mean() / turns_light.mean()), 1.0)
 
 
 def _free_basis(scaled: Array, root: Array) -> Array:

@@ -78,4 +78,11 @@ KNOWN: list[Known] = [
         scenes="touching .*",
         functions="simulate moreau",
     ),
+    Known(
+        "time stepping turns a free body by Cayley's map, and a body with rows by the joint's retraction",
+        ("mechanism 60", "an idle row", "simulate moreau"),
+        scenes="mechanism .*",
+        transformations="split by a weld|split by a lock|an idle row",
+        functions="simulate moreau",
+    ),
 ]

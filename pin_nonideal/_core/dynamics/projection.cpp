@@ -13,11 +13,16 @@ namespace pn {
 
 namespace {
 
+// Compute x := B^T lam, the move R x of rows with multipliers lam in the metric of M.
+void sum_rows(const Program& p, const Workspace& w, const VecX& lam, VecX& x) {
+    x.setZero();
+    for (int i : w.now.rows.blocks) add_transpose(p.blocks[i], w.now.B, lam, x);
+}
+
 // Compute x := R^-T B^T (B B^T)^-1 r, the least move in the metric of M that changes A x by r.
 void least_move(const Program& p, Workspace& w, VecX& x) {
     solve_rows(w.now.rows, w.scratch.r, w.scratch.lam_step);
-    x.setZero();
-    for (int i : w.now.rows.blocks) add_transpose(p.blocks[i], w.now.B, w.scratch.lam_step, x);
+    sum_rows(p, w, w.scratch.lam_step, x);
     solve_Rt(p.mechanism, w.now.terms, x);
 }
 
@@ -96,8 +101,7 @@ void broyden_step(Workspace& w, int count) {
 // Move q from position_start by R^-T B^T position_lam, on the given dofs.
 template <class... Dofs>
 void move_position(const Program& p, Workspace& w, VecX& q, const Dofs&... dofs) {
-    w.scratch.scaled.setZero();
-    for (int i : w.now.rows.blocks) add_transpose(p.blocks[i], w.now.B, w.scratch.position_lam, w.scratch.scaled);
+    sum_rows(p, w, w.scratch.position_lam, w.scratch.scaled);
     solve_Rt(p.mechanism, w.now.terms, dofs..., w.scratch.scaled);
     retract(p.mechanism, w.scratch.position_start.data(), w.scratch.scaled.data(), q.data());
 }
@@ -109,28 +113,33 @@ double rounding_part(const Workspace& w) { return w.now.rows.distance < near_sin
 
 void follow_constraints(const Program& p, Workspace& w, double h, VecX& move) {
     if (w.now.rows.blocks.empty()) return;
+    VecX &second = w.scratch.scaled, &third = w.scratch.work;
     w.scratch.r.setZero();
     for (int i : w.now.rows.blocks) {
         const Block& block = p.blocks[i];
         for (size_t k = 0; k < block.kept.size(); ++k)
             if (block.holonomic[k]) w.scratch.r[block.row + k] = -0.5 * h * h * w.now.b[block.row + k];
     }
-    solve_rows(w.now.rows, w.scratch.r, w.scratch.position_lam);
-    // The terms of the series do not decrease close to a singular position or at high speed. Skip the third order for such
-    // rows.
-    const double cube = h * h * h, second = product(w, w.scratch.position_lam, w.scratch.position_lam);
-    const double third = product(w, w.state.third_order_lam, w.state.third_order_lam);
-    if (cube * cube * third < projection_parameters.falling_square * second)
-        w.scratch.position_lam += cube * w.state.third_order_lam;
-    else w.state.third_order_lam.setZero();
-    w.scratch.scaled.setZero();
-    for (int i : w.now.rows.blocks) add_transpose(p.blocks[i], w.now.B, w.scratch.position_lam, w.scratch.scaled);
-    solve_Rt(p.mechanism, w.now.terms, w.scratch.scaled);
-    move += w.scratch.scaled;
+    solve_rows(w.now.rows, w.scratch.r, w.scratch.lam_step);
+    sum_rows(p, w, w.scratch.lam_step, second);
+    solve_rows(w.now.rows, w.state.third_order_gap, w.scratch.lam_step);
+    sum_rows(p, w, w.scratch.lam_step, third);
+    third *= h * h * h;
+    // The terms of the series do not decrease close to a singular position or at high speed. Skip the third order there.
+    if (third.squaredNorm() < projection_parameters.falling_square * second.squaredNorm()) second += third;
+    else w.state.third_order_gap.setZero();
+    solve_Rt(p.mechanism, w.now.terms, second);
+    move += second;
+    w.now.awaits_gap = true;
 }
 
-void learn_third_order(Workspace& w, double h) {
-    if (w.now.has_closing) w.state.third_order_lam += w.now.closing_lam / (h * h * h);
+void learn_third_order(const Program& p, Workspace& w, double h) {
+    if (w.now.awaits_gap) return;
+    for (int i : w.now.rows.blocks) {
+        const Block& block = p.blocks[i];
+        const auto rows = Eigen::seqN(block.row, block.kept.size());
+        w.state.third_order_gap(rows) += w.now.step_gap(rows) / (h * h * h);
+    }
 }
 
 static double position_floor(const Program& p, const Workspace& w) { return rounding_part(w) * scene_size(p, w); }
@@ -166,6 +175,10 @@ bool project_position(const Program& p, Workspace& w, double t, VecX& q, const V
         w.now.projected_gap = std::max(w.now.projected_gap, largest / std::max(floor, projection_parameters.no_floor));
     }
     const bool moves = largest > floor;
+    if (moves && w.now.awaits_gap) {
+        w.now.step_gap = w.scratch.r;
+        w.now.awaits_gap = false;
+    }
     configured &= !moves;
     int count = 0;      // steps since the factors were taken
     double rate = 1.0;  // ratio of the largest residuals of the last two steps

@@ -30,11 +30,11 @@ struct ProjectionParameters {
 inline constexpr ProjectionParameters projection_parameters{};
 
 // Add the least move that follows the constraints to third order to a step's move h v1, v1 = v0 + h a. Without it the
-// gap is h^2/2 b, because h v0 + h^2/2 a follows the constraints to second order. The multipliers of h^3 come from
+// gap is h^2/2 b, because h v0 + h^2/2 a follows the constraints to second order. The gap of order h^3 comes from
 // projections after earlier steps. The workspace must hold (v0, a).
 void follow_constraints(const Program& p, Workspace& w, double h, VecX& move);
-// Update the multipliers of h^3 after the projection at the end of such a step.
-void learn_third_order(Workspace& w, double h);
+// Update the gap of order h^3 after the projection at the end of such a step.
+void learn_third_order(const Program& p, Workspace& w, double h);
 
 // Project q. Return false if nothing had to move. The workspace must hold factors near (t, q) and is configured there on
 // return. Only a user's own rows read v. `configured`: the workspace is already configured at (t, q). `keeps_factors`: if

@@ -20,7 +20,7 @@ static void size(const Program& p, RunState& state) {
     state.unknown = VecX::Zero(p.unknowns());
     if (!p.gaps.empty() || !p.frictions.empty()) state.percussion = VecX::Zero(p.layout.rows);
     for (VecX& rate : state.last_rates.rate) rate = VecX::Zero(p.mechanism.nv);
-    state.third_order_lam = VecX::Zero(p.layout.rows);
+    state.third_order_gap = VecX::Zero(p.layout.rows);
 }
 
 static void size(const Program& p, Evaluation& now) {
@@ -43,7 +43,7 @@ static void size(const Program& p, Evaluation& now) {
     now.slipping.reserve(elements);
     now.A.assign(p.entries, 0.0);
     now.B.assign(p.entries, 0.0);
-    for (VecX* x : {&now.b, &now.lam, &now.closing_lam, &now.reactions.lam}) *x = VecX::Zero(p.layout.rows);
+    for (VecX* x : {&now.b, &now.lam, &now.closing_lam, &now.step_gap, &now.reactions.lam}) *x = VecX::Zero(p.layout.rows);
     now.rows.allocate(p.layout, static_cast<int>(p.blocks.size()), nv);
     now.ideal_rows.allocate(p.layout, static_cast<int>(p.blocks.size()), nv);
     now.body_force.assign(bodies, no_force);

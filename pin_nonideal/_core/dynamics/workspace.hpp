@@ -60,7 +60,7 @@ struct RunState {
     bool warm = false;             // true if `unknown` is an initial guess for the next solution
     VecX percussion;  // impulses of contacts and friction in the last time step, by row and divided by its length
     VelocityRates last_rates;
-    VecX third_order_lam;         // third-order multipliers of the step, divided by its cubed length
+    VecX third_order_gap;         // third-order part of the gaps that a step closes, divided by its cubed length
     bool has_ideal_row_choice = false;   // rows that are independent without sticking elements are chosen for this step
     Uniqueness unique = Uniqueness::shown;  // uniqueness of the motion in these modes, as last decided
     double spectral_bound = 0.0;            // bound on the growth of the implicit reaction equation at that decision
@@ -106,6 +106,8 @@ struct Evaluation {
     RowSystem rows, ideal_rows;  // ideal: of the constraints without sticking elements (see IdealMotion)
     VecX b, lam;  // by kept row
     VecX closing_lam;  // multipliers of the last closing move of the position
+    VecX step_gap;     // negative residuals at the end of a step that follows the constraints, before projection
+    bool awaits_gap = false;   // such a step has not been projected yet
     bool has_closing = false;  // closing_lam may be nonzero
     double projected_gap = 0.0, projected_rate = 0.0;  // largest residuals before projection, relative to rounding
     VecX tau, external, F, C, C_smooth, base_C, a;  // generalized forces and acceleration

@@ -58,6 +58,17 @@ void Runner::set(const Array& q_in, const Array& v_in, const std::optional<Array
     w->now.override_torque = map(*tau);
 }
 
+void Runner::read_directions(const Array& directions) {
+    directions_.assign(p->frictions.size(), Vec3::Zero());
+    size_t first = 0;
+    for (size_t e = 0; e < directions_.size(); ++e) {
+        const auto size = static_cast<size_t>(p->frictions[e].dim);
+        if (first + size > directions.shape(0)) throw std::invalid_argument("directions do not fit the friction elements");
+        std::copy_n(directions.data() + first, size, &directions_[e][0]);
+        first += size;
+    }
+}
+
 void Runner::choose_modes(double t, const std::optional<std::vector<Mode>>& modes) {
     state_.open.clear();
     if (!p->gaps.empty()) choose_contacts(t, modes);
@@ -86,6 +97,7 @@ void Runner::choose_friction(double t, const std::optional<std::vector<Mode>>& m
         if (joint_motion) joint_motion->to_modes(*p, *w, mode_query);
         return resolve_modes(*p, *w, t, q, v, mode_query);
     }
+    if (w->state.solves_directions) w->state.last_direction = directions_;
     set_modes(*p, *w, *modes);
     w->state.warm = false;
     begin_step(*p, *w, t, q, v);
@@ -108,24 +120,26 @@ void Runner::acceleration(nb::handle q_in, nb::handle v_in, double t, nb::handle
 
 namespace {
 
-// Guard that freezes functions of time during its lifetime.
-class Frozen {
+// Guard that sets a flag during its lifetime.
+class FlagGuard {
 public:
-    Frozen(Evaluation& now, bool frozen) : now_(now) { now_.frozen = frozen; }
-    ~Frozen() { now_.frozen = false; }
-    Frozen(const Frozen&) = delete;
-    Frozen& operator=(const Frozen&) = delete;
+    FlagGuard(bool& flag, bool value) : flag_(flag) { flag_ = value; }
+    ~FlagGuard() { flag_ = false; }
+    FlagGuard(const FlagGuard&) = delete;
+    FlagGuard& operator=(const FlagGuard&) = delete;
 
 private:
-    Evaluation& now_;
+    bool& flag_;
 };
 
 }  // namespace
 
 Instant Runner::solve(const Array& q_in, const Array& v_in, double t, const std::optional<Array>& tau,
-                      const std::optional<std::vector<Mode>>& modes, bool frozen) {
+                      const std::optional<std::vector<Mode>>& modes, bool frozen,
+                      const std::optional<Array>& directions) {
     set(q_in, v_in, tau);
-    const Frozen stands_still(w->now, frozen);
+    const FlagGuard stands_still(w->now.frozen, frozen), knows_directions(w->state.solves_directions, directions.has_value());
+    if (directions) read_directions(*directions);
     choose_modes(t, modes);
     if (!modes) {
         const LawResiduals laws = check_laws(*p, *w, t, q, v, state_);
@@ -394,7 +408,7 @@ nb::class_<Runner> bind_runner(nb::module_& m) {
     runner
         .def("acceleration", &Runner::acceleration, "q"_a, "v"_a, "t"_a, "tau"_a.none(), "out"_a)
         .def("solve", &Runner::solve, "q"_a, "v"_a, "t"_a = 0.0, "tau"_a = nb::none(), "modes"_a = nb::none(),
-             "frozen"_a = false)
+             "frozen"_a = false, "directions"_a = nb::none())
         .def("rows", &Runner::rows, "q"_a, "v"_a, "t"_a, "blocks"_a = nb::none())
         .def("residuals", &Runner::residuals, "q"_a, "v"_a, "t"_a)
         .def("row_lengths", &Runner::row_lengths, "q"_a, "v"_a, "t"_a, "own"_a = false, "blocks"_a = nb::none())

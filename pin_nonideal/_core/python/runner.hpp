@@ -45,9 +45,10 @@ struct Runner {
 
     // Write the acceleration into `out`, an array of nv numbers. Uses plain buffers, for calls in tight loops.
     void acceleration(nb::handle q_in, nb::handle v_in, double t, nb::handle tau, nb::handle out);
-    // Solve Eq. (40) at one state. `frozen`: functions of time stand still, for states of rest.
+    // Solve Eq. (40) at one state. `frozen`: functions of time stand still, for states of rest. `directions`: unit slip
+    // directions in the order of `slip_rows`, for given modes of elements that begin to slip.
     Instant solve(const Array& q_in, const Array& v_in, double t, const std::optional<Array>& tau,
-                  const std::optional<std::vector<Mode>>& modes, bool frozen);
+                  const std::optional<std::vector<Mode>>& modes, bool frozen, const std::optional<Array>& directions);
     int constraint_rank() const;
     // Return the rows of some blocks, including removed rows: A (by rows), b, residual, rate. Without a choice, return
     // the rows of all constraints and contacts in the order of their descriptions.
@@ -85,11 +86,13 @@ struct Runner {
 private:
     ReusedRun run_;  // kept run, which records only states
     MotionState state_;  // of the motion whose modes were chosen last
+    std::vector<Vec3> directions_;  // given slip directions of the elements
 
     // Set the state and the torques. Throw std::invalid_argument if they do not fit the model, which Python explains.
     void set(const Array& q_in, const Array& v_in, const std::optional<Array>& tau);
     // Return the chosen blocks, or all blocks of constraints and contacts in the order of their rows.
     std::vector<int> chosen_blocks(const std::optional<std::vector<int>>& blocks) const;
+    void read_directions(const Array& directions);
     // Set the modes: the given ones, else by velocity, and at rest by the complementarity problem.
     void choose_modes(double t, const std::optional<std::vector<Mode>>& modes);
     void choose_contacts(double t, const std::optional<std::vector<Mode>>& modes);

@@ -12,7 +12,7 @@ void SemiImplicitEuler::advance(System& system) {
     retract(system.p.mechanism, step_.y0.data(), system.v.data(), step_.y1.data());
 }
 
-void SemiImplicitEuler::learn(System& system) const { learn_third_order(system.w, step_.h); }
+void SemiImplicitEuler::learn(System& system) const { learn_third_order(system.p, system.w, step_.h); }
 
 void SemiImplicitEuler::interpolate(double part, VecX& y) const {
     y = step_.y0 + part * delta_;
