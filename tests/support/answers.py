@@ -30,7 +30,7 @@ OF_FIRST_ORDER = 3e-2
 FLOORS = {"q": 0.1, "v": 0.1, "a": 10.0, "force": 1.0, "t": 0.1, "energy": 1.0, "number": 1.0, "rates": 1.0}
 MIN_LOAD = 1e-3  # N m
 MIN_ENERGY = 1e-3  # J
-WALL = 10.0  # wall time of one run [s]
+WALL = 30.0  # wall time of one run [s]
 
 
 @dataclass(frozen=True)

@@ -85,4 +85,10 @@ KNOWN: list[Known] = [
         transformations="split by a weld|split by a lock|an idle row",
         functions="simulate moreau",
     ),
+    Known(
+        "Radau at a tight tolerance stops at dead centers, with one error or another",
+        ("side rods 0", "turned mount", "simulate Radau"),
+        scenes="side rods .*",
+        functions="simulate Radau",
+    ),
 ]

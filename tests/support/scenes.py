@@ -235,7 +235,7 @@ def random_cases(count: int) -> dict[str, Maker]:
         "Bennett": (loops.bennett, {"duration": 3.0}),
         "side rods": (loops.side_rods, {"duration": 2.0}),
         "driven Cardan": (lambda seed: loops.cardan(seed + 3), {"duration": 1.0, "outputs": 100}),
-        "free Cardan": (lambda seed: loops.cardan(seed, driven=False), {"duration": 0.3}),
+        "free Cardan": (lambda seed: loops.cardan(seed, driven=False), {"duration": 0.3, "dt": 2e-4}),
         "drive": (loops.drive, {"duration": 20.0}),
         "drive with caster": (lambda seed: loops.drive(seed, caster=True), {"duration": 10.0}),
         "linkage": (loops.linkage, {"duration": 0.5}),

@@ -5,6 +5,7 @@
 // at the start of each step (decide_rows) and kept over the step.
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include "constraints/layout.hpp"
@@ -44,6 +45,8 @@ struct RowSystem : RowChoice {
     std::vector<int> columns;
     LoadSharing sharing;
 
+    int active_count() const { return static_cast<int>(std::count(active.begin(), active.end(), char(1))); }
+    int required_count() const { return static_cast<int>(std::count(required.begin(), required.end(), char(1))); }
     void allocate(const RowLayout& layout, int blocks, int nv);
     // Select the blocks with a required row, which are `among` some blocks, and use all required rows.
     void use_required(const RowLayout& layout, const std::vector<Block>& all, const std::vector<int>& among);

@@ -61,7 +61,7 @@ bool depenetrate(const Program& p, Workspace& w, double t, VecX& q, const VecX& 
     ConeComplementarity solver;
     bool outside = false;
     for (int k = 0; k < depenetration_parameters.max_steps; ++k) {
-        begin_rows(p, w, t, q, v);
+        begin_rows(p, w, t, q, v, max_rank_near(w));
         project_position(p, w, t, q, v, true);
         width = widths(p, w, t, v, gaps);
         outside = width.minCoeff() >= -rounding;
@@ -75,14 +75,14 @@ bool depenetrate(const Program& p, Workspace& w, double t, VecX& q, const VecX& 
     }
     if (!outside) {  // the next step detects the penetration and stops the approach
         q = start;
-        begin_rows(p, w, t, q, v);
+        begin_rows(p, w, t, q, v, max_rank_near(w));
         project_position(p, w, t, q, v, true);
         width = widths(p, w, t, v, gaps);
     }
     std::vector<char> touch = closed;
     for (size_t k = 0; k < gaps.size(); ++k) touch[gaps[k]] = std::abs(width[k]) <= rounding;
     set_contacts(p, w, touch, modes);
-    return begin_rows(p, w, t, q, v);
+    return begin_rows(p, w, t, q, v, max_rank_near(w));
 }
 
 }  // namespace pn

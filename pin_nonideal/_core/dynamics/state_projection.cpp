@@ -49,7 +49,7 @@ void project_out(const Program& p, Workspace& w, double t, VecX& q, const VecX& 
 
 bool project_onto_dependent(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
     if (!w.now.rows.redundant || !p.gaps.empty() || w.state.sticks_anywhere()) return false;
-    const int rank = static_cast<int>(std::count(w.now.rows.active.begin(), w.now.rows.active.end(), char(1)));
+    const int rank = w.now.rows.active_count();
     bool moved = false;
     const auto is_open = [&] {
         return dependent_residual(p, w) > state_projection_parameters.creeping_gap * scene_size(p, w);
@@ -91,8 +91,9 @@ void project_and_evaluate(const Program& p, Workspace& w, double t, VecX& q, Vec
     solve_dynamics(p, w, t, v);
 }
 
-bool choose_rows_near(const Program& p, Workspace& w, double t, VecX& q, const VecX& v) {
-    if (w.now.rows.blocks.empty() || !w.now.rows.orthogonal) return false;
+bool choose_rows_near(const Program& p, Workspace& w, double t, VecX& q, const VecX& v, int max_rank) {
+    if (w.now.rows.blocks.empty()) return false;
+    if (!w.now.rows.orthogonal && w.now.rows.active_count() <= max_rank) return false;
     if (!p.gaps.empty() || w.state.sticks_anywhere()) {
         choose_rows(p, w);
         return false;
@@ -100,7 +101,7 @@ bool choose_rows_near(const Program& p, Workspace& w, double t, VecX& q, const V
     const VecX start = q;
     bool moved = false;
     for (double tolerance : state_projection_parameters.tolerances_near) {
-        choose_rows(p, w, tolerance);
+        choose_rows(p, w, tolerance, max_rank);
         moved = project_position(p, w, t, q, v);
         if (dependent_residual(p, w) <= state_projection_parameters.creeping_gap * scene_size(p, w)) break;
         q = start;

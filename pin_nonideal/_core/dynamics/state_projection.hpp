@@ -2,6 +2,8 @@
 // projection that returns a bool returns false if nothing had to move.
 #pragma once
 
+#include <climits>
+
 #include "dynamics/projection.hpp"
 
 namespace pn {
@@ -34,8 +36,9 @@ bool project_onto_dependent(const Program& p, Workspace& w, double t, VecX& q, c
 bool project_past_sticking(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
 
 // Choose rows at a state near the constraints without rows from an earlier step, and project the position onto them.
-// The workspace must be configured at this state.
-bool choose_rows_near(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
+// The workspace must be configured at this state. `max_rank`: rank on the constraints, if known. Off them dependent rows
+// seem independent.
+bool choose_rows_near(const Program& p, Workspace& w, double t, VecX& q, const VecX& v, int max_rank = INT_MAX);
 
 // Project a state without factors from an earlier step. Uses the factors and independent rows at the state itself, with
 // all elements slipping.

@@ -83,15 +83,17 @@ static void choose_rows_anew(const Program& p, Workspace& w, int max_rank = INT_
     ++w.counters.factorizations;
 }
 
-bool configure_step(const Program& p, Workspace& w) {
+int max_rank_near(const Workspace& w) { return w.now.rows.required_count() - std::max(w.now.dependent_at_start, 0); }
+
+bool configure_step(const Program& p, Workspace& w, int max_rank) {
     w.state.has_ideal_row_choice = false;
     if (w.now.rows.blocks.empty()) return false;
     const RowSystem& rows = w.now.rows;
     const bool due = p.gaps.empty() && is_choice_due(w.now.rows);  // contacts are chosen with their modes
-    if (!rows.orthogonal && !due) return false;
+    if (!rows.orthogonal && !due && rows.active_count() <= max_rank) return false;
     // The Cholesky factor proves that the active rows are independent: a new choice has at most as many.
-    const bool keeps_rank = !rows.orthogonal;
-    choose_rows_anew(p, w, keeps_rank ? std::count(rows.active.begin(), rows.active.end(), char(1)) : INT_MAX);
+    if (!rows.orthogonal) max_rank = std::min(max_rank, rows.active_count());
+    choose_rows_anew(p, w, max_rank);
     return true;
 }
 
@@ -156,19 +158,21 @@ void restore_motion(const Program& p, Workspace& w, double t, const VecX& v) {
     if (tolerance >= step_start_parameters.max_unheld_part) choose(first_tolerance);
 }
 
-bool begin_rows(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+bool begin_rows(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, int max_rank) {
     configure(p, w, t, q, v);
-    return configure_step(p, w);
+    return configure_step(p, w, max_rank);
 }
 
 void begin_rows_inside(const Program& p, Workspace& w, double t0, const VecX& q0, double t, const VecX& q,
                        const VecX& v) {
+    const RowSystem& rows = w.now.rows;
     configure(p, w, t, q, v);
-    if (!w.now.rows.orthogonal) return;
+    if (rows.blocks.empty() || (!rows.orthogonal && w.now.dependent_at_start == 0)) return;
     begin_rows(p, w, t0, q0, v);
-    const auto rank = std::count(w.now.rows.active.begin(), w.now.rows.active.end(), char(1));
+    const int rank = rows.active_count();
+    w.now.dependent_at_start = rows.required_count() - rank;
     configure(p, w, t, q, v);
-    if (w.now.rows.orthogonal) choose_rows_anew(p, w, static_cast<int>(rank));
+    if (rows.orthogonal) choose_rows_anew(p, w, rank);
 }
 
 void project_into_modes(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {

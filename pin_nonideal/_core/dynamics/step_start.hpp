@@ -1,6 +1,8 @@
 // Evaluation at the start of a step, with the choice of independent rows for the step.
 #pragma once
 
+#include <climits>
+
 #include "dynamics/workspace.hpp"
 
 namespace pn {
@@ -22,13 +24,15 @@ inline constexpr StepStartParameters step_start_parameters{};
 void begin_step(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 // Evaluate in a configured workspace at another velocity. `chosen`: the rows were just chosen.
 void continue_step(const Program& p, Workspace& w, double t, const VecX& v, bool chosen = false);
-// Configure and choose the independent rows, without forces. Return true if it chose rows.
-bool begin_rows(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
-// Configure inside a step, which leaves the constraints. Off the constraints dependent rows seem independent. If the
-// Cholesky factor does not decide, the independent rows are chosen at the step's start (t0, q0).
+// Configure and choose the independent rows, at most `max_rank`, without forces. Return true if it chose rows.
+bool begin_rows(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, int max_rank = INT_MAX);
+// Configure inside a step, which leaves the constraints. Off the constraints dependent rows seem independent, so the rank
+// is determined at the step's start (t0, q0), unless all rows were independent at an earlier start.
 void begin_rows_inside(const Program& p, Workspace& w, double t0, const VecX& q0, double t, const VecX& q, const VecX& v);
-// Choose the independent rows in a configured workspace. Return true if it chose rows.
-bool configure_step(const Program& p, Workspace& w);
+// Choose the independent rows in a configured workspace, at most `max_rank`. Return true if it chose rows.
+bool configure_step(const Program& p, Workspace& w, int max_rank = INT_MAX);
+// Return the rank of the required rows near the start of a time step, if the same constraints depend on others there.
+int max_rank_near(const Workspace& w);
 // Choose the rows in a configured workspace, project v onto A v + phi_t = 0, and evaluate. Return true if v changed.
 bool begin_step_on_rates(const Program& p, Workspace& w, double t, VecX& v);
 // Do the same without a choice of rows: `chosen` is true if the rows were just chosen. Skip the evaluation unless

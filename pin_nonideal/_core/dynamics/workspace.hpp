@@ -103,6 +103,9 @@ struct Evaluation {
     std::vector<char> selected;                  // closed flags by gap, at the last selection of rows
     std::vector<int> loaded_elements, slipping;  // elements with load (sticking or slipping), and slipping elements
     std::vector<double> A, B;
+    // Number of rows of constraints that depend on others, at the start of the last time step whose rows were chosen. A
+    // negative number is not known.
+    int dependent_at_start = -1;
     RowSystem rows, ideal_rows;  // ideal: of the constraints without sticking elements (see IdealMotion)
     VecX b, lam;  // by kept row
     VecX closing_lam;  // multipliers of the last closing move of the position

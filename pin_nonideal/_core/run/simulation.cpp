@@ -34,6 +34,7 @@ Simulation::Simulation(const Program& program, Workspace& workspace, const Optio
     // Time stepping solves for velocities. Accelerations are only recorded, so the solution nearest to the last one
     // suffices.
     const bool in_time = options.method.scheme == Method::Scheme::moreau;
+    w.now.dependent_at_start = -1;
     w.continues = options.continues || (in_time && system.ng > 0);
     progress.slip_at_start.assign(p.frictions.size(), 0.0);
     progress.in_tension.assign(p.contacts.size(), 0);

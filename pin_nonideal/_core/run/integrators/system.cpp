@@ -159,10 +159,12 @@ void System::settle(double t, VecX& y, VecX& dy, bool evaluates, bool may_lack_m
     };
     // Factor the rows of the new modes. Sticking elements must not move during the projection.
     configure(p, w, t, q, v);
-    const bool near = ng == 0 && w.now.rows.orthogonal && !w.state.sticks_anywhere();
+    const int max_rank = max_rank_near(w);
+    const bool undecided = w.now.rows.orthogonal || w.now.rows.active_count() > max_rank;
+    const bool near = ng == 0 && undecided && !w.state.sticks_anywhere();
     const double before = energy && !w.now.rows.blocks.empty() ? total() : 0.0;
-    bool moved = near && choose_rows_near(p, w, t, q, v);
-    bool chosen = near || configure_step(p, w);
+    bool moved = near && choose_rows_near(p, w, t, q, v, max_rank);
+    bool chosen = near || configure_step(p, w, max_rank);
     const double longest_single = longest_single_move(p, w);
     if (longest_single > 0.0) q_before_ = q;
     moved |= project_position(p, w, t, q, v, true, !evaluates);
