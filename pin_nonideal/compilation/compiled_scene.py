@@ -116,13 +116,16 @@ class CompiledScene:
             stand_in = core.Builder(model, core.Provider[spec.terms])
             lower(plain, stand_in, resolver)
             sampled = stand_in.finish()
-        self.dropped, duplicate_rows = zero_rows(model, q0, self.program, sampled, spec.assembly_tolerance)
+        try:
+            self.dropped, copies = zero_rows(model, q0, self.program, sampled, spec.assembly_tolerance)
+        except core.CoreFailure as failure:
+            raise self.named(failure) from None
         if self.dropped:
             idle = {(name, row) for name, row, _ in self.dropped}
             for block, c in enumerate(self.program.constraints):
                 acting_rows = [row for row in range(c.count) if (c.name, row) not in idle]
                 builder.select_rows(block, acting_rows)
-            for row, first, factor in duplicate_rows:
+            for row, first, factor in copies:
                 builder.add_copy(row, first, factor)
             self.program = builder.finish()
         idle_names = {name for name, _, _ in self.dropped}

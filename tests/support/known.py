@@ -91,4 +91,17 @@ KNOWN: list[Known] = [
         scenes="side rods .*",
         functions="simulate Radau",
     ),
+    Known(
+        "Radau as the method of the scene stops at dead centers at a tight tolerance",
+        ("side rods 0", "Radau", "simulate dop853"),
+        scenes="side rods .*",
+        transformations="Radau",
+    ),
+    Known(
+        "fixed steps pass the breaks of a user's rows, which nothing states",
+        ("cart 17", "rows by hand, times 1e4", "simulate rk4"),
+        scenes="cart .*",
+        transformations="rows by hand.*",
+        functions="simulate (rk4|semi_implicit_euler|moreau)|stepper",
+    ),
 ]

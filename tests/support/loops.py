@@ -73,7 +73,9 @@ def side_rods(seed: int) -> pn.Scene:
             body(model, 0, pin.JointModelRY(), f"wheel{k}", 2.0, place=place, inertia=0.05 * np.eye(3))
         )
         frame(model, f"pin{k}", joints[-1], at((radius, 0.0, 0.0)))
-    rod = body(model, joints[0], pin.JointModelRY(), "rod", 1.0, place=at((radius, 0.0, 0.0)), inertia=ROD)
+        if k == 0:  # branch by branch, as Pinocchio's algorithms need
+            end = at((radius, 0.0, 0.0))
+            rod = body(model, joints[0], pin.JointModelRY(), "rod", 1.0, place=end, inertia=ROD)
     for k in range(1, wheels):
         frame(model, f"eye{k}", rod, at((places[k] - places[0], 0.0, 0.0)))
         anchors.append(pn.PointAnchor(f"eye{k}", f"pin{k}", name=f"rod {k}"))

@@ -223,7 +223,7 @@ def carried_along(case: Case, rate: float, growth: float) -> Image | None:
         carrier,
         moving=True,
         as_steps_shorten=growth != 0.0,
-        without=frozenset({"energies", "poses", "rank"}),
+        without=frozenset({"energies", "balance", "poses", "rank"}),
     )
 
 

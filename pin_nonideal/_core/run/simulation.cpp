@@ -28,7 +28,7 @@ Simulation::Simulation(const Program& program, Workspace& workspace, const Optio
       impacts(system, progress, watch, run_options, output, recording),
       time_stepping(system, progress, watch, run_options, torques, output, warnings, value_events, recording),
       chatter(system, progress, run_options, stiffness, time_stepping, recording),
-      modes(system, progress, run_options, torques, output, impacts, chatter, recording) {
+      modes(system, progress, run_options, torques, output, impacts, time_stepping, chatter, recording) {
     progress.y = progress.rate = progress.configured_y = VecX::Zero(system.ny);
     guess = w.state.unknown;
     // Time stepping solves for velocities. Accelerations are only recorded, so the solution nearest to the last one
@@ -312,14 +312,15 @@ bool Simulation::recover(const Failure& failure) {
     const bool at_hand_over = hand_over_ahead || progress.t - progress.hand_over_time <= ChatterDetector::parameters.window;
     const bool of_hand_over =
         (at_hand_over && ModeChanges::is_of_closed_contacts(failure)) || modes.is_of_contradicting_contacts(failure);
+    const bool of_drive = modes.contradicts_drive(failure);
     const bool is_recoverable = of_hand_over || ModeChanges::is_recoverable(failure);
-    if (!can_switch_modes && !is_recoverable) return false;
+    if (!can_switch_modes && !is_recoverable && !of_drive) return false;
     bool has_switched = false;
     attempt([&] {  // a failure means that the current modes have no motion at the step's start
         back_to_start();
         has_switched = can_switch_modes && modes.force_switch();
     });
-    return has_switched || modes.bridge_with_time_stepping(failure, of_hand_over);
+    return has_switched || modes.bridge_with_time_stepping(failure, of_hand_over) || (of_drive && modes.follow_drive());
 }
 
 // The loads of a stage that diverged are no guess for a shorter step.

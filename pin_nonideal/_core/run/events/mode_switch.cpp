@@ -15,7 +15,7 @@ static bool is_of_modes(const Failure& failure) {
 }
 
 ModeChanges::ModeChanges(System& system, Progress& progress, const Options& options, Torques& torques, Output& output,
-                         ImpactHandler& impacts, ChatterDetector& chatter, Recording& out)
+                         ImpactHandler& impacts, TimeStepping& time_stepping, ChatterDetector& chatter, Recording& out)
     : p(system.p),
       w(system.w),
       system_(system),
@@ -24,6 +24,7 @@ ModeChanges::ModeChanges(System& system, Progress& progress, const Options& opti
       torques_(torques),
       output_(output),
       impacts_(impacts),
+      time_stepping_(time_stepping),
       chatter_(chatter),
       out_(out) {}
 
@@ -98,6 +99,41 @@ bool ModeChanges::force_switch() {
     progress_.forced_switch_time = progress_.t;
     output_.now();
     return true;
+}
+
+bool ModeChanges::contradicts_drive(const Failure& failure) const {
+    return failure.kind == Failure::Kind::inconsistent && p.moves_in_time && w.state.sticks_anywhere() &&
+           !options_.method.outside();
+}
+
+bool ModeChanges::follow_drive() {
+    const RunState before = w.state;
+    const auto keep = [&] {
+        set_contacts(p, w, before.closed, before.mode);
+        w.state = before;
+    };
+    const auto failure = attempt([&] {
+        switch_modes(system_, progress_.t, progress_.y, progress_.rate, FoundEvent{FoundEvent::Kind::touch, -1, progress_.t});
+    });
+    if (failure || std::equal(before.mode.begin(), before.mode.end(), w.state.mode.begin())) {
+        keep();
+        if (attempt([&] { step_with_drive(); })) return false;
+    }
+    impacts_.remember_gaps();
+    for (const Event& change : changes_since(system_, progress_.t, before.closed, before.mode)) out_.events.push_back(change);
+    output_.configured_now();
+    output_.now();
+    return true;
+}
+
+// A motion that starts smoothly has no acceleration at first. Its speed shows which elements slip.
+void ModeChanges::step_with_drive() {
+    const double last = progress_.t - drive_end_ < drive_length_ ? drive_length_ : 0.0;
+    drive_length_ = std::max(2.0 * last, mode_switch_parameters.drive_step);
+    const double stop = std::min(options_.end(), progress_.t + drive_length_);
+    while (progress_.t < stop) time_stepping_.step(drive_length_, stop, options_.end());
+    drive_end_ = progress_.t;
+    switch_modes(system_, progress_.t, progress_.y, progress_.rate, std::nullopt);
 }
 
 void ModeChanges::bridge_chatter(int element) {

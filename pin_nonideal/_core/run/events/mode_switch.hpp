@@ -15,6 +15,8 @@ struct ModeSwitchParameters {
     double max_creep_speed = 1e-8;
     // Length of a tiny step, relative to the time, in seconds below 1 s. Motions over shorter steps are lost in rounding.
     double tiny_step = 1e-10;
+    // Length [s] of the first time step in which a prescribed motion starts. Further steps are twice as long.
+    double drive_step = 1e-7;
 };
 
 inline constexpr ModeSwitchParameters mode_switch_parameters{};
@@ -24,7 +26,7 @@ inline double tiny_step_at(double t) { return mode_switch_parameters.tiny_step *
 class ModeChanges {
 public:
     ModeChanges(System& system, Progress& progress, const Options& options, Torques& torques, Output& output,
-                ImpactHandler& impacts, ChatterDetector& chatter, Recording& out);
+                ImpactHandler& impacts, TimeStepping& time_stepping, ChatterDetector& chatter, Recording& out);
 
     // Switch modes and state at an event that has been reached.
     void change(FoundEvent event);
@@ -42,6 +44,10 @@ public:
     static bool is_of_closed_contacts(const Failure& failure);
     // Check if rows of closed contacts alone contradict each other. Such rows are nearly dependent.
     bool is_of_contradicting_contacts(const Failure& failure) const;
+    // Let elements that stick slip where prescribed motions start to move them: by their accelerations, or else after time
+    // steps in which they gain speed. `contradicts_drive` checks if sticking elements contradict these motions.
+    bool contradicts_drive(const Failure& failure) const;
+    bool follow_drive();
     // Bridge an accumulation of events, and select modes at the new state.
     void bridge_chatter(int element);
     // Bridge steps with closed contacts that no longer advance the time, and select modes at the new state.
@@ -55,6 +61,7 @@ private:
     static bool is_undecided(const Failure& failure);
     bool is_creeping() const;
     void select_new_modes();
+    void step_with_drive();
 
     const Program& p;
     Workspace& w;
@@ -64,8 +71,10 @@ private:
     Torques& torques_;
     Output& output_;
     ImpactHandler& impacts_;
+    TimeStepping& time_stepping_;
     ChatterDetector& chatter_;
     Recording& out_;
+    double drive_end_ = -HUGE_VAL, drive_length_ = 0.0;  // end and length [s] of the last time step with a drive
 };
 
 }  // namespace pn

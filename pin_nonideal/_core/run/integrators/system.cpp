@@ -119,14 +119,15 @@ void System::project_and_evaluate(double t, VecX& y, VecX& dy) {
 }
 
 // Call `act` at the end of a time step whose modes may allow no motion. If the laws allow no motion, the friction of the
-// step determines the motion: always with `may_lack_motion`, else only if the solver found no motion of contacts, which
-// proves nothing. Return false if the friction of the step determines the motion.
+// step determines the motion: always with `may_lack_motion` and without contacts, else only if the solver found no motion
+// of contacts, which proves nothing. The friction of a step without contacts satisfies the laws, and holds an element whose
+// slip ends in the next step. Return false if the friction of the step determines the motion.
 template <class Act>
 bool System::attempt_motion(double t, bool may_lack_motion, const Act& act) {
     const auto failure = attempt({Failure::Kind::paradox, Failure::Kind::not_converged}, act);
     if (!failure) return true;
-    const bool undecided = failure->solutions == Failure::Solutions::unproven && ng > 0;
-    if (!(may_lack_motion || undecided)) throw *failure;
+    const bool satisfied = ng == 0 || failure->solutions == Failure::Solutions::unproven;
+    if (!(may_lack_motion || satisfied)) throw *failure;
     if (may_lack_motion) {
         w.now.no_motion = true;
         w.now.several_element = failure->elements.empty() ? 0 : failure->elements.front();

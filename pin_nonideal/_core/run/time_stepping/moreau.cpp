@@ -11,6 +11,7 @@
 #include "dynamics/step_start.hpp"
 #include "complementarity/socp_mode_newton.hpp"
 #include "friction/stick_slip.hpp"
+#include "math/decompositions.hpp"
 #include "run/time_stepping/end_modes.hpp"
 #include "tree/lie_group.hpp"
 
@@ -95,6 +96,18 @@ void Moreau::solve_without_friction(double t) {
 void Moreau::respond() {
     problem_.respond_in_step(p, w);
     problem_.clean(p, w);
+    find_dependent();
+}
+
+// Check if some forces of the elements do not move the bodies. Loads, and the limits by them, are then not unique.
+void Moreau::find_dependent() {
+    are_dependent_ = false;
+    if (!p.needs_reactions || w.now.rows.blocks.empty()) return;
+    unit_ = problem_.W.diagonal().cwiseSqrt().cwiseInverse();
+    Cholesky factor;
+    const bool is_definite = unit_.allFinite() && factor.compute(unit_.asDiagonal() * problem_.W * unit_.asDiagonal());
+    const double root = is_definite ? factor.factor().diagonal().minCoeff() : 0.0;
+    are_dependent_ = root * root < parameters.dependent_pivot;
 }
 
 // Set up the friction problem. Slip velocities at the step's end over h replace slip accelerations.
@@ -171,6 +184,17 @@ double Moreau::update_limits(double t) {
     return change;
 }
 
+// Replace the limits by the next iterate after the limits for which the force was found.
+void Moreau::accelerate_limits() {
+    const Eigen::Index ne = system_.ne, rows = problem_.rows;
+    VecX from(ne + rows), to(ne + rows);
+    from << force_limit_.size, force_limit_.middle;
+    to << limit_.size, limit_.middle;
+    const VecX next = loads_.next(from, to);
+    limit_.size = next.head(ne).cwiseMax(0.0);
+    limit_.middle = next.tail(rows);
+}
+
 // Solve for the friction forces, with limits for the loads of this step.
 void Moreau::solve_friction(double t) {
     int at = 0;  // warm start from forces of the last step, whose modes usually persist
@@ -179,6 +203,7 @@ void Moreau::solve_friction(double t) {
             initial_force_[at++] = w.state.percussion[p.blocks[friction.block].row + k];
     force_.setZero(problem_.rows);
     double last_change = HUGE_VAL;
+    loads_.restart();
     for (int pass = 0; pass < parameters.max_load_passes; ++pass) {
         // Limits that depend on no load need no motion.
         if (pass == 0 || p.needs_reactions) apply_forces();
@@ -188,14 +213,38 @@ void Moreau::solve_friction(double t) {
                             change <= parameters.stall_load_tolerance * largest;
         last_change = change;
         if (pass > 0 && (change <= parameters.load_tolerance * largest || stalls || !p.needs_reactions)) return;
+        if (pass > 0) accelerate_limits();
         if (!symmetric_limits_) force_ = friction_program(problem_.W, problem_.alpha0, problem_.dims, limit_);
         else if (problem_.rows > 0 && boxes_)
             box_.solve(problem_.W, problem_.alpha0, limit_.size, &initial_force_, force_);
         else force_ = friction_program(problem_.W, problem_.alpha0, problem_.dims, limit_.size, &initial_force_);
-        initial_force_ = force_;
         force_limit_ = limit_;
+        if (are_dependent_) share_loads();
+        initial_force_ = force_;
         if (pass + 1 == parameters.max_load_passes) throw Failure(Failure::Kind::not_converged, t, problem_.elements);
     }
+}
+
+// Replace the forces of elements that stick by the forces of least norm with the same motion, if their limits allow. The
+// components of each element count with its mean response.
+void Moreau::share_loads() {
+    std::vector<int> sticking;
+    for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e) {
+        if (!is_within_limit(e, at)) continue;
+        const int dim = problem_.dims[e];
+        const double response = std::sqrt(problem_.W.diagonal().segment(at, dim).mean());
+        unit_.segment(at, dim).setConstant(response > 0.0 ? 1.0 / response : 0.0);
+        for (int k = 0; k < dim; ++k) sticking.push_back(at + k);
+    }
+    if (sticking.empty()) return;
+    const VecX unit = unit_(sticking);
+    const MatX W = unit.asDiagonal() * problem_.W(sticking, sticking);
+    const VecX shared = least_squares(W * unit.asDiagonal(), W * force_(sticking), parameters.dependent_pivot);
+    own_force_ = force_;
+    force_(sticking) = shared.cwiseProduct(unit);
+    for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e)
+        if (force_.segment(at, problem_.dims[e]) != own_force_.segment(at, problem_.dims[e]) && !is_within_limit(e, at))
+            return force_.swap(own_force_);
 }
 
 // Compute the velocity and the modes at the step's end. A force below its limit holds its element.

@@ -11,6 +11,7 @@
 #include "complementarity/box_lcp.hpp"
 #include "complementarity/friction_limits.hpp"
 #include "friction/problem.hpp"
+#include "math/anderson.hpp"
 #include "run/integrators/system.hpp"
 #include "run/time_stepping/free_flight.hpp"
 #include "run/time_stepping/joint_drives.hpp"
@@ -25,6 +26,8 @@ struct MoreauParameters {
     double stall_load_tolerance = 1e-9, min_load_decrease = 0.5;
     double limit_rounding = 1e-12;     // distance of a force at its limit, relative to the limit
     double slip_rest_rounding = 1e-9;  // slip at the end that counts as none, relative to that without friction
+    // Pivot of the response of unit forces, relative to its diagonal, below which forces depend on each other.
+    double dependent_pivot = 1e-10;
     // Maximum number of passes for load-dependent limits.
     int max_load_passes = 60;
 };
@@ -50,6 +53,9 @@ private:
     bool give_way();
     bool is_within_limit(int e, int at);
     double slip_rounding() const;
+    void find_dependent();
+    void share_loads();
+    void accelerate_limits();
     void apply_forces();
     double update_limits(double t);
     void end_velocity();
@@ -72,8 +78,10 @@ private:
     bool boxes_ = true;  // every element has one direction
     VecX force_, power_;                  // forces and powers of the elements
     FrictionLimits limit_, force_limit_;  // current limits, and the limits for which the force was found
+    bool are_dependent_ = false;    // some forces do not move the bodies: elements that stick share loads
     bool symmetric_limits_ = true;  // all limits are equal forward and backward
-    VecX shifted_;
+    AndersonAcceleration loads_;
+    VecX shifted_, unit_, own_force_;
 };
 
 }  // namespace pn

@@ -1,0 +1,118 @@
+"""Joints with dry friction that prescribed motions move from rest, beside the motion without friction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import pin_nonideal as pn
+
+from ....support.loops import at
+from ....support.mechanisms import body, empty, frame
+from ....support.seeds import ranges
+
+COULOMB = 0.7
+DURATION = 2.0
+METHODS: list[dict[str, Any]] = [
+    {"rtol": 1e-9},
+    {"method": "dopri5", "rtol": 1e-9},
+    {"method": "rk4", "dt": 1e-3},
+    {"method": "semi_implicit_euler", "dt": 1e-3},
+    {"method": "moreau", "dt": 1e-3},
+]
+
+
+def minimum_jerk(t: float) -> tuple[float, float, float]:
+    """0.3 between 0.5 s and 1.5 s, from rest to rest, with a known second derivative."""
+    s = min(max(t - 0.5, 0.0), 1.0)
+    return (
+        0.3 * s**3 * (10.0 - 15.0 * s + 6.0 * s**2),
+        0.3 * 30.0 * s**2 * (1.0 - s) ** 2,
+        0.3 * 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s),
+    )
+
+
+MOTIONS: dict[str, Callable[[], Any]] = {
+    "spline from rest to rest": lambda: pn.spline([0.5, 1.5], [0.0, 0.3]),
+    "cubic": lambda: pn.polynomial([0.0, 0.0, 0.0, 0.2]),
+    "quartic, backward": lambda: pn.polynomial([0.0, 0.0, 0.0, 0.0, -0.1]),
+    "minimum jerk": lambda: minimum_jerk,
+}
+
+
+def carriage() -> tuple[pin.Model, int]:
+    """Return a carriage on a rail with a pendulum."""
+    model = empty()
+    joint = body(model, 0, pin.JointModelPX(), "carriage", 2.0)
+    body(model, joint, pin.JointModelRY(), "pendulum", 1.0, lever=(0.0, 0.0, -0.5), inertia=0.01 * np.eye(3))
+    return model, joint
+
+
+@pytest.mark.parametrize("options", METHODS, ids=lambda options: options.get("method", "dop853"))
+@pytest.mark.parametrize("motion", MOTIONS)
+def test_a_carriage_with_friction_starts(motion: str, options: dict[str, Any]) -> None:
+    model, _ = carriage()
+    drive = pn.PrescribedMotion("carriage", MOTIONS[motion](), name="drive")
+    free = pn.Scene(model, constraints=[drive], q0=[0.0, 0.3])
+    rough = free.replace(laws=[pn.JointFriction("carriage", coulomb=COULOMB)])
+    options = {**options, "output_dt": 0.05, "record": ("a", "forces")}
+    one, other = (pn.simulate(scene, DURATION, **options) for scene in (free, rough))
+    accuracy = 1e-7 if "rtol" in options else 1e-2
+    q, other_q, v, force, other_force = (
+        run_values[run.grid]
+        for run_values, run in (
+            (one.q, one),
+            (other.q, other),
+            (one.v, one),
+            (one.lam[:, 0], one),
+            (other.lam[:, 0], other),
+        )
+    )
+    np.testing.assert_allclose(other_q, q, atol=accuracy)
+    # Friction changes only the force of the drive.
+    moving = np.abs(v[:, 0]) > 1e-3
+    expected = COULOMB * np.sign(v[:, 0])
+    np.testing.assert_allclose(
+        (other_force - force)[moving], expected[moving], atol=max(1e-5, 100.0 * accuracy)
+    )
+    if "rtol" in options:
+        assert [e.kind for e in other.events if e.kind in ("stick", "slip")][:1] == ["slip"]
+
+
+def driven_loop(rng: np.random.Generator, rough: bool) -> pn.Scene:
+    """A planar four-bar in a turned plane, driven from rest at its crank, with friction in all hinges."""
+    model = empty()
+    place = at(rng.standard_normal(3), rng.uniform(-1.0, 1.0, 3))
+    # Grashof's condition: the crank turns fully.
+    crank, coupler, rocker, base = 0.2, *rng.uniform(0.8, 1.0, 3)
+    bar = {"inertia": 0.02 * np.eye(3)}
+    first = body(model, 0, pin.JointModelRZ(), "crank", 1.0, place=place, lever=(0.1, 0.0, 0.0), **bar)
+    second = body(model, first, pin.JointModelRZ(), "coupler", 1.0, place=at((crank, 0.0, 0.0)), **bar)
+    pivot = place * at((base, 0.0, 0.0))
+    third = body(model, 0, pin.JointModelRZ(), "rocker", 1.0, place=pivot, lever=(0.3, 0.0, 0.0), **bar)
+    frame(model, "coupler tip", second, at((coupler, 0.0, 0.0)))
+    frame(model, "rocker tip", third, at((rocker, 0.0, 0.0)))
+    laws = [
+        pn.JointFriction(name, coulomb=rng.uniform(0.01, 0.1), mu=0.1, radius=0.02, span=0.1)
+        for name in ("crank", "coupler", "rocker")
+    ]
+    laws.append(pn.JointFriction("loop", mu=0.1, radius=0.02, span=0.1))
+    drive = pn.PrescribedMotion("crank", pn.polynomial([0.0, 0.0, 0.0, rng.uniform(0.5, 2.0)]), name="drive")
+    closing = pn.HingeAnchor("coupler tip", "rocker tip", axis="z", name="loop")
+    scene = pn.Scene(model, constraints=[closing, drive], laws=laws if rough else [])
+    return scene.replace(q0=scene.project([0.0, 1.0, 2.0], np.zeros(3))[0])
+
+
+@pytest.mark.parametrize("many", ranges(2, 20, 300))
+def test_a_loop_with_friction_in_its_hinges_starts(many: range) -> None:
+    for seed in many:
+        free, rough = (driven_loop(np.random.default_rng(seed), each) for each in (False, True))
+        exact = pn.simulate(free, 0.5 * DURATION, rtol=1e-10)
+        for options in METHODS:
+            run = pn.simulate(rough, 0.5 * DURATION, **options)
+            assert np.abs(run.q[-1] - exact.q[-1]).max() < 1e-8, (seed, options)
+            assert np.abs(run.v[-1] - exact.v[-1]).max() < 1e-7, (seed, options)
