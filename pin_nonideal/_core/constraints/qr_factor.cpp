@@ -28,17 +28,29 @@ void dense_columns(const std::vector<Block>& blocks, const std::vector<double>& 
     }
 }
 
+// Return the column from k to n that is longest below row k.
+int longest_column(const RowSystem& s, int k, int n) {
+    const Eigen::Index length = s.Q.rows() - k;
+    int best = k;
+    double best_norm = -1.0;
+    for (int c = k; c < n; ++c) {
+        const double norm = s.Q.col(c).tail(length).squaredNorm();
+        if (norm > best_norm * (1.0 + rank_parameters.tie)) { best_norm = norm; best = c; }
+    }
+    return best;
+}
+
 // Factorize the first n columns of Q in place by Householder reflectors, with column pivoting if `pivot`. Return the rank.
-int householder(RowSystem& s, int n, bool pivot, double tolerance) {
+// The first `lasting` columns are pivots as long as they are clearly independent.
+int householder(RowSystem& s, int n, bool pivot, double tolerance, int lasting = 0) {
     const int m = static_cast<int>(s.Q.rows());
     for (int k = 0; k < n; ++k) {
         if (k >= m) return k;
         if (pivot) {
-            int best = k;
-            double best_norm = -1.0;
-            for (int c = k; c < n; ++c) {
-                const double norm = s.Q.col(c).tail(m - k).squaredNorm();
-                if (norm > best_norm * (1.0 + rank_parameters.tie)) { best_norm = norm; best = c; }
+            int best = longest_column(s, k, std::max(k + 1, lasting));
+            if (k >= lasting || s.Q.col(best).tail(m - k).norm() <= rank_parameters.clear_pivot) {
+                best = longest_column(s, k, n);
+                lasting = 0;
             }
             if (best != k) {
                 s.Q.col(k).swap(s.Q.col(best));
@@ -67,9 +79,9 @@ int householder(RowSystem& s, int n, bool pivot, double tolerance) {
 }  // namespace
 
 void find_independent(const std::vector<Block>& blocks, const std::vector<double>& B, double tolerance, int max_rank,
-                      RowSystem& s) {
+                      int lasting, RowSystem& s) {
     dense_columns(blocks, B, s.required, s);
-    s.rank = std::min(max_rank, householder(s, static_cast<int>(s.columns.size()), true, tolerance));
+    s.rank = std::min(max_rank, householder(s, static_cast<int>(s.columns.size()), true, tolerance, lasting));
     std::fill(s.active.begin(), s.active.end(), char(0));
     for (int k = 0; k < s.rank; ++k) s.active[s.columns[k]] = 1;
     s.redundant = s.rank < static_cast<int>(s.columns.size());

@@ -31,6 +31,7 @@ static void present_lengths(const Block& block, const std::vector<double>& B, do
 void decide_rows(const Mechanism& m, Terms& terms, const std::vector<Block>& blocks,
                  const std::vector<RowValues>& values, const std::vector<double>& B, RowSystem& s, double tolerance,
                  int max_rank) {
+    int lasting = 0;
     for (int i : s.blocks) {
         const Block& block = blocks[i];
         double* length = s.scale.data() + block.row;
@@ -40,9 +41,10 @@ void decide_rows(const Mechanism& m, Terms& terms, const std::vector<Block>& blo
         for (size_t k = 0; k < block.kept.size(); ++k) {
             if (keeps) length[k] = std::max(length[k], std::sqrt(s.longest[block.row + k]));
             length[k] = length[k] > 0.0 ? 1.0 / length[k] : 1.0;
+            lasting += lasts && s.required[block.row + k];
         }
     }
-    find_independent(blocks, B, tolerance, max_rank, s);
+    find_independent(blocks, B, tolerance, max_rank, lasting, s);
     s.longest_chosen.setZero();
     s.chosen_pivot = 0.0;
 }

@@ -61,6 +61,10 @@ void DescribedRows::finish(int kept) {
         if (row.kept >= 0) row.part = row.factor / weight[row.kept];
 }
 
+void DescribedRows::weigh(const Block& friction) {
+    for (size_t k = 0; k < friction.kept.size(); ++k) weight[friction.row + k] *= redundancy_parameters.friction_weight;
+}
+
 // Return the load sharing of the rows in use, which is computed if they have changed.
 static LoadSharing& load_sharing(const std::vector<Block>& blocks, const std::vector<double>& B, const DescribedRows& all,
                                  RowSystem& s) {

@@ -12,6 +12,9 @@ struct RedundancyParameters {
     // [Bjorck: Stability analysis of the method of seminormal equations, 1987.]
     double rounding = 1e-14;  // remainder that counts as rounding, relative to the row
     int max_passes = 2;       // maximum passes
+    // Weight of multipliers of a joint's friction beside those of constraints. Friction takes this part of loads that
+    // constraints can carry, and its limit is checked to a few digits.
+    double friction_weight = 1e-12;
 };
 
 inline constexpr RedundancyParameters redundancy_parameters{};
@@ -30,6 +33,8 @@ struct DescribedRows {
 
     // Compute parts and weights once all rows are known.
     void finish(int kept);
+    // Let the rows of a joint's friction carry only what constraints cannot carry.
+    void weigh(const Block& friction);
     // Return the multiplier of one described row from the multipliers of the kept rows.
     double share(int row, const VecX& lam) const {
         return rows[row].kept < 0 ? 0.0 : rows[row].part * lam[rows[row].kept];

@@ -112,7 +112,7 @@ Vec3 friction_force(const Program& p, Workspace& w, int e) {
     if (w.state.mode[e] != sticking) return w.now.slip_force[e];
     Vec3 force = Vec3::Zero();
     const Block& block = p.blocks[f.block];
-    if (block.dof >= 0)
+    if (is_locked(w, block))
         for (int k = 0; k < f.dim; ++k) force[k] = holding_forces(p, w)[block.dof + k];
     else
         for (int k = 0; k < f.dim; ++k) force[k] = w.now.lam[block.row + k];

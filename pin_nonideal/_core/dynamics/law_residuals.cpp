@@ -21,7 +21,7 @@ namespace {
 Vec3 friction_by_row(const Program& p, Workspace& w, int e, const VecX& lam) {
     const Block& block = p.blocks[p.frictions[e].block];
     if (w.state.mode[e] != sticking) return w.now.slip_force[e];
-    if (block.dof >= 0) return friction_force(p, w, e);
+    if (is_locked(w, block)) return friction_force(p, w, e);
     Vec3 force = Vec3::Zero();
     for (size_t k = 0; k < block.kept.size(); ++k) force[k] = lam[block.row + k];
     return force;

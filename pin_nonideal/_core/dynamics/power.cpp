@@ -30,7 +30,7 @@ void law_forces(const Program& p, Workspace& w, const VecX& v, std::vector<VecX>
         if (w.state.mode[e] != sticking) continue;
         const Friction& f = p.frictions[e];
         const Block& block = p.blocks[f.block];
-        if (block.dof >= 0)
+        if (is_locked(w, block))
             for (int k = 0; k < f.dim; ++k) force[f.law][block.dof + k] += holding_forces(p, w)[block.dof + k];
         else if (w.now.rows.block_used[f.block])
             add_transpose(block, w.now.A, reactions(p, w).lam, force[f.law]);

@@ -199,7 +199,8 @@ std::optional<double> Simulation::integrate(const Proposal& proposal) {
     // A stage can leave the domain if the step is too long. A shorter step shows if the motion itself fails. If the motion
     // diverges, no step is short enough, and the step-size failure is reported.
     const double tiny = tiny_step_at(progress.t);
-    const bool runs_away = tiny * system.velocity(progress.rate).norm() > system.velocity(progress.y).norm();
+    const bool runs_away = failure->kind != Failure::Kind::inconsistent &&
+                           tiny * system.velocity(progress.rate).norm() > system.velocity(progress.y).norm();
     if (!options.method.adaptive() || (proposal.size < tiny && !runs_away)) throw *failure;
     if (failure->kind == Failure::Kind::closure) open_loop = failure;
     back_to_start();  // rows and warm starts of the failed step do not serve the next trial

@@ -83,6 +83,32 @@ def test_a_carriage_with_friction_starts(motion: str, options: dict[str, Any]) -
         assert [e.kind for e in other.events if e.kind in ("stick", "slip")][:1] == ["slip"]
 
 
+@pytest.mark.parametrize("limit", [0.0, 1.0, 20.0])
+def test_a_drive_at_rest_carries_the_weight(limit: float) -> None:
+    """The friction of a joint at rest takes no load from the drive that holds it."""
+    model = empty()
+    body(model, 0, pin.JointModelPZ(), "lift", 1.0)
+    hold = pn.PrescribedMotion("lift", pn.constant(0.0), name="drive")
+    law = pn.UserFriction(lambda t, q: np.array([1.0]), lambda t, q, v, r: limit)
+    for laws in ([law], [pn.JointFriction("lift", coulomb=limit, viscous=1.0)]):
+        scene = pn.Scene(model, constraints=[hold], laws=laws)
+        at_rest = scene.solve(np.zeros(1), np.zeros(1))
+        assert at_rest.lam == pytest.approx([9.81], rel=1e-9)
+        assert at_rest.F_nonideal == pytest.approx([0.0], abs=1e-8)
+        run = pn.simulate(scene, 0.1, record="forces")
+        assert run.lam[-1] == pytest.approx([9.81], rel=1e-9)
+
+
+@pytest.mark.parametrize("many", ranges(3, 30, 300))
+def test_a_drive_at_rest_holds_a_loop_as_without_friction(many: range) -> None:
+    for seed in many:
+        free, rough = (driven_loop(np.random.default_rng(seed), each) for each in (False, True))
+        q, v = free.q0, np.zeros(free.model.nv)
+        drive = free.constraint_slices["drive"]
+        holding = free.solve(q, v, 0.0).lam[drive]
+        assert rough.solve(q, v, 0.0).lam[drive] == pytest.approx(holding, rel=1e-8), seed
+
+
 def driven_loop(rng: np.random.Generator, rough: bool) -> pn.Scene:
     """A planar four-bar in a turned plane, driven from rest at its crank, with friction in all hinges."""
     model = empty()
