@@ -582,5 +582,6 @@ def _(case: Case) -> Image:
     q0, v0 = maps.state(case.q0, case.v0, 0.0)
     spring = pn.JointSpring("added wheel", 1.0, name="added spring")
     made = replace(image, q0=q0, v0=v0, forces=(*image.forces, spring))
-    # The search steps depend on all coordinates and may reach another equilibrium.
-    return Image(made, case, carrier, without=frozenset({"energies", "rates", "place of rest"}))
+    # The search steps depend on all coordinates and may reach another equilibrium, or none.
+    made = replace(made, skips=made.skips | {"equilibrium"})
+    return Image(made, case, carrier, without=frozenset({"energies"}))
