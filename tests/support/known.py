@@ -36,7 +36,7 @@ class Known:
 KNOWN: list[Known] = [
     Known(
         "reactions that elements at rest share are of least norm over forces and torques, see `rest`",
-        ("places 2", "millimeters", "rest"),
+        ("places 2", "an idle row", "rest"),
         scenes="(places|mechanism|ball loop) .*",
         functions="rest",
     ),

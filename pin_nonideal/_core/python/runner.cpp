@@ -138,7 +138,8 @@ Instant Runner::solve(const Array& q_in, const Array& v_in, double t, const std:
                       const std::optional<std::vector<Mode>>& modes, bool frozen,
                       const std::optional<Array>& directions) {
     set(q_in, v_in, tau);
-    const FlagGuard stands_still(w->now.frozen, frozen), knows_directions(w->state.solves_directions, directions.has_value());
+    const FlagGuard stands_still(w->now.frozen, frozen);
+    const FlagGuard knows_directions(w->state.solves_directions, directions.has_value());
     if (directions) read_directions(*directions);
     choose_modes(t, modes);
     if (!modes) {

@@ -34,7 +34,6 @@ Simulation::Simulation(const Program& program, Workspace& workspace, const Optio
     // Time stepping solves for velocities. Accelerations are only recorded, so the solution nearest to the last one
     // suffices.
     const bool in_time = options.method.scheme == Method::Scheme::moreau;
-    w.now.dependent_at_start = -1;
     w.continues = options.continues || (in_time && system.ng > 0);
     progress.slip_at_start.assign(p.frictions.size(), 0.0);
     progress.in_tension.assign(p.contacts.size(), 0);
@@ -47,6 +46,7 @@ void Simulation::start(const VecX& q0, const VecX& v0) {
     progress.y.head(system.nq) = q0;
     progress.y.segment(system.nq, system.nv) = v0;
     if (system.nz > 0) progress.y.segment(system.nq + system.nv, system.nz) = w.state.z;
+    w.now.dependent_at_start = -1;
     output.begin();
     breaks.enter();
     w.state.has_held = false;
@@ -111,6 +111,7 @@ bool Simulation::between_steps() {
 
 void Simulation::restore(const std::string& state) {
     from_bytes(state, system, progress, out);
+    w.now.dependent_at_start = -1;
     breaks.enter();
 }
 

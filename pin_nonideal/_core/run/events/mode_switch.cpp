@@ -112,15 +112,15 @@ bool ModeChanges::follow_drive() {
         set_contacts(p, w, before.closed, before.mode);
         w.state = before;
     };
-    const auto failure = attempt([&] {
-        switch_modes(system_, progress_.t, progress_.y, progress_.rate, FoundEvent{FoundEvent::Kind::touch, -1, progress_.t});
-    });
+    const FoundEvent onset{FoundEvent::Kind::touch, -1, progress_.t};
+    const auto failure = attempt([&] { switch_modes(system_, progress_.t, progress_.y, progress_.rate, onset); });
     if (failure || std::equal(before.mode.begin(), before.mode.end(), w.state.mode.begin())) {
         keep();
         if (attempt([&] { step_with_drive(); })) return false;
     }
     impacts_.remember_gaps();
-    for (const Event& change : changes_since(system_, progress_.t, before.closed, before.mode)) out_.events.push_back(change);
+    for (const Event& change : changes_since(system_, progress_.t, before.closed, before.mode))
+        out_.events.push_back(change);
     output_.configured_now();
     output_.now();
     return true;
