@@ -103,7 +103,8 @@ def named_failure(
         return _singular(model, failure.elements[0], t)
     if kind is kinds.inconsistent:
         names = named([*program.block_names, *program.element_names], failure.elements)
-        return _inconsistent(names, value, t, model, around.pairs)
+        rubs = not set(names).isdisjoint(program.element_names)
+        return _inconsistent(names, value, t, model, around.pairs, rubs)
     if kind is kinds.not_finite:
         return NonFiniteError(f"acceleration is not finite at t = {t:.4g} s", time=t)
     if kind is kinds.paradox:
@@ -313,7 +314,12 @@ def _stuck(steps: float, t: float, explicit_only: str) -> RunError:
 
 
 def _inconsistent(
-    names: Sequence[str], residual: float, t: float, model: Model, pairs: dict[str, tuple[str, str]]
+    names: Sequence[str],
+    residual: float,
+    t: float,
+    model: Model,
+    pairs: dict[str, tuple[str, str]],
+    rubs: bool,
 ) -> RunError:
     quoted = _list_names(names)
     if residual == 0.0:  # the failure of an impact has no residual
@@ -328,10 +334,14 @@ def _inconsistent(
         blame, remedy = f"constraints {quoted} contradict each other", "leave one of them out"
     else:
         blame, remedy = f"constraint {quoted} contradicts itself", "leave one of its rows out"
+    remedy += ", or let both ask for the same motion"
+    if rubs:
+        remedy = (
+            "friction sticks that a prescribed motion begins to move: methods of the core, such as "
+            '"dop853", let it slip'
+        )
     return InconsistentConstraintsError(
-        f"{blame}: residual {abs(residual):.1e} m/s^2 at t = {t:.2f} s; {remedy}, or let both ask for "
-        "the same motion",
-        time=t,
+        f"{blame}: residual {abs(residual):.1e} m/s^2 at t = {t:.2f} s; {remedy}", time=t
     )
 
 

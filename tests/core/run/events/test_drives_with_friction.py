@@ -142,3 +142,11 @@ def test_a_loop_with_friction_in_its_hinges_starts(many: range) -> None:
             run = pn.simulate(rough, 0.5 * DURATION, **options)
             assert np.abs(run.q[-1] - exact.q[-1]).max() < 1e-8, (seed, options)
             assert np.abs(run.v[-1] - exact.v[-1]).max() < 1e-7, (seed, options)
+
+
+def test_methods_of_scipy_name_the_friction_that_a_drive_would_move() -> None:
+    model, _ = carriage()
+    drive = pn.PrescribedMotion("carriage", pn.polynomial([0.0, 0.0, 0.0, 0.2]), name="drive")
+    scene = pn.Scene(model, constraints=[drive], laws=[pn.JointFriction("carriage", coulomb=COULOMB)])
+    with pytest.raises(pn.InconsistentConstraintsError, match='"dop853", let it slip'):
+        pn.simulate(scene, 1.0, method="Radau")
