@@ -6,6 +6,7 @@
 #pragma once
 
 #include <algorithm>
+#include <climits>
 #include <vector>
 
 #include "constraints/layout.hpp"
@@ -46,6 +47,8 @@ struct RowSystem : RowChoice {
     LoadSharing sharing;
 
     int active_count() const { return static_cast<int>(std::count(active.begin(), active.end(), char(1))); }
+    // Many contacts have many rows, which are counted only for a known rank.
+    bool has_rank_up_to(int max_rank) const { return max_rank == INT_MAX || active_count() <= max_rank; }
     int required_count() const { return static_cast<int>(std::count(required.begin(), required.end(), char(1))); }
     void allocate(const RowLayout& layout, int blocks, int nv);
     // Select the blocks with a required row, which are `among` some blocks, and use all required rows.

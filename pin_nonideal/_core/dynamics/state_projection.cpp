@@ -93,7 +93,7 @@ void project_and_evaluate(const Program& p, Workspace& w, double t, VecX& q, Vec
 
 bool choose_rows_near(const Program& p, Workspace& w, double t, VecX& q, const VecX& v, int max_rank) {
     if (w.now.rows.blocks.empty()) return false;
-    if (!w.now.rows.orthogonal && w.now.rows.active_count() <= max_rank) return false;
+    if (!w.now.rows.orthogonal && w.now.rows.has_rank_up_to(max_rank)) return false;
     if (!p.gaps.empty() || w.state.sticks_anywhere()) {
         choose_rows(p, w);
         return false;

@@ -83,14 +83,16 @@ static void choose_rows_anew(const Program& p, Workspace& w, int max_rank = INT_
     ++w.counters.factorizations;
 }
 
-int max_rank_near(const Workspace& w) { return w.now.rows.required_count() - std::max(w.now.dependent_at_start, 0); }
+int max_rank_near(const Workspace& w) {
+    return w.now.dependent_at_start > 0 ? w.now.rows.required_count() - w.now.dependent_at_start : INT_MAX;
+}
 
 bool configure_step(const Program& p, Workspace& w, int max_rank) {
     w.state.has_ideal_row_choice = false;
     if (w.now.rows.blocks.empty()) return false;
     const RowSystem& rows = w.now.rows;
     const bool due = p.gaps.empty() && is_choice_due(w.now.rows);  // contacts are chosen with their modes
-    if (!rows.orthogonal && !due && rows.active_count() <= max_rank) return false;
+    if (!rows.orthogonal && !due && rows.has_rank_up_to(max_rank)) return false;
     // The Cholesky factor proves that the active rows are independent: a new choice has at most as many.
     if (!rows.orthogonal) max_rank = std::min(max_rank, rows.active_count());
     choose_rows_anew(p, w, max_rank);

@@ -31,7 +31,8 @@ bool begin_rows(const Program& p, Workspace& w, double t, const VecX& q, const V
 void begin_rows_inside(const Program& p, Workspace& w, double t0, const VecX& q0, double t, const VecX& q, const VecX& v);
 // Choose the independent rows in a configured workspace, at most `max_rank`. Return true if it chose rows.
 bool configure_step(const Program& p, Workspace& w, int max_rank = INT_MAX);
-// Return the rank of the required rows near the start of a time step, if the same constraints depend on others there.
+// Return the rank of the required rows near the start of a time step, if the same constraints depend on others there, or
+// INT_MAX if none does.
 int max_rank_near(const Workspace& w);
 // Choose the rows in a configured workspace, project v onto A v + phi_t = 0, and evaluate. Return true if v changed.
 bool begin_step_on_rates(const Program& p, Workspace& w, double t, VecX& v);

@@ -161,7 +161,7 @@ void System::settle(double t, VecX& y, VecX& dy, bool evaluates, bool may_lack_m
     // Factor the rows of the new modes. Sticking elements must not move during the projection.
     configure(p, w, t, q, v);
     const int max_rank = max_rank_near(w);
-    const bool undecided = w.now.rows.orthogonal || w.now.rows.active_count() > max_rank;
+    const bool undecided = w.now.rows.orthogonal || !w.now.rows.has_rank_up_to(max_rank);
     const bool near = ng == 0 && undecided && !w.state.sticks_anywhere();
     const double before = energy && !w.now.rows.blocks.empty() ? total() : 0.0;
     bool moved = near && choose_rows_near(p, w, t, q, v, max_rank);
