@@ -47,6 +47,7 @@ void Simulation::start(const VecX& q0, const VecX& v0) {
     progress.y.segment(system.nq, system.nv) = v0;
     if (system.nz > 0) progress.y.segment(system.nq + system.nv, system.nz) = w.state.z;
     w.now.dependent_at_start = -1;
+    modes.start();
     output.begin();
     breaks.enter();
     w.state.has_held = false;

@@ -28,6 +28,8 @@ public:
     ModeChanges(System& system, Progress& progress, const Options& options, Torques& torques, Output& output,
                 ImpactHandler& impacts, TimeStepping& time_stepping, ChatterDetector& chatter, Recording& out);
 
+    // Forget the mode switches of an earlier run.
+    void start() { drive_end_ = -HUGE_VAL; }
     // Switch modes and state at an event that has been reached.
     void change(FoundEvent event);
     // Forced switch: if no step is short enough, the motion of the current modes may have ended. `can_switch_modes`

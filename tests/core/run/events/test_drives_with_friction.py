@@ -13,6 +13,7 @@ import pin_nonideal as pn
 
 from ....support.loops import at
 from ....support.mechanisms import body, empty, frame
+from ....support.same_run import assert_same_run
 from ....support.seeds import ranges
 
 COULOMB = 0.7
@@ -81,6 +82,16 @@ def test_a_carriage_with_friction_starts(motion: str, options: dict[str, Any]) -
     )
     if "rtol" in options:
         assert [e.kind for e in other.events if e.kind in ("stick", "slip")][:1] == ["slip"]
+
+
+def test_a_drive_starts_the_same_way_in_each_run() -> None:
+    model, _ = carriage()
+    drive = pn.PrescribedMotion("carriage", pn.polynomial([0.0, 0.0, 0.0, 0.2]), name="drive")
+    scene = pn.Scene(model, constraints=[drive], laws=[pn.JointFriction("carriage", coulomb=COULOMB)])
+    first = pn.simulate(scene, 0.5)
+    for earlier in (0.5, 1e-7, 3e-6):
+        pn.simulate(scene, earlier)
+        assert_same_run(first, pn.simulate(scene, 0.5))
 
 
 @pytest.mark.parametrize("limit", [0.0, 1.0, 20.0])
