@@ -30,7 +30,7 @@ SAMPLES = kinds() | random_cases(3)
 MANY = {name: make for name, make in random_cases(100).items() if name not in SAMPLES}
 # Answers of the scene's own method suffice where only steps and samples change.
 OWN_RUN = "simulate dop853"
-# Methods with fixed steps. Where a step is too long for a stiff law, the motion is not that of the scene, and
+# Methods with fixed steps. If a step is too long for a stiff law, the motion is not that of the scene, and
 # rounding grows in it.
 FIXED, RESOLVED = ("simulate rk4", "simulate semi_implicit_euler", "simulate moreau", "stepper"), 0.03
 

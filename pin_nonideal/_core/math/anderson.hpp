@@ -1,6 +1,6 @@
 // Acceleration of a fixed-point iteration x := g(x) by its last residuals (D. G. Anderson, "Iterative procedures for
 // nonlinear integral equations", J. ACM 12, 1965; H. F. Walker, P. Ni, SIAM J. Numer. Anal. 49, 2011). With one unknown
-// this is the secant method. Where g moves further than x, plain iterations leave an unstable fixed point.
+// this is the secant method. If g moves further than x, the fixed point is unstable, and plain iterations leave it.
 #pragma once
 
 #include "math/spatial.hpp"
