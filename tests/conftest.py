@@ -1,16 +1,20 @@
-"""Import of the oracles, default handling of Ctrl-C, and a fixture for files that runs write."""
+"""Import of the oracles, one thread of BLAS, default handling of Ctrl-C, and a fixture for written files."""
 
 from __future__ import annotations
 
 import contextlib
 import importlib.util
 import io
+import os
 import signal
 import sys
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
+
+# Set before the first import of numpy: the workers of the tests use all cores.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # No test depends on the load of the machine.
 settings.register_profile("untimed", deadline=None)

@@ -60,26 +60,36 @@ class ClosureSearch:
             q: start configuration, (nq,).
             free: mask of coordinates that may move, (nv,); all when None.
         """
-        mass, unit = mass_function(self.model, self._runner), self._unit_at(q)
         try:
-            is_free = np.ones(self.model.nv, dtype=bool) if free is None else free
-            block = np.ix_(is_free, is_free)
-            loops = self._rows(q, unit, self._loops, is_free)
-            arguments = (
-                self.model,
-                loops,
-                lambda q: mass(q)[block],
-                metric(mass(q), self.unit)[block],
-                unit[is_free],
-                np.logical_not(self._slides)[is_free],
-                q,
-                free,
-            )
-            if not self._gaps.any():
-                return Search(*arguments).nearest()
-            return UnilateralClosure(self._rows(q, unit, self._gaps, is_free), *arguments).nearest()
+            return self._search(q, free).nearest()
         except np.linalg.LinAlgError:  # a number overflowed: no closure
             return Closure(q, np.inf, 0.0, False, 0), False
+
+    def first(self, q: Array) -> Closure:
+        """Return the first closure found around the configuration q, (nq,), at any distance."""
+        try:
+            return self._search(q, None).first()
+        except np.linalg.LinAlgError:  # a number overflowed: no closure
+            return Closure(q, np.inf, 0.0, False, 0)
+
+    def _search(self, q: Array, free: NDArray[np.bool_] | None) -> Search:
+        mass, unit = mass_function(self.model, self._runner), self._unit_at(q)
+        is_free = np.ones(self.model.nv, dtype=bool) if free is None else free
+        block = np.ix_(is_free, is_free)
+        loops = self._rows(q, unit, self._loops, is_free)
+        arguments = (
+            self.model,
+            loops,
+            lambda q: mass(q)[block],
+            metric(mass(q), self.unit)[block],
+            unit[is_free],
+            np.logical_not(self._slides)[is_free],
+            q,
+            free,
+        )
+        if not self._gaps.any():
+            return Search(*arguments)
+        return UnilateralClosure(self._rows(q, unit, self._gaps, is_free), *arguments)
 
     def _unit_at(self, q: Array) -> Array:
         """Return the units of a search; slide units cover the least displacements that close single rows."""

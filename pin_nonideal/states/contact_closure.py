@@ -57,7 +57,7 @@ class UnilateralClosure(Search):
         """Check if all rows are satisfied and no contact penetrates."""
         return super()._is_closed(iterate) and self._depth(iterate) <= PENETRATION_ROUNDING
 
-    def _settle(self, iterate: Iterate) -> Closure:
+    def _settle(self, iterate: Iterate, limit: float) -> Closure:
         """Descend to a local minimum of the distance, with an update of the active gaps."""
         known = iterate
         for _ in range(MAX_SETTLINGS):
@@ -70,7 +70,7 @@ class UnilateralClosure(Search):
             start = self._retract(iterate.q)
             if start is None:
                 break
-            closure = super()._settle(start)
+            closure = super()._settle(start, np.inf)
             self._hold(np.zeros(0, dtype=int))
             iterate = self._place(closure.q)
             outside, further = (

@@ -33,6 +33,8 @@ CLOSING_STEPS, RETRACTIONS, SLIDES, HALVINGS = 300, 15, 60, 25
 DAMPING, MIN_DAMPING, MAX_DAMPING = 1e-3, 1e-14, 1e10
 # Relative slope of the distance along the constraints at which a closure is stationary: rounding over gaps.
 STATIONARY_SLOPE = 1e-10
+# Part of the last slope above which a descent does not converge.
+STALLED_SLOPE = 0.5
 # Rounding of a displacement, relative to a displacement of all coordinates by their units.
 ROUNDING = 1e-13
 # Step of gradient differences [units].
@@ -161,7 +163,8 @@ class Search:
                 if not self._is_closed(iterate):
                     open_iterate = min(iterate, open_iterate, key=self._lacking)
                     continue
-                closure = self._unwound(self._settle(iterate))
+                limit = best.distance if best is not None else np.inf
+                closure = self._unwound(self._settle(iterate, limit), limit)
             except UserFunctionError:  # a user function raises on the path of this start
                 continue
             if conditioning(self.mass(closure.q)) <= MIN_RCOND:
@@ -188,6 +191,21 @@ class Search:
         lacking = self._lacking(open_iterate)
         return Closure(open_iterate.q, lacking, self._distance(open_iterate), False, self.iterations), False
 
+    def first(self) -> Closure:
+        """Return the first closure found from q0 or a random start, at any distance.
+
+        Raises:
+            numpy.linalg.LinAlgError: a number overflows.
+        """
+        generator, open_iterate = np.random.default_rng(0), self._place(self.q0)
+        for k in range(STARTS):
+            iterate = self._close(self._start(k, None, generator))
+            open_iterate = min(iterate, open_iterate, key=self._lacking)
+            if self._is_closed(iterate):
+                break
+        gap = self._lacking(open_iterate)
+        return Closure(open_iterate.q, gap, self._distance(open_iterate), False, self.iterations)
+
     def _start(self, k: int, best: Closure | None, generator: np.random.Generator) -> Array:
         """Return start k: q0, then random starts, from the first closure on no farther away than the best."""
         if k == 0:
@@ -198,7 +216,7 @@ class Search:
         distance = best.distance * generator.uniform() ** (1.0 / len(x))  # uniform in the ball
         return self._integrate(self.q0, np.linalg.solve(self.root, distance / np.linalg.norm(x) * x))
 
-    def _unwound(self, closure: Closure) -> Closure:
+    def _unwound(self, closure: Closure, limit: float) -> Closure:
         """Return the nearer of a closure and the closure without whole turns of its joints."""
         move = self._difference(closure.q)
         turns = np.where(self.angles, np.round(move / TURN), 0.0)
@@ -206,7 +224,7 @@ class Search:
             return closure
         iterate = self._close(self._integrate(self.q0, move - TURN * turns))
         return (
-            min(closure, self._settle(iterate), key=lambda c: c.distance)
+            min(closure, self._settle(iterate, limit), key=lambda c: c.distance)
             if self._is_closed(iterate)
             else closure
         )
@@ -296,22 +314,38 @@ class Search:
 
     # --- along the constraints ------------------------------------------------------------------------------
 
-    def _settle(self, iterate: Iterate) -> Closure:
-        """Descend to a local minimum of the distance; return the start if the descent ends at a corner."""
-        end, is_minimum = self._slide(iterate)
+    def _settle(self, iterate: Iterate, limit: float) -> Closure:
+        """Descend to a local minimum of the distance; return the start if the descent ends at a corner.
+
+        Args:
+            iterate: configuration on the constraints.
+            limit: distance of the nearest closure so far; a descent that will not reach it may end early.
+        """
+        end, is_minimum = self._slide(iterate, limit)
         if not is_minimum and self._has_corner(end):
             end = iterate
         return Closure(end.q, end.gap, self._distance(end), is_minimum, self.iterations)
 
-    def _slide(self, iterate: Iterate) -> tuple[Iterate, bool]:
-        """Apply Newton's method for the Lagrangian in the open directions; return if it ends in a minimum."""
+    def _slide(self, iterate: Iterate, limit: float) -> tuple[Iterate, bool]:
+        """Apply Newton's method for the Lagrangian in the open directions; return if it ends in a minimum.
+
+        A descent may stall at a singular configuration: the slope stays, and the steps become short. It ends
+        if all remaining steps at the decrease of the last step do not reach the limit.
+        """
         is_minimum = False
-        for _ in range(SLIDES):
+        last_distance, last_slope = np.inf, 0.0
+        for remaining in range(SLIDES, 0, -1):
             U, s, Vt = row_singular_values(iterate.B)
             open_directions = complement(Vt)
-            slope = open_directions.T @ iterate.move
+            slope, distance = float(np.linalg.norm(open_directions.T @ iterate.move)), self._distance(iterate)
+            if (
+                slope > STALLED_SLOPE * last_slope
+                and (last_distance - distance) * remaining < distance - limit
+            ):
+                break
             lam = -U @ ((Vt @ iterate.move) / s)
-            flat = np.linalg.norm(slope) <= STATIONARY_SLOPE * self._distance(iterate) + ROUNDING * self.size
+            flat = slope <= STATIONARY_SLOPE * distance + ROUNDING * self.size
+            last_distance, last_slope = (np.inf if flat else distance), slope
             curvature, directions = self._curvature(iterate, lam, open_directions)
             if flat and curvature.min(initial=1.0) >= -SADDLE:
                 is_minimum = len(curvature) <= MANY_FREEDOMS
@@ -323,10 +357,10 @@ class Search:
             else:
                 parts = directions.T @ iterate.move
                 x = -directions @ (parts / np.maximum(np.abs(curvature), MIN_CURVATURE))
-                trial = self._downhill(iterate, x, float(np.linalg.norm(slope)))
+                trial = self._downhill(iterate, x, slope)
             if trial is None:
                 # Neither distance nor slope decreases, so the remaining slope may be rounding.
-                is_minimum = bool(np.linalg.norm(slope) <= 1e3 * STATIONARY_SLOPE * self._distance(iterate))
+                is_minimum = slope <= 1e3 * STATIONARY_SLOPE * distance
                 break
             iterate = trial
         return iterate, is_minimum

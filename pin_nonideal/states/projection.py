@@ -352,10 +352,12 @@ class Projection:
             and self._is_outside(newton, self._residuals(runner, newton, t))
         ):
             return Closure(newton, 0.0, 0.0, False, 0), False
-        search = ClosureSearch(
+        return self._closure_search(runner, t).nearest(q, free)
+
+    def _closure_search(self, runner: core.Runner, t: float) -> ClosureSearch:
+        return ClosureSearch(
             self.model, runner, t, self.unit, self.length, self._slides, self._gaps, self._loops
         )
-        return search.nearest(q, free)
 
     def _furthest(self, move: Array) -> int:
         """Return the coordinate with the largest displacement over its unit."""
@@ -383,8 +385,14 @@ class Projection:
         ]
 
 
-def nearest_closure(
-    model: Model, program: core.Program, runner: core.Runner, q: Array, enough: float
+def closure_nearby(
+    model: Model,
+    program: core.Program,
+    runner: core.Runner,
+    q: Array,
+    enough: float,
+    *,
+    is_nearest: bool = True,
 ) -> tuple[Array, float]:
     """Return the configuration near q with the smallest residual found, closed or not.
 
@@ -394,6 +402,7 @@ def nearest_closure(
         runner: a workspace of the program.
         q: configuration, (nq,).
         enough: residual up to which no search is needed [m or rad].
+        is_nearest: whether a search goes on from the first closure to the nearest.
 
     Returns:
         The configuration, (nq,), and its largest residual [m or rad].
@@ -405,7 +414,8 @@ def nearest_closure(
     except core.CoreFailure:
         before = after = np.inf
     if min(before, after) > enough:
-        on = projection._search(runner, q, 0.0, None)[0].q
+        search = projection._closure_search(runner, 0.0)
+        on = (search.nearest(q)[0] if is_nearest else search.first(q)).q
         before, after = np.inf, _largest(residuals_at(runner, on, zero, 0.0))
     return (on, after) if after <= before else (q, before)
 

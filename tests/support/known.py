@@ -6,6 +6,8 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
+import pytest
+
 
 @dataclass(frozen=True)
 class Known:
@@ -90,6 +92,7 @@ KNOWN: list[Known] = [
         ("side rods 0", "turned mount", "simulate Radau"),
         scenes="side rods .*",
         functions="simulate Radau",
+        marks=(pytest.mark.slow,),
     ),
     Known(
         "Radau as the method of the scene stops at dead centers at a tight tolerance",

@@ -179,7 +179,7 @@ def test_headings_of_friction_name_it_once(law: str, browser: Any, tmp_path: Pat
     ]
 
 
-SIZES = [(1400, 900), (900, 500), (420, 800)]
+SIZES = [(1400, 900), pytest.param((900, 500), marks=pytest.mark.slow), (420, 800)]
 
 
 @pytest.mark.parametrize("size", SIZES, ids=str)
@@ -307,7 +307,7 @@ COVERED = """() => {
 }"""
 
 
-@pytest.mark.parametrize("size", [(1400, 900), (900, 500), (420, 800)])
+@pytest.mark.parametrize("size", SIZES, ids=str)
 def test_values_of_forces_are_beside_the_cards(loop: Watched, size: tuple[int, int]) -> None:
     """A value under the heading or under the table of forces would be illegible."""
     loop.page.set_viewport_size({"width": size[0], "height": size[1]})

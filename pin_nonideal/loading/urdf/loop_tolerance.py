@@ -18,7 +18,7 @@ from pin_nonideal.core_loader import core
 from pin_nonideal.description.constraints import Constraint, FrameAnchor, JointCoupling, PointAnchor
 from pin_nonideal.scene.scene import Scene, compiled_scene
 from pin_nonideal.states.loop_closure import CLOSURE_TOLERANCE
-from pin_nonideal.states.projection import nearest_closure
+from pin_nonideal.states.projection import closure_nearby
 from pin_nonideal.states.rows import rows_at
 from pin_nonideal.types import Array, Model
 
@@ -158,7 +158,7 @@ def _independent_rows(
     mask is None if the loops do not close, or if no row depends on others because of rounded frames.
     """
     model, program, runner = compiled.model, compiled.program, compiled.program.runner()
-    q, gap = nearest_closure(model, program, runner, compiled.q0, tolerance)
+    q, gap = closure_nearby(model, program, runner, compiled.q0, tolerance)
     if gap > tolerance:
         return None, q, gap, ""
     generator = np.random.default_rng(5)
@@ -169,7 +169,8 @@ def _independent_rows(
         if not free.shape[1]:
             break
         step = free @ generator.uniform(-PROBE_RANGE, PROBE_RANGE, free.shape[1])
-        probe, distance = nearest_closure(model, program, runner, pin.integrate(model, q, step), tolerance)
+        moved = pin.integrate(model, q, step)
+        probe, distance = closure_nearby(model, program, runner, moved, tolerance, is_nearest=False)
         if distance <= tolerance:
             at_probe = _independent(model, runner, probe, tolerance)
             rounded = rounded or at_probe[2]

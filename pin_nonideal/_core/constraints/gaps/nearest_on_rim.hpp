@@ -65,21 +65,24 @@ struct NearestAroundRim {
 
     // Find the nearest point. The distance only grows up its slope, so the nearest point of the whole disk lies in the
     // other half of the plane. An arc of the rim, at first half of it, closes in, and Newton steps continue inside the
-    // arc. If two arcs remain, chords of the disk select one.
+    // arc. If two arcs remain, chords of the disk select one, once: the distance is even around a rim that is coaxial
+    // with the solid, and no chord is then better than another.
     NearestToRevolved<Sides> find(const Sides& s, const Revolved& solid) const {
         NearestToRevolved<Sides> out(s, middle, solid);
         if (radius == 0.0) return out;
         Direction now = start(s, out.at);
         Arc arc{{now.y, -now.x}, {-now.y, now.x}};
         Scalar steepest = HUGE_VAL;
+        bool selected = false;
         for (int iteration = 0; iteration < rim_search_parameters.max_samples; ++iteration) {
             const OnSolid at = nearest(s, solid, now);
             const Direction slope = slope_of(at);
             if (!(dot(slope, slope) > rim_search_parameters.level * rim_search_parameters.level))
                 break;  // the solid lies below the whole disk
             const Scalar around = cross(now, slope), outward = dot(now, slope), steep = around < 0.0 ? -around : around;
-            if (!(steep > rim_search_parameters.level) && !(outward > 0.0)) break;
-            if (!cut(arc, now, slope)) {
+            if (!(steep > rim_search_parameters.level) && (selected || !(outward > 0.0))) break;
+            if (!cut(arc, now, slope) && !selected) {
+                selected = true;
                 now = of_chords(s, solid, now);
                 arc = {turned(now, Scalar(-rim_search_parameters.beside_chords)),
                        turned(now, Scalar(rim_search_parameters.beside_chords))};
@@ -115,7 +118,8 @@ private:
             return dot(sum, sum) > rim_search_parameters.level ? unit(sum) : Direction{-low.y, low.x};
         }
     };
-    // Cut the arc along the chord through a point of the arc. Return false if a piece would remain at either end.
+    // Cut the arc along the chord through a point of the arc, and keep the end down the slope. Return false if a piece
+    // would remain at the other end too.
     static bool cut(Arc& arc, const Direction& now, const Direction& slope) {
         const Direction down = unit({-slope.x, -slope.y});
         const Scalar part = 2.0 * dot(now, down);
@@ -123,10 +127,9 @@ private:
         const bool ahead = cross(now, slope) < 0.0;
         const Arc behind{arc.low, now}, before{now, arc.high}, kept = ahead ? before : behind;
         const Arc rest = ahead ? behind : before;
-        if (dot(now, slope) > 0.0 && rest.holds(across)) return false;
         arc = kept;
         if (arc.holds(across)) (ahead ? arc.high : arc.low) = across;
-        return true;
+        return !(dot(now, slope) > 0.0 && rest.holds(across));
     }
     // Return the direction of the nearest point of the whole disk, by bisection over the chords along `direction`. The least
     // distance of a chord is convex across the chords.

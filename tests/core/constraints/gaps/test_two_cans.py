@@ -24,7 +24,7 @@ from ....geometry.test_cylinder_pairs import (
 )
 from ....geometry.test_geometry_pairs import EXACT, by_coal, pair, placements, shape
 from ....support.contact_points import point_loads, points_of
-from ....support.mechanisms import GRAVITY, body, empty
+from ....support.mechanisms import GRAVITY, body, empty, frame
 from ....support.same_run import assert_same_run
 
 PAIRS = [("cylinder", "cylinder"), ("cylinder", "cone"), ("cone", "cone")]
@@ -132,6 +132,31 @@ def test_gaps_beside_coal(kinds):
                 worst = max(worst, abs(gap + radius - exact))
     assert compared > 10 * len(gaps)
     assert worst < COAL
+
+
+@pytest.mark.parametrize("shift", [0.0, 1e-15, 1e-9, 0.05])
+def test_gaps_of_solids_on_one_axis(shift):
+    """The distance is even around the rim of the larger face; no point of this rim is the nearest one."""
+    rng = np.random.default_rng(2)
+    for _ in range(100):
+        length1, length2 = rng.uniform(0.0, 0.5, 2)
+        below1, above1, below2, above2 = rng.uniform(0.06, 0.4, 4)
+        model, away = empty(), rng.uniform(1e-3, 0.3)
+        joint = body(model, 0, pin.JointModelFreeFlyer(), "free", 1.0)
+        frame(model, "solid", joint)
+        contact = pn.RevolvedContact(
+            "solid", "universe", (length1, below1, above1), (length2, below2, above2), 0.01, 0.002
+        )
+        runner = pn.Scene(model, contacts=[contact])._compiled.program.runner()
+        up = 0.5 * (length1 + length2) + away
+        for height, turn in ((up, np.eye(3)), (-up, np.eye(3)), (up, np.diag([1.0, -1.0, -1.0]))):
+            way = rng.normal(size=2)
+            place = np.array([*(shift * way / np.linalg.norm(way)), height])
+            q = np.concatenate([place, pin.Quaternion(turn @ pin.exp3(np.array([0.0, 0.0, 1.0]))).coeffs()])
+            A, _, gaps, _ = runner.rows(q, np.zeros(6), 0.0)
+            assert gaps[0] == pytest.approx(away - 0.012, abs=PROVED)
+            normal = pin.XYZQUATToSE3(q).rotation @ A.reshape(-1, 6)[0, :3]
+            np.testing.assert_allclose(normal, [0.0, 0.0, np.sign(height)], atol=1e-12)
 
 
 @pytest.mark.parametrize("kinds", PAIRS)

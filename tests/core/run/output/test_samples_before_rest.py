@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -56,10 +58,16 @@ def step_before_rest(run):
     return run.dense.times[np.searchsorted(run.dense.times[:, 1], instant - 1e-14)]
 
 
-def hung_until_rest(seed, anchored):
-    """The same with the instant of rest, or a skipped test."""
+@lru_cache(maxsize=4)
+def at_rest(seed, anchored):
+    """Return the same and the instant of rest or None, which the oracle finds in about a second."""
     scene, oracle, start = hung(seed, anchored)
-    instant = oracle.rest(start, DURATION)
+    return scene, oracle, start, oracle.rest(start, DURATION)
+
+
+def hung_until_rest(seed, anchored):
+    """The same, or a skipped test if the body swings on."""
+    scene, oracle, start, instant = at_rest(seed, anchored)
     if instant is None:
         pytest.skip("it swings on")
     return scene, oracle, start, instant
