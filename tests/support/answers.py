@@ -351,7 +351,7 @@ def _differ(
     if kind == "events":
         if coupled(image.of) or coupled(image.case):
             value, back = together(value), together(said_of_all(image, said))
-        return _other_events(value, back, tolerance, image.of.duration)
+        return _other_events(value, back, 10.0 * tolerance * image.of.duration + image.of.onset)
     return _apart(value, back, tolerance, FLOORS[kind])
 
 
@@ -423,7 +423,7 @@ def together(events: list[Any]) -> list[Any]:
     return found
 
 
-def _other_events(one: list[Any], other: list[Any], tolerance: float, duration: float) -> list[str]:
+def _other_events(one: list[Any], other: list[Any], lateness: float) -> list[str]:
     """Compare events by kind and element, with their times and impulses."""
 
     def key(e: Any) -> Any:
@@ -437,6 +437,6 @@ def _other_events(one: list[Any], other: list[Any], tolerance: float, duration: 
             found.append(f"{k[0]} of {k[1]}: {len(first)} | {len(second)}")
             continue
         late = max(abs(a[0] - b[0]) for a, b in zip(first, second, strict=True))
-        if late > 10.0 * tolerance * duration:
+        if late > lateness:
             found.append(f"{k[0]} of {k[1]}: {late:.2g} s apart")
     return found

@@ -26,6 +26,7 @@ class Case:
         drawn: consistent states for instantaneous results; None for random states near the start.
         moved: states off the constraints; None for the start moved along constraint forces.
         outputs: number of samples of a run after its start.
+        onset: time by which an event may be late that marks the onset of a smooth motion [s].
         parts: fractions of the duration at which a run is divided.
         finer: factor of the number of samples.
         method: method in place of the function's method, with `dt`.
@@ -51,6 +52,7 @@ class Case:
     moved: tuple[tuple[np.ndarray, np.ndarray], ...] | None = None
     outputs: int = 20
     finer: int = 1
+    onset: float = 0.0
     parts: tuple[float, ...] = ()
     rtol: float = 1e-9
     atol: Any = 1e-11

@@ -101,6 +101,20 @@ KNOWN: list[Known] = [
         transformations="Radau",
     ),
     Known(
+        "time stepping with contacts takes its first modes from the end of a first step, which no event marks",
+        ("started loop 0", "a far contact", "simulate moreau"),
+        scenes="started .*",
+        transformations="a far contact",
+        functions="simulate moreau",
+    ),
+    Known(
+        "a user's rows state no break at which a drive starts a joint with friction",
+        ("started with friction Spline", "rows by hand, times 1e4", "simulate rk4"),
+        scenes="started with friction Spline",
+        transformations="rows by hand.*",
+        functions="simulate .*|stepper|poses of a replay",
+    ),
+    Known(
         "fixed steps pass the breaks of a user's rows, which nothing states",
         ("cart 17", "rows by hand, times 1e4", "simulate rk4"),
         scenes="cart .*",

@@ -198,6 +198,36 @@ def linkage(seed: int = 0) -> pn.Scene:
     return pn.Scene(model, constraints=[loop], q0=q, v0=np.zeros(3), name=f"linkage {seed}")
 
 
+def started_loop(seed: int, rough: bool = True) -> pn.Scene:
+    """A planar four-bar in a turned plane, driven from rest at its crank, with friction in all hinges."""
+    rng = np.random.default_rng(seed)
+    model = empty()
+    place = at(rng.standard_normal(3), rng.uniform(-1.0, 1.0, 3))
+    # Grashof's condition: the crank turns fully.
+    crank, coupler, rocker, base = 0.2, *rng.uniform(0.8, 1.0, 3)
+    bar = {"inertia": 0.02 * np.eye(3)}
+    first = body(model, 0, pin.JointModelRZ(), "crank", 1.0, place=place, lever=(0.1, 0.0, 0.0), **bar)
+    second = body(model, first, pin.JointModelRZ(), "coupler", 1.0, place=at((crank, 0.0, 0.0)), **bar)
+    pivot = place * at((base, 0.0, 0.0))
+    third = body(model, 0, pin.JointModelRZ(), "rocker", 1.0, place=pivot, lever=(0.3, 0.0, 0.0), **bar)
+    frame(model, "coupler tip", second, at((coupler, 0.0, 0.0)))
+    frame(model, "rocker tip", third, at((rocker, 0.0, 0.0)))
+    laws = [
+        pn.JointFriction(name, coulomb=rng.uniform(0.01, 0.1), mu=0.1, radius=0.02, span=0.1)
+        for name in ("crank", "coupler", "rocker")
+    ]
+    laws.append(pn.JointFriction("loop", mu=0.1, radius=0.02, span=0.1))
+    # No hinge is at rest to first order, as the closing one is while the crank lies along the base.
+    start, jerk = rng.uniform(0.5, 2.5), rng.uniform(3.0, 12.0)
+    motion = pn.polynomial([start, 0.0, 0.0, jerk / 6.0])
+    driven = pn.PrescribedMotion("crank", motion, name="drive")
+    closing = pn.HingeAnchor("coupler tip", "rocker tip", axis="z", name="loop")
+    scene = pn.Scene(
+        model, constraints=[closing, driven], laws=laws if rough else [], name=f"started loop {seed}"
+    )
+    return scene.replace(q0=scene.project([start, 1.0 - start, 2.0], np.zeros(3))[0])
+
+
 def ball_loop(seed: int) -> pn.Scene:
     """Spatial crank, coupler and rocker; the closing ball joint has load-dependent friction."""
     rng = np.random.default_rng(seed)

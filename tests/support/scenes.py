@@ -134,8 +134,8 @@ def arm(**more: Any) -> pn.Scene:
         ["revolute x", "revolute unaligned", "prismatic y"], np.random.default_rng(5), parents=range(3)
     )
     frame(model, "post", 0, at((1.0, 0.5, 0.2)))
-    q, v = np.array([0.3, -0.4, 0.1]), np.array([1.0, -0.7, 0.3])
-    return pn.Scene(model, q0=q, v0=v, **more)
+    start = {"q0": np.array([0.3, -0.4, 0.1]), "v0": np.array([1.0, -0.7, 0.3])}
+    return pn.Scene(model, **(start | more))
 
 
 def _swing(t: float, q: Any, v: Any) -> Any:
@@ -185,12 +185,19 @@ MOTIONS: dict[str, Callable[[], Any]] = {
     "Spline": lambda: pn.spline([0.0, 0.05, 0.12, 0.2], [0.3, 0.35, 0.2, 0.3]),
     "function": lambda: lambda t: (0.3 * np.cos(t), -0.3 * np.sin(t), -0.3 * np.cos(t)),
 }
+STARTS: dict[str, Callable[[], Any]] = {
+    "Polynomial": lambda: pn.polynomial([0.3, 0.0, 0.0, 2.0]),
+    "Spline": lambda: pn.spline([0.05, 0.2], [0.3, 0.4]),
+    "held": lambda: pn.constant(0.3),
+}
 
 
-def _random(make: Callable[[int], Any], name: str, seed: int, **more: Any) -> Case:
+def _random(make: Callable[[int], Any], name: str, seed: int, rests: bool = False, **more: Any) -> Case:
     made = make(seed)
     scene = made if isinstance(made, pn.Scene) else made.scene
     case = case_of(scene, f"{name} {seed}", **more)
+    if rests:  # a drawn velocity would leave only its rounding
+        case = replace(case, drawn=((scene.q0, np.zeros(scene.model.nv)),))
     return (
         case
         if made is scene
@@ -223,6 +230,16 @@ def kinds() -> dict[str, Maker]:
         made[f"motion {name}"] = lambda f=f: case_of(
             arm(constraints=[pn.PrescribedMotion("j0", f(), name="drive")]), duration=0.25
         )
+    for name, f in STARTS.items():
+        made[f"started with friction {name}"] = lambda f=f: case_of(
+            arm(
+                constraints=[pn.PrescribedMotion("j0", f(), name="drive")],
+                laws=[pn.JointFriction("j0", coulomb=0.5)],
+                v0=[0.0, -0.7, 0.3],
+            ),
+            duration=0.25,
+            onset=1e-3,
+        )
     return made
 
 
@@ -239,6 +256,7 @@ def random_cases(count: int) -> dict[str, Maker]:
         "drive": (loops.drive, {"duration": 20.0}),
         "drive with caster": (lambda seed: loops.drive(seed, caster=True), {"duration": 10.0}),
         "linkage": (loops.linkage, {"duration": 0.5}),
+        "started loop": (loops.started_loop, {"duration": 1.0, "rests": True, "onset": 1e-3}),
         "ball loop": (loops.ball_loop, {"duration": 1.5, "outputs": 300}),
         "cart": (loops.cart, {"duration": 6.0}),
     }

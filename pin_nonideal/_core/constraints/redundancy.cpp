@@ -52,6 +52,7 @@ MatX dependence(const std::vector<Block>& blocks, const std::vector<double>& B, 
 
 void DescribedRows::finish(int kept) {
     weight = VecX::Zero(kept);
+    yields.assign(kept, 0);
     for (const Row& row : rows) {
         if (row.kept < 0) continue;
         copied |= weight[row.kept] > 0.0;
@@ -61,8 +62,31 @@ void DescribedRows::finish(int kept) {
         if (row.kept >= 0) row.part = row.factor / weight[row.kept];
 }
 
-void DescribedRows::weigh(const Block& friction) {
-    for (size_t k = 0; k < friction.kept.size(); ++k) weight[friction.row + k] *= redundancy_parameters.friction_weight;
+void DescribedRows::yield(const Block& friction) {
+    std::fill_n(yields.begin() + friction.row, friction.kept.size(), 1);
+}
+
+// Return the inverse weights of the rows in use and of the dependent rows. All friction that yields has one factor:
+// `friction_weight` over the largest load of constraints per load of such friction.
+static std::pair<VecX, VecX> inverse_weights(const DescribedRows& all, const std::vector<int>& rows,
+                                             const LoadSharing& sharing) {
+    VecX used(rows.size()), dependent(sharing.dependent.size());
+    for (size_t l = 0; l < rows.size(); ++l) used[l] = 1.0 / all.weight[rows[l]];
+    for (size_t k = 0; k < sharing.dependent.size(); ++k) dependent[k] = 1.0 / all.weight[sharing.dependent[k]];
+    double carried = 0.0;
+    for (size_t k = 0; k < sharing.dependent.size(); ++k) {
+        if (!all.yields[sharing.dependent[k]]) continue;
+        double of_constraints = 0.0;
+        for (size_t l = 0; l < rows.size(); ++l)
+            if (!all.yields[rows[l]]) of_constraints += sharing.W(k, l) * sharing.W(k, l) * used[l];
+        carried = std::max(carried, of_constraints / dependent[k]);
+    }
+    const double factor = (carried > 0.0 ? carried : 1.0) / redundancy_parameters.friction_weight;
+    for (size_t l = 0; l < rows.size(); ++l)
+        if (all.yields[rows[l]]) used[l] *= factor;
+    for (size_t k = 0; k < sharing.dependent.size(); ++k)
+        if (all.yields[sharing.dependent[k]]) dependent[k] *= factor;
+    return {std::move(used), std::move(dependent)};
 }
 
 // Return the load sharing of the rows in use, which is computed if they have changed.
@@ -81,11 +105,10 @@ static LoadSharing& load_sharing(const std::vector<Block>& blocks, const std::ve
     const std::vector<int>& rows = s.envelope.row_at;
     sharing.W = dependence(blocks, B, s, sharing.dependent);
     // With weights g and x + W^T y = lam, sum(x^2/g) + sum(y^2/g) is minimal if (1/g + W (1/g) W^T) y = W (1/g) lam.
-    VecX inverse(rows.size());
-    for (size_t l = 0; l < rows.size(); ++l) inverse[l] = 1.0 / all.weight[rows[l]];
-    const MatX weighted = sharing.W * inverse.asDiagonal();
+    const auto [used, dependent] = inverse_weights(all, rows, sharing);
+    const MatX weighted = sharing.W * used.asDiagonal();
     MatX S = weighted * sharing.W.transpose();
-    for (size_t k = 0; k < sharing.dependent.size(); ++k) S(k, k) += 1.0 / all.weight[sharing.dependent[k]];
+    S.diagonal() += dependent;
     sharing.taken = solve_semidefinite(S, weighted);
     return sharing;
 }
@@ -110,11 +133,10 @@ const MatX& free_multipliers(const std::vector<Block>& blocks, const std::vector
     if (sharing.has_free) return sharing.free;
     sharing.has_free = true;
     const std::vector<int>& rows = s.envelope.row_at;
+    const VecX inverse = inverse_weights(all, rows, sharing).first;
     MatX used = -sharing.W.transpose();
     for (size_t k = 0; k < sharing.dependent.size(); ++k)
         used(s.envelope.position[sharing.dependent[k]], static_cast<Eigen::Index>(k)) = 1.0;
-    VecX inverse(rows.size());
-    for (size_t l = 0; l < rows.size(); ++l) inverse[l] = 1.0 / all.weight[rows[l]];
     const MatX S = used.transpose() * inverse.asDiagonal() * used;
     Cholesky factor;
     factor.compute(S);

@@ -12,8 +12,8 @@ struct RedundancyParameters {
     // [Bjorck: Stability analysis of the method of seminormal equations, 1987.]
     double rounding = 1e-14;  // remainder that counts as rounding, relative to the row
     int max_passes = 2;       // maximum passes
-    // Weight of multipliers of a joint's friction beside those of constraints. Friction takes this part of loads that
-    // constraints can carry, and its limit is checked to a few digits.
+    // Weight of multipliers of a joint's friction relative to the constraints that carry the same load, at any scale of
+    // their rows. Friction takes this part of the load, and its limit is checked to a few digits.
     double friction_weight = 1e-12;
 };
 
@@ -27,14 +27,15 @@ struct DescribedRows {
         double factor = 1.0;  // the row is this multiple of the kept row
         double part = 1.0;    // its minimum-norm multiplier over the multiplier of the kept row
     };
-    std::vector<Row> rows;  // constraints and contacts in their order, then directions of friction
-    VecX weight;            // by kept row: sum of the squared factors of the rows that it represents
-    bool copied = false;    // some kept row represents several rows
+    std::vector<Row> rows;     // constraints and contacts in their order, then directions of friction
+    VecX weight;               // by kept row: sum of the squared factors of the rows that it represents
+    std::vector<char> yields;  // by kept row: it belongs to friction that carries only what constraints cannot carry
+    bool copied = false;       // some kept row represents several rows
 
     // Compute parts and weights once all rows are known.
     void finish(int kept);
     // Let the rows of a joint's friction carry only what constraints cannot carry.
-    void weigh(const Block& friction);
+    void yield(const Block& friction);
     // Return the multiplier of one described row from the multipliers of the kept rows.
     double share(int row, const VecX& lam) const {
         return rows[row].kept < 0 ? 0.0 : rows[row].part * lam[rows[row].kept];

@@ -130,7 +130,7 @@ void Program::finish() {
     for (size_t e = 0; e < frictions.size(); ++e) {
         Friction& f = frictions[e];
         f.gap = f.anchor >= first_gap ? f.anchor - first_gap : -1;
-        if (f.load != Friction::Load::multiplier) described.weigh(blocks[f.block]);
+        if (f.load != Friction::Load::multiplier) described.yield(blocks[f.block]);
         if (f.gap < 0) continue;
         gaps[f.gap].elements.push_back(static_cast<int>(e));
         // Spinning and rolling resistance have their own row kind.

@@ -24,10 +24,9 @@ RestProblem::RestProblem(const Program& program, Workspace& workspace, double ti
     lam_without_ = w.now.lam;
     equation.n = problem_.rows;
     equation.W = problem_.W;
-    equation.alpha0 = problem_.slip_accelerations(p, w);
-    const double noise = relative_acceleration_rounding * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
-    for (int i = 0; i < problem_.rows; ++i)  // rows held by the constraints have no slip acceleration
-        if (problem_.W(i, i) == 0.0 && std::abs(equation.alpha0[i]) <= noise) equation.alpha0[i] = 0.0;
+    problem_.alpha0 = problem_.slip_accelerations(p, w);
+    problem_.unload_held(p, w);
+    equation.alpha0 = problem_.alpha0;
     for (size_t i = 0; i < problem_.elements.size(); ++i) describe(i, i < resting.size());
     bool by_functions = false;
     each_law<UserLaw>(p.laws, [&](const UserLaw& law) { by_functions |= law.reaction == Reaction::total; });

@@ -1,12 +1,13 @@
 #include "friction/problem.hpp"
 
+#include <cmath>
+
 #include "dynamics/acceleration.hpp"
 #include "math/lanes.hpp"
 #include "math/tolerances.hpp"
 #include "tree/mass_factor.hpp"
 
 namespace pn {
-
 
 static const Block& block_of(const Program& p, int element) { return p.blocks[p.frictions[element].block]; }
 
@@ -120,8 +121,20 @@ void FrictionProblem::clean(const Program& p, Workspace& w) {
     W = (0.5 * (W + W.transpose())).eval();
     each_unit_force(p, w, [&](int i) {
         solve_R(p.mechanism, w.now.terms, force);
-        drop_held(i, force.squaredNorm());
+        free[i] = force.squaredNorm();
+        drop_held(i, free[i]);
     });
+}
+
+void FrictionProblem::unload_held(const Program& p, Workspace& w) {
+    if (W.diagonal().all()) return;
+    force = w.now.F;
+    solve_R(p.mechanism, w.now.terms, force);
+    const double of_forces = force.norm(), of_motion = w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm();
+    for (int i = 0; i < rows; ++i) {
+        const double noise = relative_acceleration_rounding * (of_motion + std::sqrt(free[i]) * of_forces);
+        if (W(i, i) == 0.0 && std::abs(alpha0[i]) <= noise) alpha0[i] = 0.0;
+    }
 }
 
 // Set row and column i of W to zero if its response is rounding compared to the unconstrained response.

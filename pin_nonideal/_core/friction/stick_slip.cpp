@@ -113,10 +113,7 @@ struct Search {
         FrictionProblem problem(p, w, list);
         problem.clean(p, w);
         problem.alpha0 = problem.slip_accelerations(p, w);
-        const double noise =
-            relative_acceleration_rounding * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
-        for (int i = 0; i < problem.rows; ++i)  // rows held by the constraints have no slip acceleration
-            if (problem.W(i, i) == 0.0 && std::abs(problem.alpha0[i]) <= noise) problem.alpha0[i] = 0.0;
+        problem.unload_held(p, w);
         FrictionLimits limits(static_cast<int>(list.size()), problem.rows);
         for (size_t i = 0, row = 0; i < list.size(); row += problem.dims[i], ++i) {
             const SlipLimits now = static_limits(p, w, list[i], t, q, v);

@@ -107,16 +107,12 @@ bool ModeChanges::contradicts_drive(const Failure& failure) const {
 }
 
 bool ModeChanges::follow_drive() {
-    const RunState before = w.state;
-    const auto keep = [&] {
-        set_contacts(p, w, before.closed, before.mode);
-        w.state = before;
-    };
+    RunState before = w.state;
     const FoundEvent onset{FoundEvent::Kind::touch, -1, progress_.t};
     const auto failure = attempt([&] { switch_modes(system_, progress_.t, progress_.y, progress_.rate, onset); });
     if (failure || std::equal(before.mode.begin(), before.mode.end(), w.state.mode.begin())) {
-        keep();
-        if (attempt([&] { step_with_drive(); })) return false;
+        restore_modes(before);
+        if (!step_with_drive(before)) return false;
     }
     impacts_.remember_gaps();
     for (const Event& change : changes_since(system_, progress_.t, before.closed, before.mode))
@@ -126,14 +122,32 @@ bool ModeChanges::follow_drive() {
     return true;
 }
 
-// A motion that starts smoothly has no acceleration at first. Its speed shows which elements slip.
-void ModeChanges::step_with_drive() {
+// A motion that starts smoothly has no acceleration at first. Its speed shows which elements slip, once it is above the
+// rounding of the time step. `before`: modes after the time steps, which record their own events.
+bool ModeChanges::step_with_drive(RunState& before) {
     const double last = progress_.t - drive_end_ < drive_length_ ? drive_length_ : 0.0;
-    drive_length_ = std::max(2.0 * last, mode_switch_parameters.drive_step);
-    const double stop = std::min(options_.end(), progress_.t + drive_length_);
-    while (progress_.t < stop) time_stepping_.step(drive_length_, stop, options_.end());
-    drive_end_ = progress_.t;
-    switch_modes(system_, progress_.t, progress_.y, progress_.rate, std::nullopt);
+    const double first = options_.method.adaptive() ? mode_switch_parameters.drive_step
+                                                    : mode_switch_parameters.drive_part * options_.dt;
+    drive_length_ = std::max(2.0 * last, first);
+    for (int trial = 0; trial < mode_switch_parameters.max_drive_steps; ++trial, drive_length_ *= 2.0) {
+        const Progress from = progress_;
+        const double stop = std::min(options_.end(), progress_.t + drive_length_);
+        if (attempt([&] { while (progress_.t < stop) time_stepping_.step(drive_length_, stop, options_.end()); })) {
+            progress_ = from;
+            restore_modes(before);
+            continue;
+        }
+        before = w.state;
+        drive_end_ = progress_.t;
+        if (!attempt([&] { switch_modes(system_, progress_.t, progress_.y, progress_.rate, std::nullopt); })) return true;
+        restore_modes(before);
+    }
+    return false;
+}
+
+void ModeChanges::restore_modes(const RunState& before) {
+    set_contacts(p, w, before.closed, before.mode);
+    w.state = before;
 }
 
 void ModeChanges::bridge_chatter(int element) {
@@ -203,8 +217,7 @@ void ModeChanges::select_new_modes() {
 
 // Restore the motion before the mode switch that failed, and record it.
 void ModeChanges::restore_last(const RunState& before, bool has_impact) {
-    set_contacts(p, w, before.closed, before.mode);
-    w.state = before;
+    restore_modes(before);
     if (has_impact) return;
     system_.read(progress_.y);
     attempt([&] {  // if this fails too, the previous sample is the last, and the first failure is reported

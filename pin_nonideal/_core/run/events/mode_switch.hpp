@@ -15,8 +15,10 @@ struct ModeSwitchParameters {
     double max_creep_speed = 1e-8;
     // Length of a tiny step, relative to the time, in seconds below 1 s. Motions over shorter steps are lost in rounding.
     double tiny_step = 1e-10;
-    // Length [s] of the first time step in which a prescribed motion starts. Further steps are twice as long.
-    double drive_step = 1e-7;
+    // Length [s] of the first time step in which a prescribed motion starts, or its part of a fixed step. Further steps
+    // are twice as long, and at most `max_drive_steps` are tried.
+    double drive_step = 1e-7, drive_part = 1e-4;
+    int max_drive_steps = 14;
 };
 
 inline constexpr ModeSwitchParameters mode_switch_parameters{};
@@ -63,7 +65,8 @@ private:
     static bool is_undecided(const Failure& failure);
     bool is_creeping() const;
     void select_new_modes();
-    void step_with_drive();
+    bool step_with_drive(RunState& before);
+    void restore_modes(const RunState& before);
 
     const Program& p;
     Workspace& w;

@@ -100,6 +100,11 @@ bool MeanVelocity::starts_at_rest(const Program& p, Workspace& w, const Friction
     return w.scratch.r.segment(block.row, block.kept.size()).norm() <= rest_rate(start_);
 }
 
+double MeanVelocity::held_slip(const Program& p, const VecX& a) const {
+    return parameters.held_rounding *
+           (a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm() + start_.cwiseAbs().maxCoeff() / h_);
+}
+
 void MeanVelocity::meet_at_end(const Program& p, Workspace& w, VecX& b) const {
     for (int i = 0; i < p.first_gap; ++i) {
         const Block& block = p.blocks[i];

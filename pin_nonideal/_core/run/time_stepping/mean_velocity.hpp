@@ -14,6 +14,8 @@ struct MeanVelocityParameters {
     // it. The velocity at the step's end then differs by a small part of tolerance / h. Sweeps of contacts cost more.
     double configuration_tolerance = 1e-12, contact_tolerance = 1e-9;
     int max_sweeps = 6;  // maximum number of sweeps of a step
+    // Slip of an element that constraints hold which counts as rounding, relative to the velocities of the step.
+    double held_rounding = 1e-12;
     // Maximum error of a prediction of the last rate, relative to this rate, for the next rate to be predicted.
     double max_unpredicted = 0.1;
 };
@@ -61,6 +63,8 @@ public:
     void start_rates(const Program& p, Workspace& w, int block) const;
     // Check if a friction element has no slip at the velocity of the start, up to rounding.
     bool starts_at_rest(const Program& p, Workspace& w, const Friction& friction) const;
+    // Return the slip over the step's length that counts as rounding, for the acceleration a without friction.
+    double held_slip(const Program& p, const VecX& a) const;
     // Set the right-hand sides b that satisfy the constraints at the end of the step. The rows are evaluated at the
     // middle of the step, so half of their change over the step remains.
     void meet_at_end(const Program& p, Workspace& w, VecX& b) const;

@@ -120,6 +120,19 @@ void Moreau::pose_problem() {
         for (int k = 0; k < friction.dim; ++k)
             problem_.alpha0[at++] += w.scratch.r[block.row + k] / h_ + 0.5 * w.now.values[friction.block].bias[k];
     }
+    unload_held();
+}
+
+// Leave the loads of elements that constraints alone hold to the constraints. The rounding of their slip has no sign.
+void Moreau::unload_held() {
+    const double rounding = mean_.held_slip(p, a_free_);
+    for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e) {
+        const int dim = problem_.dims[e];
+        if (problem_.W.diagonal().segment(at, dim).any()) continue;
+        if (problem_.alpha0.segment(at, dim).norm() > rounding) continue;
+        problem_.alpha0.segment(at, dim).setZero();
+        w.state.percussion.segment(p.blocks[p.frictions[e].block].row, dim).setZero();
+    }
 }
 
 // Find the elements without slip at the step's start. Static friction may hold them.

@@ -48,6 +48,7 @@ private:
     void solve_without_friction(double t);
     void respond();
     void pose_problem();
+    void unload_held();
     void solve_friction(double t);
     void find_rest();
     bool give_way();

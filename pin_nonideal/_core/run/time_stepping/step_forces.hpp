@@ -73,6 +73,7 @@ private:
     void measure_free(const MeanVelocity& mean, double h, const VecX& a_free);
     double turning_rate(const StepRow& row, double h) const;
     void recall_forces();
+    void unload_held(const MeanVelocity& mean, const VecX& a_free);
     bool accept_best_forces(double h);
     bool moves();
     bool keep_rest(bool solved, const VecX& q0);

@@ -11,8 +11,8 @@ import pytest
 
 import pin_nonideal as pn
 
-from ....support.loops import at
-from ....support.mechanisms import body, empty, frame
+from ....support.loops import started_loop
+from ....support.mechanisms import body, empty
 from ....support.same_run import assert_same_run
 from ....support.seeds import ranges
 
@@ -113,41 +113,17 @@ def test_a_drive_at_rest_carries_the_weight(limit: float) -> None:
 @pytest.mark.parametrize("many", ranges(3, 30, 300))
 def test_a_drive_at_rest_holds_a_loop_as_without_friction(many: range) -> None:
     for seed in many:
-        free, rough = (driven_loop(np.random.default_rng(seed), each) for each in (False, True))
+        free, rough = (started_loop(seed, rough) for rough in (False, True))
         q, v = free.q0, np.zeros(free.model.nv)
         drive = free.constraint_slices["drive"]
         holding = free.solve(q, v, 0.0).lam[drive]
         assert rough.solve(q, v, 0.0).lam[drive] == pytest.approx(holding, rel=1e-8), seed
 
 
-def driven_loop(rng: np.random.Generator, rough: bool) -> pn.Scene:
-    """A planar four-bar in a turned plane, driven from rest at its crank, with friction in all hinges."""
-    model = empty()
-    place = at(rng.standard_normal(3), rng.uniform(-1.0, 1.0, 3))
-    # Grashof's condition: the crank turns fully.
-    crank, coupler, rocker, base = 0.2, *rng.uniform(0.8, 1.0, 3)
-    bar = {"inertia": 0.02 * np.eye(3)}
-    first = body(model, 0, pin.JointModelRZ(), "crank", 1.0, place=place, lever=(0.1, 0.0, 0.0), **bar)
-    second = body(model, first, pin.JointModelRZ(), "coupler", 1.0, place=at((crank, 0.0, 0.0)), **bar)
-    pivot = place * at((base, 0.0, 0.0))
-    third = body(model, 0, pin.JointModelRZ(), "rocker", 1.0, place=pivot, lever=(0.3, 0.0, 0.0), **bar)
-    frame(model, "coupler tip", second, at((coupler, 0.0, 0.0)))
-    frame(model, "rocker tip", third, at((rocker, 0.0, 0.0)))
-    laws = [
-        pn.JointFriction(name, coulomb=rng.uniform(0.01, 0.1), mu=0.1, radius=0.02, span=0.1)
-        for name in ("crank", "coupler", "rocker")
-    ]
-    laws.append(pn.JointFriction("loop", mu=0.1, radius=0.02, span=0.1))
-    drive = pn.PrescribedMotion("crank", pn.polynomial([0.0, 0.0, 0.0, rng.uniform(0.5, 2.0)]), name="drive")
-    closing = pn.HingeAnchor("coupler tip", "rocker tip", axis="z", name="loop")
-    scene = pn.Scene(model, constraints=[closing, drive], laws=laws if rough else [])
-    return scene.replace(q0=scene.project([0.0, 1.0, 2.0], np.zeros(3))[0])
-
-
 @pytest.mark.parametrize("many", ranges(2, 20, 300))
 def test_a_loop_with_friction_in_its_hinges_starts(many: range) -> None:
     for seed in many:
-        free, rough = (driven_loop(np.random.default_rng(seed), each) for each in (False, True))
+        free, rough = (started_loop(seed, rough) for rough in (False, True))
         exact = pn.simulate(free, 0.5 * DURATION, rtol=1e-10)
         for options in METHODS:
             run = pn.simulate(rough, 0.5 * DURATION, **options)
