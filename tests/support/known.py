@@ -101,11 +101,17 @@ KNOWN: list[Known] = [
         transformations="Radau",
     ),
     Known(
-        "time stepping with contacts takes its first modes from the end of a first step, which no event marks",
+        "time stepping with contacts takes its first modes from the end of a first step, without events",
         ("started loop 0", "a far contact", "simulate moreau"),
         scenes="started .*",
         transformations="a far contact",
         functions="simulate moreau",
+    ),
+    Known(
+        "works are no part of the error of a step, and drives that move all bodies leave no other error",
+        ("started loop 66", "friction without limit", "simulate dop853"),
+        scenes="started loop (66|81)",
+        functions="simulate dop853",
     ),
     Known(
         "a user's rows state no break at which a drive starts a joint with friction",

@@ -125,6 +125,7 @@ void Moreau::pose_problem() {
 
 // Leave the loads of elements that constraints alone hold to the constraints. The rounding of their slip has no sign.
 void Moreau::unload_held() {
+    if (problem_.W.diagonal().all()) return;
     const double rounding = mean_.held_slip(p, a_free_);
     for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e) {
         const int dim = problem_.dims[e];

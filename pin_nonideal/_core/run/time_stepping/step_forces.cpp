@@ -29,8 +29,9 @@ void StepForces::pose(const MeanVelocity& mean, double h, const VecX& a_free, bo
 
 // As Moreau::unload_held.
 void StepForces::unload_held(const MeanVelocity& mean, const VecX& a_free) {
-    const double rounding = mean.held_slip(p, a_free);
     const auto W = responses_.matrix(static_cast<int>(elements_.rows.size()));
+    if (W.diagonal().all()) return;
+    const double rounding = mean.held_slip(p, a_free);
     for (size_t e = 0, at = 0; e < elements_.parts.size(); at += elements_.cones[e].dim, ++e) {
         const int dim = elements_.cones[e].dim;
         if (elements_.parts[e].gap >= 0 || W.diagonal().segment(at, dim).any()) continue;

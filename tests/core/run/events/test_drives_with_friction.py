@@ -11,8 +11,10 @@ import pytest
 
 import pin_nonideal as pn
 
+from ....scene.test_symmetries import check
 from ....support.loops import started_loop
-from ....support.mechanisms import body, empty
+from ....support.mechanisms import body, empty, frame
+from ....support.random_trees import tree
 from ....support.same_run import assert_same_run
 from ....support.seeds import ranges
 
@@ -137,3 +139,34 @@ def test_methods_of_scipy_name_the_friction_that_a_drive_would_move() -> None:
     scene = pn.Scene(model, constraints=[drive], laws=[pn.JointFriction("carriage", coulomb=COULOMB)])
     with pytest.raises(pn.InconsistentConstraintsError, match='"dop853", let it slip'):
         pn.simulate(scene, 1.0, method="Radau")
+
+
+@pytest.mark.parametrize(
+    "contacts", [[], [pn.PointContact("hand", height=-100.0, mu=0.5)]], ids=["", "contact"]
+)
+def test_a_held_joint_with_friction_neither_slips_nor_takes_load_in_time_steps(contacts: list[Any]) -> None:
+    """The other joints move, and rounding of the velocity at the held joint has no sign."""
+    model = tree(
+        ["revolute x", "revolute unaligned", "prismatic y"], np.random.default_rng(5), parents=range(3)
+    )
+    frame(model, "hand", 3)
+    hold = pn.PrescribedMotion("j0", pn.constant(0.3), name="drive")
+    free = pn.Scene(model, constraints=[hold], contacts=contacts, q0=[0.3, -0.4, 0.1], v0=[0.0, -0.7, 0.3])
+    rough = free.replace(laws=[pn.JointFriction("j0", coulomb=0.5, static_ratio=1.2)])
+    expected, run = (pn.simulate(s, 0.25, method="moreau", dt=1e-3, record="forces") for s in (free, rough))
+    assert [e.kind for e in run.events] == []
+    np.testing.assert_allclose(run.q, expected.q, atol=1e-12)
+    np.testing.assert_allclose(run.lam[1:], expected.lam[1:], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "transformation", "function"),
+    [
+        ("started loop 1", "tonnes, kilometers, hours", "solve"),
+        ("started with friction held", "rows by hand, times 1e-4", "solve"),
+        ("started loop 2", "a far contact", "simulate rk4"),
+        ("started loop 0", "rk4", "simulate dop853"),
+    ],
+)
+def test_images_answer_as_their_scenes(name: str, transformation: str, function: str) -> None:
+    check(name, transformation, [function])
