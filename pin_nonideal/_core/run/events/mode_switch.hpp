@@ -16,9 +16,9 @@ struct ModeSwitchParameters {
     // Length of a tiny step, relative to the time, in seconds below 1 s. Motions over shorter steps are lost in rounding.
     double tiny_step = 1e-10;
     // Length [s] of the first time step in which a prescribed motion starts, or its part of a fixed step. Further steps
-    // are twice as long, and at most `max_drive_steps` are tried.
+    // are twice as long.
     double drive_step = 1e-7, drive_part = 1e-4;
-    int max_drive_steps = 14;
+    int max_drive_steps = 14;  // maximum number of these steps
 };
 
 inline constexpr ModeSwitchParameters mode_switch_parameters{};
