@@ -198,8 +198,14 @@ def linkage(seed: int = 0) -> pn.Scene:
     return pn.Scene(model, constraints=[loop], q0=q, v0=np.zeros(3), name=f"linkage {seed}")
 
 
-def started_loop(seed: int, rough: bool = True) -> pn.Scene:
-    """A planar four-bar in a turned plane, driven from rest at its crank, with friction in all hinges."""
+def started_loop(seed: int, rough: bool = True, stop: float | None = None) -> pn.Scene:
+    """A planar four-bar in a turned plane with friction in all hinges, whose crank a drive moves from rest.
+
+    Args:
+        seed: seed of lengths, placement, friction and motion.
+        rough: whether there is friction.
+        stop: time at which the drive stops [s].
+    """
     rng = np.random.default_rng(seed)
     model = empty()
     place = at(rng.standard_normal(3), rng.uniform(-1.0, 1.0, 3))
@@ -219,7 +225,9 @@ def started_loop(seed: int, rough: bool = True) -> pn.Scene:
     laws.append(pn.JointFriction("loop", mu=0.1, radius=0.02, span=0.1))
     # No hinge is at rest to first order, as the closing one is while the crank lies along the base.
     start, jerk = rng.uniform(0.5, 2.5), rng.uniform(3.0, 12.0)
-    motion = pn.polynomial([start, 0.0, 0.0, jerk / 6.0])
+    motion: Any = pn.polynomial([start, 0.0, 0.0, jerk / 6.0])
+    if stop is not None:
+        motion = pn.spline([0.2 * stop, stop], [start, start + 0.1 * jerk])
     driven = pn.PrescribedMotion("crank", motion, name="drive")
     closing = pn.HingeAnchor("coupler tip", "rocker tip", axis="z", name="loop")
     scene = pn.Scene(

@@ -350,6 +350,7 @@ void Simulation::accept(const Proposal& proposal, const std::optional<FoundEvent
     out.limited += norm.is_limited();
     const std::optional<double> to_rest = event ? std::nullopt : locator.time_to_rest();
     if (to_rest) progress.h = parameters.past_rest * *to_rest;
+    else if (const auto size = event ? std::nullopt : locator.step_after_stop()) progress.h = std::min(progress.h, *size);
     progress.t = event ? event->time : proposal.last && !to_rest ? proposal.stop : stepper.t0 + stepper.h;
     progress.numerical_energy += system.numerical_energy;
     const bool arrives = event && event->kind == FoundEvent::Kind::rest_or_limit;

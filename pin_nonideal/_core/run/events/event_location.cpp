@@ -57,6 +57,26 @@ bool EventLocator::has_arrived(int e) const {
     return norm_.of_speed(slip_at_start_[e]) <= 1.0;
 }
 
+bool EventLocator::is_rest(double slip) const {
+    return slip <= rest_speed * (1.0 + system_.velocity(stepper_.y1).cwiseAbs().maxCoeff());
+}
+
+// Check if prescribed motions have stopped an element by the step's end and leave it at rest.
+bool EventLocator::is_stopped(int e) const {
+    if (!is_rest(slip_velocity(w.now, p.frictions[e]).norm())) return false;
+    const double largest = w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm();
+    return slip_acceleration(p, w, p.frictions[e]).norm() <= parameters.stopped_acceleration * largest;
+}
+
+std::optional<double> EventLocator::step_after_stop() const {
+    if (!follows_drives()) return std::nullopt;
+    const auto stops = [&](int e) {
+        return is_rest(slip_velocity(w.now, p.frictions[e]).norm()) && !is_rest(system_.slip(stepper_.start_rate(), e));
+    };
+    if (std::none_of(w.now.slipping.begin(), w.now.slipping.end(), stops)) return std::nullopt;
+    return parameters.part_after_stop * stepper_.h;
+}
+
 // Move the step's end to `size`, or repeat the step if the move is too long.
 void EventLocator::correct_end_to(double size) {
     if (std::abs(size - stepper_.h) > parameters.moved_part * stepper_.h) return stepper_.end_at(size);
@@ -139,7 +159,7 @@ std::optional<FoundEvent> EventLocator::locate() {
         return FoundEvent{kind, index, stepper_.t0 + stepper_.h};
     };
     for (auto e = w.now.slipping.rbegin(); e != w.now.slipping.rend(); ++e)
-        if (has_arrived(*e)) return event_of(FoundKind::rest_or_limit, *e);
+        if (has_arrived(*e) || (follows_drives() && is_stopped(*e))) return event_of(FoundKind::rest_or_limit, *e);
     time_to_rest_.reset();
     std::optional<Crossing> crossing = search_.first();
     if (crossing) step_onto(*crossing);

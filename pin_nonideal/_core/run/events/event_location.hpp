@@ -20,6 +20,9 @@ struct EventLocationParameters {
     // Slip passes by rest if it keeps more than `rest_part` of its speed at the step's start and exceeds
     // `passing_speed`.
     double rest_part = 0.05, passing_speed = 1e-6;
+    // Slip acceleration of an element that prescribed motions have stopped, relative to the largest acceleration. At the
+    // instant of the stop it may still decelerate: the next step is `part_after_stop` of the step and shows the rest.
+    double stopped_acceleration = 1e-9, part_after_stop = 1e-4;
     // Length of a fixed step toward a rest: relative to the time to the rest, and minimum relative to the full step.
     double part_toward_rest = 0.5, min_shortened_part = 1e-3;
     // A step that misses a rest ends before it, by `part_before_rest` of the time to the rest. If slip begins with
@@ -53,12 +56,18 @@ public:
     // Return the time from the step's end to the rest of slip before which the step was ended, if any.
     std::optional<double> time_to_rest() const { return time_to_rest_; }
 
+    // Return the length of the next step if prescribed motions may have stopped an element at the step's end.
+    std::optional<double> step_after_stop() const;
     // Shorten a fixed step toward the rest of slip in several directions, whose direction can turn fast at the end. The
     // workspace must be evaluated at the step's start.
     double shorten_toward_rest(const VecX& rate, double size);
 
 private:
     bool has_arrived(int element) const;
+    // Prescribed motions may stop elements, which methods of SciPy do not release again.
+    bool follows_drives() const { return p.moves_in_time && !stepper_.method.outside(); }
+    bool is_rest(double slip) const;
+    bool is_stopped(int element) const;
     bool passes_by_rest(int element) const;
     bool misses_rest(const Watch& watch) const;
 

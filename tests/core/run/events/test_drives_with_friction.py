@@ -86,6 +86,50 @@ def test_a_carriage_with_friction_starts(motion: str, options: dict[str, Any]) -
         assert [e.kind for e in other.events if e.kind in ("stick", "slip")][:1] == ["slip"]
 
 
+def trapezoid(t: float, start: float) -> tuple[float, float, float]:
+    """0.1875 m forward from `start` within a second: the acceleration of 1 m/s^2 jumps four times."""
+    s = t - start
+    if s < 0.0 or s >= 1.0:
+        return (0.0 if s < 0.0 else 0.1875), 0.0, 0.0
+    if s < 0.25:
+        return 0.5 * s**2, s, 1.0
+    if s < 0.75:
+        return 0.03125 + 0.25 * (s - 0.25), 0.25, 0.0
+    return 0.1875 - 0.5 * (1.0 - s) ** 2, 1.0 - s, -1.0
+
+
+STOPS: dict[str, tuple[Callable[[], Any], list[float]]] = {
+    "there and back": (
+        lambda: pn.spline([0.5, 1.0, 1.3, 1.7], [0.0, 0.3, 0.3, 0.0]),
+        [0.5, 1.7],
+    ),
+    "spline": (lambda: pn.spline([0.5, 1.5], [0.0, 0.3]), [0.5, 1.5]),
+    "minimum jerk": (lambda: minimum_jerk, [0.5, 1.5]),
+    "trapezoid": (lambda: lambda t: trapezoid(t, 0.5), [0.5, 1.5]),
+    "trapezoid between steps": (lambda: lambda t: trapezoid(t, 0.4503), [0.4503, 1.4503]),
+}
+
+
+@pytest.mark.parametrize("options", METHODS, ids=lambda options: options.get("method", "dop853"))
+@pytest.mark.parametrize("motion", STOPS)
+def test_a_carriage_that_its_drive_stops_rests(motion: str, options: dict[str, Any]) -> None:
+    """At rest the drive carries the load without the friction, which neither holds nor pushes."""
+    model, _ = carriage()
+    make, (start, stop) = STOPS[motion]
+    drive = pn.PrescribedMotion("carriage", make(), name="drive")
+    free = pn.Scene(model, constraints=[drive], q0=[0.0, 0.3])
+    rough = free.replace(laws=[pn.JointFriction("carriage", coulomb=COULOMB)])
+    options = {**options, "output_dt": 0.05, "record": "forces"}
+    expected, run = (pn.simulate(scene, DURATION, **options) for scene in (free, rough))
+    at_rest = (run.t[run.grid] < start - 0.01) | (run.t[run.grid] > stop + 0.01)
+    force, expected_force = run.lam[run.grid][at_rest], expected.lam[expected.grid][at_rest]
+    np.testing.assert_allclose(force, expected_force, atol=1e-7 if "rtol" in options else 1e-2)
+    kinds = [e for e in run.events if e.kind in ("stick", "slip")]
+    assert (kinds[0].kind, kinds[-1].kind) == ("slip", "stick")
+    assert kinds[0].time == pytest.approx(start, abs=2e-3)
+    assert kinds[-1].time == pytest.approx(stop, abs=2e-3)
+
+
 def test_a_drive_starts_the_same_way_in_each_run() -> None:
     model, _ = carriage()
     drive = pn.PrescribedMotion("carriage", pn.polynomial([0.0, 0.0, 0.0, 0.2]), name="drive")
@@ -131,6 +175,19 @@ def test_a_loop_with_friction_in_its_hinges_starts(many: range) -> None:
             run = pn.simulate(rough, 0.5 * DURATION, **options)
             assert np.abs(run.q[-1] - exact.q[-1]).max() < 1e-8, (seed, options)
             assert np.abs(run.v[-1] - exact.v[-1]).max() < 1e-7, (seed, options)
+
+
+@pytest.mark.parametrize("many", ranges(2, 20, 300))
+def test_a_loop_that_its_drive_stops_rests(many: range) -> None:
+    for seed in many:
+        free, rough = (started_loop(seed, rough, stop=0.5) for rough in (False, True))
+        exact = pn.simulate(free, 0.7, rtol=1e-10, record="forces")
+        for options in METHODS:
+            run = pn.simulate(rough, 0.7, record="forces", **options)
+            assert np.abs(run.q[-1] - exact.q[-1]).max() < 1e-8, (seed, options)
+            assert run.lam[-1] == pytest.approx(exact.lam[-1], rel=1e-6, abs=1e-6), (seed, options)
+            of_crank = [e for e in run.events if e.element == "JointFriction(crank)"]
+            assert [e.kind for e in of_crank if e.kind != "reverse"] == ["slip", "stick"], (seed, options)
 
 
 def test_methods_of_scipy_name_the_friction_that_a_drive_would_move() -> None:
