@@ -126,12 +126,14 @@ template <class Act>
 bool System::attempt_motion(double t, bool may_lack_motion, const Act& act) {
     const auto failure = attempt({Failure::Kind::paradox, Failure::Kind::not_converged, Failure::Kind::inconsistent}, act);
     if (!failure) return true;
-    // A prescribed motion may begin at the step's end to move elements that stuck in the step.
     const bool is_inconsistent = failure->kind == Failure::Kind::inconsistent;
-    if (is_inconsistent && !(p.moves_in_time && w.state.sticks_anywhere())) throw *failure;
-    const bool satisfied = is_inconsistent || ng == 0 || failure->solutions == Failure::Solutions::unproven;
+    // A prescribed motion may begin at the step's end to move elements that stuck in the step.
+    const bool of_drive =
+        is_inconsistent && p.moves_in_time && role(p.blocks[failure->elements.front()].kind) == Role::direction;
+    if (is_inconsistent && !of_drive) throw *failure;
+    const bool satisfied = of_drive || ng == 0 || failure->solutions == Failure::Solutions::unproven;
     if (!(may_lack_motion || satisfied)) throw *failure;
-    if (may_lack_motion && !is_inconsistent) {
+    if (may_lack_motion && !of_drive) {
         w.now.no_motion = true;
         w.now.several_element = failure->elements.empty() ? 0 : failure->elements.front();
     }

@@ -190,6 +190,20 @@ def test_a_loop_that_its_drive_stops_rests(many: range) -> None:
             assert [e.kind for e in of_crank if e.kind != "reverse"] == ["slip", "stick"], (seed, options)
 
 
+@pytest.mark.parametrize("options", METHODS, ids=lambda options: options.get("method", "dop853"))
+def test_drives_that_contradict_each_other_are_an_error_beside_friction(options: dict[str, Any]) -> None:
+    """Friction that sticks elsewhere is not the cause."""
+    model, _ = carriage()
+    drives = [
+        pn.PrescribedMotion("carriage", pn.spline([0.1, 1.0], [0.0, 0.3]), name="drive"),
+        pn.UserConstraint(lambda t, q, v, data: (np.array([[1.0, 0.0]]), np.zeros(1)), 1, name="still"),
+    ]
+    for laws in ([], [pn.JointFriction("pendulum", coulomb=10.0)]):
+        scene = pn.Scene(model, constraints=drives, laws=laws, q0=[0.0, 0.3])
+        with pytest.raises(pn.InconsistentConstraintsError, match=r'"still" and "drive"|"drive" and "still"'):
+            pn.simulate(scene, 0.8, **options)
+
+
 def test_methods_of_scipy_name_the_friction_that_a_drive_would_move() -> None:
     model, _ = carriage()
     drive = pn.PrescribedMotion("carriage", pn.polynomial([0.0, 0.0, 0.0, 0.2]), name="drive")
