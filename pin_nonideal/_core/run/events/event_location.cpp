@@ -63,7 +63,7 @@ bool EventLocator::is_rest(double slip) const {
 
 // Check if prescribed motions have stopped an element by the step's end and leave it at rest.
 bool EventLocator::is_stopped(int e) const {
-    if (!is_rest(slip_velocity(w.now, p.frictions[e]).norm())) return false;
+    if (w.state.is_sticking_deferred[e] || !is_rest(slip_velocity(w.now, p.frictions[e]).norm())) return false;
     const double largest = w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm();
     return slip_acceleration(p, w, p.frictions[e]).norm() <= parameters.stopped_acceleration * largest;
 }
