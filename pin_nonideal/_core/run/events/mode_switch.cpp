@@ -132,7 +132,7 @@ bool ModeChanges::step_with_drive(RunState& before) {
     for (int trial = 0; trial < mode_switch_parameters.max_drive_steps; ++trial, drive_length_ *= 2.0) {
         const Progress from = progress_;
         const double stop = std::min(options_.end(), progress_.t + drive_length_);
-        if (attempt([&] { while (progress_.t < stop) time_stepping_.step(drive_length_, stop, options_.end()); })) {
+        if (attempt([&] { time_stepping_.step(drive_length_, stop, options_.end()); })) {
             progress_ = from;
             restore_modes(before);
             continue;
