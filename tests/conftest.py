@@ -1,4 +1,4 @@
-"""Import of the oracles, one thread of BLAS, default handling of Ctrl-C, and a fixture for written files."""
+"""Oracles, one thread of BLAS, default handling of Ctrl-C, fewer parameters to collect, and written files."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 from hypothesis import settings
+
+DEFAULT_SELECTION = "not slow and not stress"  # as in pyproject.toml
 
 # Set before the first import of numpy: the workers of the tests use all cores.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -36,6 +38,20 @@ def _import_oracles() -> None:
 
 
 _import_oracles()
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Drop parameters that the default selection leaves out: the collection of 36,000 items takes long."""
+    if metafunc.config.option.markexpr != DEFAULT_SELECTION:
+        return
+    for mark in metafunc.definition.iter_markers("parametrize"):
+        values = mark.args[1] if len(mark.args) > 1 else None
+        if isinstance(values, list):
+            values[:] = [value for value in values if not _is_left_out(value)] or values[:1]
+
+
+def _is_left_out(value: object) -> bool:
+    return any(mark.name in ("slow", "stress") for mark in getattr(value, "marks", ()))
 
 
 @pytest.fixture

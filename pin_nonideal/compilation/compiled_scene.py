@@ -59,6 +59,7 @@ class CompiledScene:
         point_names: names of all contacts of the core, in the order of their descriptions.
         contacts: contacts of the user, as groups of `point_names`; each stop is one contact.
         multipliers: rows of `lam`, as groups of the rows of the core.
+        element_names: names of the friction elements of the core.
         elements: friction elements of the user, as groups of those of the core.
         laws: laws of the user and of contacts with friction, as groups of those of the core.
         works: columns of powers and works, as groups of those of the core.
@@ -99,7 +100,8 @@ class CompiledScene:
         self.block_names = block_names(self.program)
         self.point_names = [self.block_names[block] for block in self.program.contacts]
         self.contacts = Groups(self.point_names, self.contact_of)
-        self.elements = Groups(self.program.element_names, self.contact_of)
+        self.element_names = self.program.element_names
+        self.elements = Groups(self.element_names, self.contact_of)
         self.laws = Groups(self.program.law_names, self.contact_of)
         self.works = Groups(self.program.power_names, self.contact_of)
         self.opening_names = self.block_names[self.program.first_gap :]

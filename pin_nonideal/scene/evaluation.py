@@ -140,6 +140,6 @@ class Evaluator:
             q: configuration on the constraints, (nq,).
             v: velocity on them, (nv,).
         """
-        slipping = [core.Mode.slip_plus] * len(self._compiled.program.element_names)
+        slipping = [core.Mode.slip_plus] * len(self._compiled.element_names)
         self.runner.solve(q, v, 0.0, modes=slipping)
         return int(self.runner.rank)

@@ -133,7 +133,7 @@ def _resultant(compiled: CompiledScene, q: Array, t: float, forces: list[Array],
 
 def _elements_at_limit(compiled: CompiledScene, cones: LimitCones, factor: float) -> str:
     """Return the elements at their limits where friction needs larger limits."""
-    elements = compiled.program.element_names
+    elements = compiled.element_names
     names = contact_names((elements[e] for e in cones.at_limits(factor)), compiled.contact_of)
     where = f"; at their limits: {_quote(names)}" if names else ""
     return f"dry friction needs {factor:.4g} times its limits{where}"
@@ -161,7 +161,7 @@ def _unheld(at_rest: AtRest, q: Array, cones: LimitCones) -> str:
             + _quote(contact_names((points[k] for k in pulls), compiled.contact_of))
         )
     if missing_friction:
-        elements = compiled.program.element_names
+        elements = compiled.element_names
         names = _quote(contact_names((elements[e] for e in missing_friction), compiled.contact_of))
         largest = max(missing_friction.values())
         parts.append(f"friction without a load would have to hold up to {largest:.4g} (N or N m): {names}")

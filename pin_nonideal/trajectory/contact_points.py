@@ -89,7 +89,7 @@ def slip_axes(compiled: CompiledScene, q: Array, t: float, elements: Sequence[in
     """
     program = compiled.program
     axes = core.slip_axes(program, np.ascontiguousarray(q[None]), np.array([t]), list(elements))
-    sides = [side_of_point(compiled, program.element_names[e]) for e in elements]
+    sides = [side_of_point(compiled, compiled.element_names[e]) for e in elements]
     return np.asarray(axes.reshape(-1, 2, 3) * np.reshape(sides, (-1, 1, 1)))
 
 

@@ -165,7 +165,7 @@ def _event(compiled: CompiledScene, event: core.Event, functions: Sequence[str])
         return Event(event.time, event.kind.name, str(joint))
     if not event.of_contact and event.kind is not core.EventKind.jump:
         # Without friction, a cluster of events consists of contact events.
-        names = compiled.program.element_names or compiled.opening_names
+        names = compiled.element_names or compiled.opening_names
         return Event(event.time, event.kind.name, names[event.element])
     name = compiled.block_names[event.element]
     if event.kind not in (core.EventKind.impact, core.EventKind.jump):

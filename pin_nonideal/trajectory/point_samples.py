@@ -148,7 +148,7 @@ def _reactions(compiled: CompiledScene, outcome: core.Outcome, names: Sequence[s
 
 def _modes(compiled: CompiledScene, outcome: core.Outcome, names: Sequence[str]) -> NDArray[np.int8]:
     """Return the modes of the friction elements of points, (nt, n)."""
-    elements = compiled.program.element_names
+    elements = compiled.element_names
     column = {name: k for k, name in enumerate(elements)}
     modes = outcome.modes.reshape(len(outcome.t), len(elements)) if elements else None
     shown = np.full((len(outcome.t), len(names)), OPEN, dtype=np.int8)

@@ -69,6 +69,7 @@ def test_prescribed_wheels_by_methods_outside_the_core(kind, method, seed):
     assert miss(seed, kind, 20.0, method=method, rtol=1e-7, atol=1e-9) < ADDED * 1e-7
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ORDERED)
 @pytest.mark.parametrize("seed", seeds(range(30), always=[0])[:1])
 def test_fixed_steps_have_their_order(kind, seed):

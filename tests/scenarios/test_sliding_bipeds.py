@@ -59,6 +59,7 @@ def test_slides_on(mu, v0):
         np.testing.assert_allclose(friction, mu * force[slips, 2], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_straight_legs_go_on_by_time_stepping():
     """Rows of the feet lose their rank at straight legs, and loads grow without bound nearby.
 

@@ -198,7 +198,7 @@ def test_a_rod_that_grows_too_long():
     assert run.violation.max() < 1e-9
 
 
-@pytest.mark.parametrize("method", ["dop853", "Radau"])
+@pytest.mark.parametrize("method", ["dop853", pytest.param("Radau", marks=pytest.mark.slow)])
 def test_a_rocker_that_is_driven_through_its_dead_point(method):
     """Looser tolerances do not help there, so the message names the constraints of the position instead."""
     scene = pn.load("four_bar")

@@ -74,7 +74,7 @@ def closed(seed: int, length: float = 1.0, **more) -> np.ndarray | None:
 SAME = [{"length": 1e-3}, {"length": 1e3}, {"times": 2}, {"factor": 7.3e3}, {"factor": 1e-4}]
 
 
-@pytest.mark.parametrize("seed", seeds(range(300), count=3))
+@pytest.mark.parametrize("seed", seeds(range(300), count=1))
 def test_units_and_copies_of_rows_change_no_closure(seed: int) -> None:
     found = closed(seed)
     for changed in SAME:

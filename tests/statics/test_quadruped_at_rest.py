@@ -50,11 +50,11 @@ def random_friction(seed):
 @pytest.mark.parametrize(
     ("friction", "sway", "seed"),
     [
-        (CONSTANT, 0.0, 0),
+        pytest.param(CONSTANT, 0.0, 0, marks=pytest.mark.slow),
         (CONSTANT, 0.05, 0),
-        (LOADED, 0.0, 0),
+        pytest.param(LOADED, 0.0, 0, marks=pytest.mark.slow),
         (LOADED, 0.05, 1),
-        (LOADED, 0.05, 3),
+        pytest.param(LOADED, 0.05, 3, marks=pytest.mark.slow),
     ],
 )
 def test_it_comes_to_rest(friction, sway, seed):
@@ -62,7 +62,9 @@ def test_it_comes_to_rest(friction, sway, seed):
     assert (come_to_rest(friction, sway, seed).v[-1] == 0.0).all()
 
 
-@pytest.mark.parametrize("seed", [0, 13, 37, 49, 55])
+@pytest.mark.parametrize(
+    "seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (13, 37, 49, 55))]
+)
 def test_random_friction_never_gives_energy(seed):
     """Stances in which changes of mode once went round in a circle, at one instant."""
     run = come_to_rest(*random_friction(seed), seed)

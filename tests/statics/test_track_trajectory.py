@@ -440,7 +440,9 @@ def as_given(samples, form):
     return samples if kept is None else {names[k]: samples[:, k] for k in kept}
 
 
-@pytest.mark.parametrize("form", ["array", "three names", "two names"])
+@pytest.mark.parametrize(
+    "form", ["two names", *(pytest.param(form, marks=pytest.mark.slow) for form in ("array", "three names"))]
+)
 @pytest.mark.parametrize("wrong", ["q", "v"])
 def test_a_reference_that_opens_a_loop_is_refused_before_the_first_step(four_bar, form, wrong, tmp_path):
     """From the third sample on the rocker is off: the message names loop, size, time and remedy."""

@@ -10,6 +10,7 @@ import sys
 import tokenize
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from pathlib import Path
 
 MIN_WORDS = 4  # shorter pieces are labels
@@ -35,7 +36,7 @@ class Sentence:
     line: int
     text: str
 
-    @property
+    @cached_property
     def words(self) -> list[str]:
         """Return the words of the sentence in lower case, without spans of code."""
         return [word.lower() for word in WORD.findall(CODE_SPAN.sub(" ", self.text))]
@@ -132,9 +133,14 @@ def sources_below(root: Path) -> list[Path]:
     )
 
 
+@lru_cache(maxsize=1)
+def _nodes(text: str) -> list[ast.AST]:
+    return list(ast.walk(ast.parse(text)))
+
+
 def _docstrings(text: str) -> Iterator[tuple[int, str]]:
     documented = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
-    for node in ast.walk(ast.parse(text)):
+    for node in _nodes(text):
         if isinstance(node, documented) and (string := ast.get_docstring(node)):
             first = node.body[0].lineno
             for offset, block in _blocks(string.splitlines()):
@@ -143,11 +149,11 @@ def _docstrings(text: str) -> Iterator[tuple[int, str]]:
 
 def _python_literals(text: str) -> Iterator[tuple[int, str]]:
     """Yield paragraphs of the string literals that are no docstrings, with code spans for fields."""
-    tree = ast.parse(text)
+    nodes = _nodes(text)
     documented = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
-    read = {id(node.body[0].value) for node in ast.walk(tree)
+    read = {id(node.body[0].value) for node in nodes
             if isinstance(node, documented) and ast.get_docstring(node) is not None}  # fmt: skip
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.JoinedStr):
             read |= {id(part) for part in node.values}
             string = "".join(str(p.value) if isinstance(p, ast.Constant) else "`x`" for p in node.values)

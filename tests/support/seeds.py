@@ -1,4 +1,4 @@
-"""Seeds of a randomized test: ten by default, all with -m slow."""
+"""Seeds of a randomized test: five by default, all with -m slow."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-BY_DEFAULT = 10
+BY_DEFAULT = 5
 
 
 def seeds(every: Iterable[int], always: Iterable[int] = (), count: int = BY_DEFAULT) -> list[Any]:
@@ -16,7 +16,7 @@ def seeds(every: Iterable[int], always: Iterable[int] = (), count: int = BY_DEFA
     Args:
         every: all seeds.
         always: additional seeds of a default run, each with a reason at the call.
-        count: number of seeds of a default run; fewer than ten for slow tests.
+        count: number of seeds of a default run; fewer than five for slow tests, more for fast ones.
     """
     listed, kept = list(every), set(always)
     kept |= set([seed for seed in listed if seed not in kept][: count - len(kept)])

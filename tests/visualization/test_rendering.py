@@ -39,6 +39,7 @@ def test_a_picture_shows_the_robot_at_its_time(run: Any, tmp_path: Path) -> None
     assert np.count_nonzero(np.abs(pictures[0] - pictures[1]).max(axis=2) > 30) > 100
 
 
+@pytest.mark.slow
 @needs_browser
 def test_a_saved_run_becomes_a_moving_picture(run: Any, tmp_path: Path, capsys: Any) -> None:
     saved, out = run.save(tmp_path / "run.npz"), tmp_path / "out.gif"
@@ -63,6 +64,7 @@ def test_a_saved_run_becomes_a_moving_picture(run: Any, tmp_path: Path, capsys: 
     assert sorted(path.name for path in tmp_path.iterdir()) == ["out.gif", "run.npz"]
 
 
+@pytest.mark.slow
 @needs_browser
 def test_a_video_is_written(run: Any, tmp_path: Path) -> None:
     imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg")

@@ -105,6 +105,7 @@ def test_the_reading_of_a_plot_follows_the_pointer(arm: Any) -> None:
     assert reading.inner_text() == "0"
 
 
+@pytest.mark.slow
 def test_an_event_is_named_under_the_pointer(arm: Any) -> None:
     box = arm.page.locator("#timeline").bounding_box()
     found = ""
@@ -133,6 +134,7 @@ def test_the_camera_turns_and_returns(loop: Any) -> None:
     assert changed(before[inside], loop.watched.picture(0.0)[inside]) == 0
 
 
+@pytest.mark.slow
 def test_it_plays_by_itself_unless_told_not_to(browser: Any, loop: Any) -> None:
     watched = Watched(browser, loop.path, fragment="")
     watched.page.wait_for_function("() => replay.playing && replay.time > 0")

@@ -57,6 +57,7 @@ def test_the_page_opens_without_a_request_an_error_or_a_warning(arm: Any, loop: 
         assert opened.watched.complaints == []
 
 
+@pytest.mark.slow
 def test_the_watch_hears_what_reaches_for_the_network(browser: Any, loop: Any, tmp_path: Path) -> None:
     """Negative control of the test above."""
     text = loop.path.read_text(encoding="utf-8")
@@ -226,6 +227,7 @@ def test_a_simulated_robot_stands_where_its_run_says(browser: Any, tmp_path: Pat
     watched.close()
 
 
+@pytest.mark.slow
 def test_a_notebook_shows_the_page_in_place(browser: Any, loop: Any) -> None:
     page = replay(loop.run)
     assert isinstance(page, ReplayPage)

@@ -136,6 +136,7 @@ def test_a_search_opens_the_sections_that_have_hits(loop: Watched) -> None:
         section.evaluate("one => { one.open = true; }")
 
 
+@pytest.mark.slow
 def test_curves_of_a_plot_are_eight_colors_and_then_dashed(loop: Watched) -> None:
     page = loop.page
     page.locator("#search").fill("N, N m")
@@ -162,7 +163,7 @@ def test_one_quantity_over_another_is_plotted_and_seeks(loop: Watched) -> None:
     assert page.locator(".plot").count() == before
 
 
-@pytest.mark.parametrize("law", ["bearing", "crank friction"])
+@pytest.mark.parametrize("law", ["bearing", pytest.param("crank friction", marks=pytest.mark.slow)])
 def test_headings_of_friction_name_it_once(law: str, browser: Any, tmp_path: Path) -> None:
     hinge = pn.JointFriction("crank_joint", mu=0.2, radius=0.01, viscous=0.3, name=law)
     scene = pn.load("four_bar").replace(laws=[hinge])
@@ -179,7 +180,8 @@ def test_headings_of_friction_name_it_once(law: str, browser: Any, tmp_path: Pat
     ]
 
 
-SIZES = [(1400, 900), pytest.param((900, 500), marks=pytest.mark.slow), (420, 800)]
+WIDER = ((900, 500), (1400, 900))
+SIZES = [(420, 800), *(pytest.param(size, marks=pytest.mark.slow) for size in WIDER)]
 
 
 @pytest.mark.parametrize("size", SIZES, ids=str)
@@ -351,6 +353,7 @@ def test_the_camera_follows_a_chosen_body(loop: Watched) -> None:
     loop.page.keyboard.press("r")
 
 
+@pytest.mark.slow
 def test_views_look_along_the_axes(loop: Watched) -> None:
     pictures = []
     for name in ("front", "side", "top", "usual"):
@@ -359,6 +362,7 @@ def test_views_look_along_the_axes(loop: Watched) -> None:
     assert min(changed(pictures[i], pictures[j]) for i in range(4) for j in range(i)) > 300
 
 
+@pytest.mark.slow
 def test_the_address_brings_back_what_was_seen(browser: Any, loop: Watched, tmp_path: Any) -> None:
     loop.run("() => { replay.seek(0.4321); document.getElementById('speed').value = '0.5'; }")
     loop.page.locator("#speed").select_option("0.5")
@@ -385,6 +389,7 @@ def pivots(page: Watched) -> Any:
     return page.run("() => [[0, 0, 0], [0.9, 0, 0]].map((place) => replay.onScreen(place))")
 
 
+@pytest.mark.slow
 def test_a_link_frames_the_motion_for_the_window_that_opens_it(browser: Any, tmp_path: Path) -> None:
     """A copied link of a large window moves the robot out of no small one; a view moved by hand is kept."""
     path = pn.replay(four_bar(), tmp_path / "linked.html")
@@ -443,6 +448,7 @@ def test_tab_walks_through_all_controls(loop: Watched) -> None:
     assert wanted <= seen
 
 
+@pytest.mark.slow
 def test_the_page_is_dark_where_the_browser_is(browser: Any, tmp_path: Any) -> None:
     path = pn.replay(four_bar(), tmp_path / "dark.html")
     context = browser.new_context(color_scheme="dark", offline=True)

@@ -116,10 +116,8 @@ def paper_run(name: str) -> tuple[Any, Any]:
     return run, lambda t, q, v: (block.paper_ideal(t), block.paper_nonideal(t, v))
 
 
-SEEN = ["ring", *(pytest.param(name, marks=pytest.mark.slow) for name in ("particle", "incline"))]
-
-
-@pytest.mark.parametrize("name", SEEN)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["ring", "particle", "incline"])
 def test_the_papers_examples_show_constraint_path_and_forces(opened: Any, name: str) -> None:
     run, paper = paper_run(name)
     page = opened(run)
@@ -183,7 +181,7 @@ def test_a_surface_is_traced_beside_the_path_of_its_point() -> None:
 
 
 MORE = ("rolling_disk", "belt_oscillator", "knife_edge_sleigh", "andrews_squeezer")
-IN_VIEW = ["four_bar", *(pytest.param(name, marks=pytest.mark.slow) for name in MORE)]
+IN_VIEW = ["four_bar", *MORE]
 
 
 def stays_in_view(page: Watched, name: str) -> None:
@@ -196,6 +194,7 @@ def stays_in_view(page: Watched, name: str) -> None:
         assert 0.0 <= top <= bottom <= canvas["height"], (name, part, box)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", IN_VIEW)
 def test_a_robot_stays_in_view(opened: Any, name: str) -> None:
     run = pn.simulate(pn.load(name), 0.03 if name == "andrews_squeezer" else 3.0)
@@ -218,6 +217,7 @@ def test_a_chain_of_500_dofs_stays_in_view(opened: Any) -> None:
     stays_in_view(opened(run), "chain")
 
 
+@pytest.mark.slow
 def test_a_travel_of_a_thousand_seconds_is_followed(opened: Any) -> None:
     """A cart with a pendulum that goes 5 km: the camera goes with it."""
     model = jointed(pin.JointModelPX(), pin.JointModelRY())
@@ -364,7 +364,7 @@ def luminance(color: str) -> float:
     return float(np.dot([0.2126, 0.7152, 0.0722], linear))
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("scheme", ["light", pytest.param("dark", marks=pytest.mark.slow)])
 def test_curves_are_seen_on_their_paper(opened: Any, scheme: str) -> None:
     model = jointed(*[pin.JointModelRZ()] * 8)
     page = opened(run_of(model, np.linspace(0.0, 1.0, 9), lambda t: t * np.arange(8.0)))
@@ -411,6 +411,7 @@ def test_on_a_short_screen_curves_are_seen_and_the_heading_is_beside_the_robot(o
     assert min(tops) >= heading["y"] + heading["height"]
 
 
+@pytest.mark.slow
 def test_numbers_do_not_cover_each_other(opened: Any) -> None:
     page = opened(pn.simulate(pn.load("four_bar"), 1.0, output_dt=0.01, record=("forces", "energy")))
     for time in (0.2, 0.5, 0.8):

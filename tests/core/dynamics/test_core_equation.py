@@ -38,7 +38,7 @@ def combination(scene, weights):
     )
 
 
-@pytest.mark.parametrize("name", ["robot_delta", "digit_like"])
+@pytest.mark.parametrize("name", ["robot_delta", pytest.param("digit_like", marks=pytest.mark.slow)])
 def test_closures_of_robots_from_the_community(name):
     """Overconstrained '6d' closures, and masses whose matrix has a condition beyond 1e7."""
     rng = np.random.default_rng(1)

@@ -96,9 +96,9 @@ def sledge():
 SCENES = {"chain": lambda: chain([0.01, 0.02]), "stiff chain": lambda: chain([0.01, 100.0]), "loop": linkage}
 
 
-# Every scene by Radau, and each method on several scenes; the loop takes seconds.
+# The loop takes seconds.
 ANSWERED = [
-    pytest.param(name, method, marks=[pytest.mark.slow] * (name == "loop" and method != "Radau"))
+    pytest.param(name, method, marks=[pytest.mark.slow] * (name == "loop"))
     for name in (*SCENES, "sledge")
     for method in METHODS
 ]

@@ -20,7 +20,7 @@ KINDS = ("clamped", "natural", "pulse", "zigzag", "profile")
 LONGER = [
     pytest.param(kind, 1.0, marks=pytest.mark.slow) for kind in ("clamped", "pulse", "zigzag", "profile")
 ]
-ORDERED = [("natural", 1.0), ("zigzag", 4.0), *LONGER]
+ORDERED = [("natural", 1.0), pytest.param("zigzag", 4.0, marks=pytest.mark.slow), *LONGER]
 # Sum of the errors of all steps, in tolerances at 1 rad/s, and rounding of fast pulses.
 ADDED, FLOOR = 300.0, 1e-10
 BALANCE = 1e-9

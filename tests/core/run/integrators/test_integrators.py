@@ -203,7 +203,7 @@ def test_sampled_control_is_held_and_sampled_on_its_grid():
 # --- Constraints over a run -------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("rtol", [1e-4, 1e-9])
+@pytest.mark.parametrize("rtol", [1e-4, pytest.param(1e-9, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("kind", TREES)
 def test_projection_keeps_every_kind_at_rounding(kind, rtol):
     make, q, v = constrained(kind, 1)

@@ -97,6 +97,7 @@ def test_ordinary_runs_are_not_limited(name):
     assert "limited by rounding" not in str(run)
 
 
+@pytest.mark.slow
 def test_a_resumed_run_is_limited_alike(tmp_path):
     model, path, calls = arm_with_a_finger(1e-3), tmp_path / "run.npz", 0
 

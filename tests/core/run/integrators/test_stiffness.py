@@ -173,6 +173,7 @@ def test_the_steps_that_a_run_may_take():
         pn.simulate(scene, 1.0, method="BDF", max_steps=3)
 
 
+@pytest.mark.slow
 def test_a_stiff_run_that_may_take_its_steps():
     run = pn.simulate(pulled(3e5), 2.0, max_steps=np.inf, output_dt=1.0)
     assert run.stats.steps > 9e4

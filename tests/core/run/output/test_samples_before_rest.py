@@ -25,7 +25,9 @@ CLEAR, FORCE = 1e-4, 1e-6  # parts of the largest speed and acceleration
 WORK = 1e-8  # part of the work of friction
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 SEEDS = [seed if seed < 1 else pytest.param(seed, marks=pytest.mark.stress) for seed in range(300)]
-ANCHORED = pytest.mark.parametrize("anchored", [False, True], ids=["joint", "anchor"])
+ANCHORED = pytest.mark.parametrize(
+    "anchored", [pytest.param(False, id="joint", marks=pytest.mark.slow), pytest.param(True, id="anchor")]
+)
 
 
 def hung(seed, anchored):
