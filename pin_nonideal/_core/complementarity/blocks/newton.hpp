@@ -66,6 +66,7 @@ public:
     // Project forces onto their cones. Return true if this changes them.
     bool project(const BlockProblem& p, const Island& island, VecX& f) const;
 
+    double unit() const { return unit_; }  // largest free velocity of the island, in units of the root of an energy
     double stiffness(int row) const { return rho_[row]; }
     const std::vector<double>& stiffnesses() const { return rho_; }
     int steps() const { return steps_; }      // steps since construction

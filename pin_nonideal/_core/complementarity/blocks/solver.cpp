@@ -54,39 +54,22 @@ bool BlockSolver::attempt(int island, VecX& f) {
     return least_ <= parameters.tolerance;
 }
 
-// Reduce a compliance of all elements to zero, from no forces. Each problem on the way has a solution close to that of
-// the last one, so the path ends at one solution of several.
-bool BlockSolver::compliance_continuation(int island, VecX& f) {
-    clear(island, f);
-    on_path_ = f;
-    double compliance = parameters.first_compliance, factor = parameters.first_compliance_ratio;
-    for (int stage = 0; stage < parameters.max_compliances && compliance > parameters.min_compliance; ++stage) {
-        if (newton_.steps() > last_step_) return false;
-        f = on_path_;
-        newton_.move(problem, islands_[island], f, x_, w_);
-        const auto search = stage == 0 ? BlockNewton::Search::patient : BlockNewton::Search::bold;
-        if (newton(island, search, compliance, f) <= parameters.path_tolerance) {
-            on_path_ = f;
-            if (compliance <= parameters.max_attempted_compliance && attempt(island, f)) return true;
-            compliance *= factor;
-        } else {  // a shorter step from the last compliance
-            if (stage == 0) return false;
-            compliance /= factor;
-            factor = std::sqrt(factor);
-            if (factor > parameters.last_compliance_ratio) return false;
-            compliance *= factor;
-        }
-    }
-    return false;
+// Follow the central path from no forces, and solve from its end. Near the laws of friction the path may break off. With
+// slip speeds that lag it breaks off elsewhere. Return true if f solves the laws.
+bool BlockSolver::search_from_path(int island, BlockInteriorPoint::Slip slip, VecX& f) {
+    if (steps() > last_step_) return false;
+    path_.follow(problem, newton_, islands_[island], factors_[island], slip, f, x_, w_);
+    if (newton_.project(problem, islands_[island], f)) newton_.move(problem, islands_[island], f, x_, w_);
+    return attempt(island, f) || least_ <= parameters.near_tolerance;
 }
 
 // Alternate sweeps and Newton's method. Newton's method may cycle between sets of sliding elements, which sweeps leave.
 bool BlockSolver::settle(int island, VecX& f) {
-    on_path_ = best_;
-    for (int round = 0; round < parameters.max_sweep_rounds && newton_.steps() <= last_step_; ++round) {
-        newton_.sweep(problem, islands_[island], parameters.sweeps_per_round, on_path_, x_, w_);
-        f = on_path_;
-        if (attempt(island, f) || least_ <= parameters.path_free_tolerance) return true;
+    swept_ = best_;
+    for (int round = 0; round < parameters.max_sweep_rounds && steps() <= last_step_; ++round) {
+        newton_.sweep(problem, islands_[island], parameters.sweeps_per_round, swept_, x_, w_);
+        f = swept_;
+        if (attempt(island, f) || least_ <= parameters.near_tolerance) return true;
     }
     return false;
 }
@@ -95,7 +78,7 @@ bool BlockSolver::settle(int island, VecX& f) {
 // true if f solves the laws.
 bool BlockSolver::share(int island, VecX& f) {
     const double error = newton(island, BlockNewton::Search::bold, parameters.shared_compliance, f);
-    if (error > parameters.path_tolerance) return false;
+    if (error > parameters.shared_tolerance) return false;
     least_ = newton_.solve_without_compliance(problem, islands_[island], factors_[island], f, x_, w_);
     return least_ <= parameters.tolerance;
 }
@@ -142,7 +125,7 @@ double BlockSolver::sweep(int island, VecX& f) {
     return newton_.error(problem, islands_[island], f, w_);
 }
 
-// Solve an island by Newton's method from the guess, else after sweeps, else along the path of compliances. Return the
+// Solve an island by Newton's method from the guess, else from the end of a central path, else after sweeps. Return the
 // error. A contact that loses its load may do so in one of several solutions: the one with shared loads is preferred.
 double BlockSolver::solve(int island, VecX& f) {
     const Island& on = islands_[island];
@@ -166,8 +149,10 @@ double BlockSolver::solve(int island, VecX& f) {
     }
     if (least_ <= parameters.tolerance) return least_;
     best_ = f;
-    if (!attempt(island, f) && least_ > parameters.path_free_tolerance && !settle(island, f))
-        compliance_continuation(island, f);
+    if (least_ <= parameters.near_tolerance) attempt(island, f);
+    else if (!search_from_path(island, BlockInteriorPoint::Slip::follows, f) &&
+             !search_from_path(island, BlockInteriorPoint::Slip::lags, f))
+        settle(island, f);
     f = best_;
     newton_.move(problem, islands_[island], f, x_, w_);
     return least_;
@@ -177,7 +162,7 @@ double BlockSolver::solve(int island, VecX& f) {
 // sweeps.
 double BlockSolver::solve_within_energy(int island, VecX& f) {
     newton_.begin(problem, islands_[island], free_rows_);
-    last_step_ = newton_.steps() + parameters.max_work / static_cast<int>(islands_[island].elements.size());
+    last_step_ = steps() + parameters.max_work / static_cast<int>(islands_[island].elements.size());
     for (int attempts = 0; attempts < 2; ++attempts) {
         newton_.move(problem, islands_[island], f, x_, w_);
         const double error = solve(island, f);

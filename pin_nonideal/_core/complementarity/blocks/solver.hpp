@@ -1,28 +1,23 @@
 // Solver of contact and friction on separate trees, island by island.
 #pragma once
 
-#include "complementarity/blocks/newton.hpp"
+#include "complementarity/blocks/interior_point.hpp"
 #include "complementarity/cone/solver.hpp"
 
 namespace pn {
 
 struct BlockSolverParameters {
     double tolerance = 1e-9;  // error of a solution. Newton stops at rounding, far below in most problems
-    // Error that is not worth the path of compliances, which costs a hundred Newton steps.
-    double path_free_tolerance = 1e-8;
-    double path_tolerance = 1e-6;                                       // error on the path of compliances
-    double first_compliance = 1.0, min_compliance = 1e-7;               // relative to an element's own response
-    double first_compliance_ratio = 0.1, last_compliance_ratio = 0.95;  // ratio of successive compliances
+    double near_tolerance = 1e-8;     // error that is not worth a search from no forces, of some twenty factors
+    double shared_tolerance = 1e-6;   // error of a solution with the compliance that decides shares
     double shared_compliance = 1e-4;  // compliance that decides shares of a load, relative to an element's own response
     int min_sharing = 4;              // least number of elements on a single node whose shares are decided
-    double max_attempted_compliance = 1e-2;  // largest compliance from which a solution is attempted
-    int max_compliances = 30;                // maximum number of compliances on the path
     // Maximum rounds of sweeps, and sweeps of a round.
-    int max_sweep_rounds = 8, sweeps_per_round = 50;
+    int max_sweep_rounds = 2, sweeps_per_round = 50;
     double min_swept_error = 1e-2;  // error from which sweeps from no forces replace the best forces found
     int last_sweeps = 400;          // number of these sweeps
-    // Newton steps of an island, times its elements, after which no other search begins: about 100 ms. It is a count and no
-    // time, so that runs stay the same.
+    // Steps in an island, times its elements, after which no other search begins: about 100 ms. It is a count and no time,
+    // so that runs stay the same.
     int max_work = 100000;
 };
 
@@ -67,17 +62,20 @@ private:
     void copy(const Island& island, const VecX& from, VecX& to) const;
     bool unloads(int island, const VecX& f) const;
     bool settle(int island, VecX& f);
-    bool compliance_continuation(int island, VecX& f);
+    bool search_from_path(int island, BlockInteriorPoint::Slip slip, VecX& f);
     bool attempt(int island, VecX& f);
     bool adds_energy(int island, const VecX& f);
     double sweep(int island, VecX& f);
     double newton(int island, BlockNewton::Search search, double compliance, VecX& f);
 
+    int steps() const { return newton_.steps() + path_.steps(); }
+
     BlockNewton newton_;
+    BlockInteriorPoint path_;
     mutable VecX on_nodes_;
-    VecX guess_, best_, on_path_, free_rows_;  // free_rows_: w under no forces
+    VecX guess_, best_, swept_, free_rows_;  // free_rows_: w under no forces
     double least_ = 0.0;  // error of best_
-    int last_step_ = 0;   // Newton step after which no other search begins
+    int last_step_ = 0;   // step after which no other search begins
     Islands islands_;
     std::vector<BlockFactor> factors_;  // one for each island
     VecX x_, w_;  // motion in the unknowns of the problem, and its rows

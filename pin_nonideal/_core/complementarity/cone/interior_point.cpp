@@ -10,14 +10,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// Return the scale that makes the cone |f_t| <= mu f_n circular: forces (root f_n, f_t / root), velocities the other way.
-double root_of(const ConeElement& e) { return e.slides() && e.bound > 0.0 ? std::sqrt(e.bound) : 1.0; }
-bool in_path(const ConeElement& e) { return !e.is(ConeKind::equality); }
-int head_rows(const ConeElement& e) { return e.is(ConeKind::contact) ? 1 : 0; }
-// Return the number of tangential rows that may carry a force.
-int tail_rows(const ConeElement& e) {
-    return e.is(ConeKind::box) ? (e.bound > 0.0 ? e.dim : 0) : e.bound > 0.0 ? e.dim - 1 : 0;
-}
+double root_of(const ConeElement& e) { return circular_scale(e.kind, tail_rows(e), e.bound); }
 
 }  // namespace
 
@@ -37,18 +30,18 @@ Cone ConeInteriorPoint::force(const ConeProblem& p, int e, const Eigen::Ref<cons
 
 void ConeInteriorPoint::start(const ConeProblem& p, Eigen::Ref<VecX> f, Slip slip) {
     mode_ = slip;
-    if (static_cast<int>(states_.size()) < p.size()) states_.resize(p.size());
+    if (static_cast<int>(points_.size()) < p.size()) points_.resize(p.size());
     auto w = w_.vector(p.n);
     p.respond(f, w);
     for (int e = 0; e < p.size(); ++e) {
-        State& s = states_[e];
+        PathPoint& s = points_[e];
         s.speed = p.associated ? 0.0 : tail(p, e, w).norm();
         s.slip.setZero();
-        s.z = s.y = {1.0, Vector3d::Zero()};
+        s.z = s.u = {1.0, Vector3d::Zero()};
     }
     f.setZero();
     for (int e = 0; e < p.size(); ++e) {
-        if (p.elements[e].is(ConeKind::box)) states_[e].z.head = p.elements[e].bound;
+        if (p.elements[e].is(ConeKind::box)) points_[e].z.head = p.elements[e].bound;
         if (p.elements[e].is(ConeKind::contact)) f[p.at[e]] = 1.0 / root_of(p.elements[e]);
     }
 }
@@ -60,8 +53,8 @@ void ConeInteriorPoint::update(const ConeProblem& p, const Eigen::Ref<const VecX
     miss = w;
     for (int e = 0; e < p.size(); ++e) {
         const ConeElement& element = p.elements[e];
-        State& s = states_[e];
-        if (!in_path(element)) continue;
+        PathPoint& s = points_[e];
+        if (element.is(ConeKind::equality)) continue;
         const int rows = tail_rows(element), first = p.at[e] + head_rows(element);
         const double root = root_of(element);
         if (mode_ == Slip::follows && element.slides() && rows > 0 && !p.associated) {
@@ -69,8 +62,8 @@ void ConeInteriorPoint::update(const ConeProblem& p, const Eigen::Ref<const VecX
             s.speed = std::sqrt(slip.squaredNorm() + parameters.smooth_speed * parameters.smooth_speed);
             s.slip = slip / s.speed;
         }
-        miss.segment(first, rows) -= s.y.tail.head(rows) / root;
-        if (element.is(ConeKind::contact)) miss[p.at[e]] += (rows > 0 ? element.bound * s.speed : 0.0) - s.y.head * root;
+        miss.segment(first, rows) -= s.u.tail.head(rows) / root;
+        if (element.is(ConeKind::contact)) miss[p.at[e]] += (rows > 0 ? element.bound * s.speed : 0.0) - s.u.head * root;
         if (rows < element.dim - head_rows(element)) miss.segment(first, element.dim - head_rows(element)).setZero();
     }
 }
@@ -80,8 +73,8 @@ bool ConeInteriorPoint::factorize(const ConeProblem& p) {
     K = p.W();
     for (int e = 0; e < p.size(); ++e) {
         const ConeElement& element = p.elements[e];
-        if (!in_path(element)) continue;
-        State& s = states_[e];
+        if (element.is(ConeKind::equality)) continue;
+        PathPoint& s = points_[e];
         const int i = p.at[e], rows = tail_rows(element), first = i + head_rows(element);
         const int idle = element.dim - head_rows(element) - rows;
         if (idle > 0) {  // tangential rows without friction
@@ -89,7 +82,7 @@ bool ConeInteriorPoint::factorize(const ConeProblem& p) {
             K.block(first, first, idle, idle).setIdentity();
             if (element.is(ConeKind::box)) continue;
         }
-        s.scaling = Scaling(s.z, s.y);
+        s.scale();
         const Scaling& T = s.scaling;
         const double root = root_of(element), inverse = 1.0 / (T.root * T.root);
         const Matrix3d block = inverse / (root * root) * (2.0 * T.w.tail * T.w.tail.transpose() + Matrix3d::Identity());
@@ -112,21 +105,17 @@ void ConeInteriorPoint::direction(const ConeProblem& p, double target, double ke
     rhs = (keep - 1.0) * miss_.vector(p.n);
     for (int e = 0; e < p.size(); ++e) {
         const ConeElement& element = p.elements[e];
-        State& s = states_[e];
-        if (!in_path(element) || (element.is(ConeKind::box) && tail_rows(element) == 0)) continue;
-        Cone d = product(s.scaling.scaled, s.scaling.scaled) * -1.0 - s.second;
-        d.head += target;
-        s.dy = s.scaling.back(quotient(d, s.scaling.scaled));
+        PathPoint& s = points_[e];
+        if (!has_cone(element)) continue;
+        s.aim(target);
         const int rows = tail_rows(element), first = p.at[e] + head_rows(element);
         const double root = root_of(element);
-        rhs.segment(first, rows) += s.dy.tail.head(rows) / root;
-        if (element.is(ConeKind::contact)) rhs[p.at[e]] += root * s.dy.head;
+        rhs.segment(first, rows) += s.du.tail.head(rows) / root;
+        if (element.is(ConeKind::contact)) rhs[p.at[e]] += root * s.du.head;
     }
     solver_.solve(rhs, step);
     for (int e = 0; e < p.size(); ++e) {
-        State& s = states_[e];
-        if (!in_path(p.elements[e]) || (p.elements[e].is(ConeKind::box) && tail_rows(p.elements[e]) == 0)) continue;
-        s.dy = s.dy - s.scaling.back(s.scaling.back(force(p, e, step, 0.0)));
+        if (has_cone(p.elements[e])) points_[e].follow(force(p, e, step, 0.0));
     }
 }
 
@@ -134,8 +123,8 @@ double ConeInteriorPoint::length(const ConeProblem& p) const {
     double longest = HUGE_VAL;
     const Eigen::Map<const VecX> step = step_.vector(p.n);
     for (int e = 0; e < p.size(); ++e) {
-        if (!in_path(p.elements[e]) || (p.elements[e].is(ConeKind::box) && tail_rows(p.elements[e]) == 0)) continue;
-        longest = std::min({longest, room(states_[e].z, force(p, e, step, 0.0)), room(states_[e].y, states_[e].dy)});
+        if (!has_cone(p.elements[e])) continue;
+        longest = std::min(longest, points_[e].room_for(force(p, e, step, 0.0)));
     }
     return longest;
 }
@@ -144,8 +133,8 @@ double ConeInteriorPoint::gap(const ConeProblem& p) const {
     double sum = 0.0;
     int count = 0;
     for (int e = 0; e < p.size(); ++e) {
-        if (!in_path(p.elements[e]) || (p.elements[e].is(ConeKind::box) && tail_rows(p.elements[e]) == 0)) continue;
-        sum += states_[e].z.dot(states_[e].y);
+        if (!has_cone(p.elements[e])) continue;
+        sum += points_[e].z.dot(points_[e].u);
         ++count;
     }
     return count > 0 ? sum / count : 0.0;
@@ -160,26 +149,18 @@ void ConeInteriorPoint::follow(const ConeProblem& p, Eigen::Ref<VecX> f, Slip sl
         const double miss = miss_.vector(p.n).cwiseAbs().maxCoeff();
         if (now < parameters.gap_tolerance && miss < parameters.gap_tolerance * 10.0) return;
         factorize(p);
-        for (int e = 0; e < p.size(); ++e) states_[e].second = Cone();
         direction(p, 0.0, 0.0);
         const double left = 1.0 - std::min(1.0, length(p)), sigma = left * left * left;
-        for (int e = 0; e < p.size(); ++e) {
-            State& s = states_[e];
-            s.second = product(s.scaling.back(force(p, e, step, 0.0)), s.scaling.forth(s.dy));
-        }
+        for (int e = 0; e < p.size(); ++e)
+            if (has_cone(p.elements[e])) points_[e].correct(force(p, e, step, 0.0));
         direction(p, sigma * now, sigma);
         const double a = std::min(1.0, max_boundary_part * length(p));
         if (!(a > parameters.min_step)) return;
         kept = f;
         f += a * step;
         bool inside = true;
-        for (int e = 0; e < p.size(); ++e) {
-            if (!in_path(p.elements[e]) || (p.elements[e].is(ConeKind::box) && tail_rows(p.elements[e]) == 0)) continue;
-            State& s = states_[e];
-            s.z = force(p, e, f, s.z.head);
-            s.y = s.y + s.dy * a;
-            inside = inside && s.z.determinant() > 0.0 && s.y.determinant() > 0.0;
-        }
+        for (int e = 0; e < p.size(); ++e)
+            if (has_cone(p.elements[e])) inside &= points_[e].move(force(p, e, f, points_[e].z.head), a);
         if (inside) continue;
         f = kept;  // rounding allows no further progress
         return;

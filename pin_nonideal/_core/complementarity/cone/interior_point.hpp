@@ -3,14 +3,13 @@
 // (Slip::follows). With Slip::stands it keeps its first value, and each problem is convex if W is symmetric.
 #pragma once
 
-#include "complementarity/cone/problem.hpp"
-#include "complementarity/second_order_cone.hpp"
+#include "complementarity/central_path.hpp"
 
 namespace pn {
 
 struct ConeInteriorPointParameters {
     int max_steps = 60;            // maximum steps along the path
-    double gap_tolerance = 1e-15;  // mean z . y of the elements at the end, in the problem's units: rounding
+    double gap_tolerance = 1e-15;  // mean z . u of the elements at the end, in the problem's units: rounding
     double min_step = 1e-7;        // part of a step below which rounding allows no further progress
     double smooth_speed = 1e-12;   // slip speed below which the direction is undefined
 };
@@ -27,13 +26,6 @@ public:
     int steps() const { return steps_; }  // total of all calls
 
 private:
-    struct State {
-        Cone z, y;       // points of the force, and of u
-        Scaling scaling;
-        Cone dy, second;
-        double speed = 0.0;  // |w_t|
-        Eigen::Vector3d slip = Eigen::Vector3d::Zero();  // direction of the slip
-    };
     Cone force(const ConeProblem& p, int e, const Eigen::Ref<const VecX>& f, double head) const;
     Eigen::Vector3d tail(const ConeProblem& p, int e, const Eigen::Ref<const VecX>& x) const;
     void start(const ConeProblem& p, Eigen::Ref<VecX> f, Slip slip);
@@ -44,7 +36,7 @@ private:
     double gap(const ConeProblem& p) const;
 
     Slip mode_ = Slip::follows;
-    std::vector<State> states_;
+    std::vector<PathPoint> points_;
     DenseSolver solver_;
     Buffer K_, w_, miss_, rhs_, step_, kept_;
     int steps_ = 0;
