@@ -183,7 +183,7 @@ PN_WIDE bool BlockFactor::eliminate_symmetric() {
         if (!cholesky(D, k.size)) return false;
         for (size_t j = 0; j < k.later.size(); ++j) {
             const int m = positions_[k.later[j]].size;
-            if (k.size == 6 && m == 6) solve_lower_columns<6>(D, 6, &H_[k.above[j]], 6);
+            if (k.size == 6 && m == 6) solve_lower_six(D, &H_[k.above[j]]);
             else solve_lower_columns(D, k.size, &H_[k.above[j]], m);
         }
         for (size_t i = 0; i < k.later.size(); ++i)
@@ -191,7 +191,7 @@ PN_WIDE bool BlockFactor::eliminate_symmetric() {
                 const int m = positions_[k.later[i]].size, n = positions_[k.later[j]].size;
                 double* C = &H_[entry(k.later[i], k.later[j])];
                 if (k.size == 6 && m == 6 && n == 6)
-                    subtract_transpose_product<6>(C, &H_[k.above[i]], &H_[k.above[j]], 6, 6, 6);
+                    subtract_six<true>(C, &H_[k.above[i]], &H_[k.above[j]]);
                 else subtract_transpose_product(C, &H_[k.above[i]], &H_[k.above[j]], m, k.size, n);
             }
     }
@@ -205,14 +205,14 @@ PN_WIDE bool BlockFactor::eliminate_general() {
         if (!eliminate(D, exchanges, k.size)) return false;
         for (size_t j = 0; j < k.later.size(); ++j) {
             const int m = positions_[k.later[j]].size;
-            if (k.size == 6 && m == 6) substitute<6>(D, exchanges, 6, &H_[k.above[j]], 6);
+            if (k.size == 6 && m == 6) substitute_six(D, exchanges, &H_[k.above[j]]);
             else substitute(D, exchanges, k.size, &H_[k.above[j]], m);
         }
         for (size_t i = 0; i < k.later.size(); ++i)
             for (size_t j = 0; j < k.later.size(); ++j) {
                 const int m = positions_[k.later[i]].size, n = positions_[k.later[j]].size;
                 double* C = &H_[entry(k.later[i], k.later[j])];
-                if (k.size == 6 && m == 6 && n == 6) subtract_product<6>(C, &H_[k.below[i]], &H_[k.above[j]], 6, 6, 6);
+                if (k.size == 6 && m == 6 && n == 6) subtract_six<false>(C, &H_[k.below[i]], &H_[k.above[j]]);
                 else subtract_product(C, &H_[k.below[i]], &H_[k.above[j]], m, k.size, n);
             }
     }

@@ -43,13 +43,13 @@ void BlockInteriorPoint::start(const BlockProblem& p, const BlockNewton& newton,
 }
 
 // Update the slip speeds and the residuals.
-void BlockInteriorPoint::update(const VecX& w) {
+void BlockInteriorPoint::update(Slip slips, const VecX& w) {
     for (Point& point : points_) {
         point.residual.setZero();
         for (int k = 0; k < point.heads + point.tails; ++k)
             point.residual[k] = w[point.row + k] * point.unit[k] / (speed_ * speed_);
         if (!point.in_path) continue;
-        if (point.heads && point.tails > 0) {
+        if (slips != Slip::none && point.heads && point.tails > 0) {
             const Vector3d slip(point.residual[1], point.tails > 1 ? point.residual[2] : 0.0, 0.0);
             point.speed = std::hypot(slip.norm(), parameters.smooth_speed);
             point.slip = slip / point.speed;
@@ -171,11 +171,11 @@ void BlockInteriorPoint::follow(const BlockProblem& p, const BlockNewton& newton
     start(p, newton, island, f);
     newton.move(p, island, f, x, w);
     for (int step = 0; step < parameters.max_steps; ++step, ++steps_) {
-        update(w);
+        update(slip, w);
         const double now = gap();
         if (now < parameters.gap_tolerance && residual() < parameters.residual_tolerance) return;
         scale(island, slip);
-        if (!factor.factor(p, island, G_, slip == Slip::lags)) return;
+        if (!factor.factor(p, island, G_, slip != Slip::follows)) return;
         direction(p, island, factor, 0.0, 0.0);
         const double left = 1.0 - std::min(1.0, length()), sigma = left * left * left;
         for (Point& point : points_)

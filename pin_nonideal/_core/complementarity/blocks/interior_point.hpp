@@ -26,7 +26,8 @@ public:
 
     // follows: the slip speeds mu |w_t| of the correction enter the equations with their derivatives.
     // lags: each step has the slip speeds of the last one. Its equations are symmetric.
-    enum class Slip { follows, lags };
+    // none: without the correction, the laws are a convex problem. Its solution rests if any forces hold the bodies.
+    enum class Slip { follows, lags, none };
 
     // Compute forces f near the end of the path, with their motion x, w. `factor` keeps the order of elimination.
     void follow(const BlockProblem& p, const BlockNewton& newton, const Island& island, BlockFactor& factor, Slip slip,
@@ -44,7 +45,7 @@ private:
     };
 
     void start(const BlockProblem& p, const BlockNewton& newton, const Island& island, VecX& f);
-    void update(const VecX& w);
+    void update(Slip slip, const VecX& w);
     void scale(const Island& island, Slip slip);
     void invert(Point& point) const;
     void direction(const BlockProblem& p, const Island& island, const BlockFactor& factor, double target, double keep);

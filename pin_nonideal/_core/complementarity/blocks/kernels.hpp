@@ -115,25 +115,53 @@ PN_INLINE void add_transpose_product(double* C, const double* A, const double* B
         }
 }
 
+// A row of six numbers.
+struct SixLanes {
+    Lanes front;
+    TwoLanes back;
+
+    SixLanes() = default;
+    PN_INLINE explicit SixLanes(const double* from) {
+        load(from, front);
+        load(from + 4, back);
+    }
+    PN_INLINE void store_to(double* to) const {
+        store(front, to);
+        store(back, to + 4);
+    }
+    PN_INLINE void scale(double a) {
+        front *= a;
+        back *= a;
+    }
+    PN_INLINE void add(double a, const SixLanes& b) {
+        front += a * b.front;
+        back += a * b.back;
+    }
+    PN_INLINE void subtract(double a, const SixLanes& b) {
+        front -= a * b.front;
+        back -= a * b.back;
+    }
+};
+
 // C += A^T B, with A (3, 6) and B (3, 6).
 PN_INLINE void add_three_by_six(double* C, const double* A, const double* B) {
-    Lanes b[3];
-    TwoLanes tail[3];
-    for (int l = 0; l < 3; ++l) {
-        load(B + 6 * l, b[l]);
-        load(B + 6 * l + 4, tail[l]);
-    }
+    const SixLanes b[3] = {SixLanes(B), SixLanes(B + 6), SixLanes(B + 12)};
     for (int i = 0; i < 6; ++i, C += 6) {
-        Lanes c;
-        TwoLanes end;
-        load(C, c);
-        load(C + 4, end);
-        for (int l = 0; l < 3; ++l) {
-            c += A[6 * l + i] * b[l];
-            end += A[6 * l + i] * tail[l];
-        }
-        store(c, C);
-        store(end, C + 4);
+        SixLanes c(C);
+        for (int l = 0; l < 3; ++l) c.add(A[6 * l + i], b[l]);
+        c.store_to(C);
+    }
+}
+
+// C -= A B, or C -= A^T B, with six rows and columns each.
+template <bool transposed>
+PN_INLINE void subtract_six(double* C, const double* A, const double* B) {
+    const SixLanes b[6] = {SixLanes(B),      SixLanes(B + 6),  SixLanes(B + 12),
+                           SixLanes(B + 18), SixLanes(B + 24), SixLanes(B + 30)};
+    for (int i = 0; i < 6; ++i, C += 6) {
+        SixLanes c(C);
+        for (int l = 0; l < 6; ++l) c.subtract(transposed ? A[6 * l + i] : A[6 * i + l], b[l]);
+        c.store_to(C);
     }
 }
 
@@ -175,6 +203,32 @@ PN_INLINE void substitute(const double* A, const int* exchanges, int n, double* 
         }
         const double inverse = 1.0 / A[i * n + i];
         for (int j = 0; j < m; ++j) X[i * m + j] *= inverse;
+    }
+}
+
+// X := L^-1 X, or X := A^-1 X with the factors of eliminate, for six rows and columns.
+PN_INLINE void solve_lower_six(const double* L, double* X) {
+    SixLanes x[6];
+    for (int i = 0; i < 6; ++i) {
+        x[i] = SixLanes(X + 6 * i);
+        for (int l = 0; l < i; ++l) x[i].subtract(L[6 * i + l], x[l]);
+        x[i].scale(L[7 * i]);
+        x[i].store_to(X + 6 * i);
+    }
+}
+PN_INLINE void substitute_six(const double* A, const int* exchanges, double* X) {
+    for (int c = 0; c < 6; ++c)
+        if (exchanges[c] != c)
+            for (int j = 0; j < 6; ++j) std::swap(X[6 * c + j], X[6 * exchanges[c] + j]);
+    SixLanes x[6];
+    for (int i = 0; i < 6; ++i) {
+        x[i] = SixLanes(X + 6 * i);
+        for (int l = 0; l < i; ++l) x[i].subtract(A[6 * i + l], x[l]);
+    }
+    for (int i = 5; i >= 0; --i) {
+        for (int l = i + 1; l < 6; ++l) x[i].subtract(A[6 * i + l], x[l]);
+        x[i].scale(1.0 / A[7 * i]);
+        x[i].store_to(X + 6 * i);
     }
 }
 

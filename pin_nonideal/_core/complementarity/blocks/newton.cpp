@@ -282,10 +282,16 @@ void BlockNewton::take(const BlockProblem& p, const Island& island, double lengt
 }
 
 void BlockNewton::begin(const BlockProblem& p, const Island& island, const VecX& free_w) {
-    unit_ = 0.0;
+    unit_ = 1.0;
+    unit_ = speed(p, island, free_w);
+}
+
+double BlockNewton::speed(const BlockProblem& p, const Island& island, const VecX& w) const {
+    double largest = 0.0;
     for (int i : island.elements)
         for (int r = p.elements[i].row; r < p.elements[i].row + p.elements[i].dim(); ++r)
-            unit_ = std::max(unit_, root_rho_[r] * std::abs(free_w[r]));
+            largest = std::max(largest, root_rho_[r] * std::abs(w[r]));
+    return unit_ > 0.0 ? largest / unit_ : 0.0;
 }
 
 double BlockNewton::error(const BlockProblem& p, const Island& island, const VecX& f, const VecX& w) {

@@ -158,11 +158,15 @@ double BlockSolver::solve(int island, VecX& f) {
     return least_;
 }
 
+void BlockSolver::begin(int island) {
+    newton_.begin(problem, islands_[island], free_rows_);
+    last_step_ = steps() + parameters.max_work / static_cast<int>(islands_[island].elements.size());
+}
+
 // Solve an island from the guess. If the forces are far from a solution or add energy, solve it from no forces, else by
 // sweeps.
 double BlockSolver::solve_within_energy(int island, VecX& f) {
-    newton_.begin(problem, islands_[island], free_rows_);
-    last_step_ = steps() + parameters.max_work / static_cast<int>(islands_[island].elements.size());
+    begin(island);
     for (int attempts = 0; attempts < 2; ++attempts) {
         newton_.move(problem, islands_[island], f, x_, w_);
         const double error = solve(island, f);
@@ -186,6 +190,32 @@ double BlockSolver::solve(VecX& f) {
         if (newton_.project(problem, islands_[i], f)) newton_.move(problem, islands_[i], f, x_, w_);
     }
     return error_;
+}
+
+// Search for rest from the end of the convex problem's path. Compliant elements share the loads in one way.
+bool BlockSolver::hold(int island, VecX& f) {
+    const Island& on = islands_[island];
+    const auto rests = [&] { return newton_.speed(problem, on, w_) <= parameters.rest_speed; };
+    path_.follow(problem, newton_, on, factors_[island], BlockInteriorPoint::Slip::none, f, x_, w_);
+    if (!(newton_.speed(problem, on, w_) <= parameters.path_rest_speed)) return false;
+    swept_ = f;
+    if (share(island, f) && rests()) return true;
+    copy(on, swept_, f);
+    newton_.move(problem, on, f, x_, w_);
+    return newton(island, BlockNewton::Search::bold, 0.0, f) <= parameters.tolerance && rests();
+}
+
+bool BlockSolver::hold(VecX& f) {
+    bool all = true;
+    guess_ = f;
+    for (int i = 0; i < islands_.size(); ++i) {
+        begin(i);
+        if (newton_.speed(problem, islands_[i], w_) <= parameters.rest_speed || hold(i, f)) continue;
+        copy(islands_[i], guess_, f);
+        newton_.move(problem, islands_[i], f, x_, w_);
+        all = false;
+    }
+    return all;
 }
 
 void BlockSolver::move(const VecX& f) {

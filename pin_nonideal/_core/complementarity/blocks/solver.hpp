@@ -16,6 +16,8 @@ struct BlockSolverParameters {
     int max_sweep_rounds = 2, sweeps_per_round = 50;
     double min_swept_error = 1e-2;  // error from which sweeps from no forces replace the best forces found
     int last_sweeps = 400;          // number of these sweeps
+    double rest_speed = 1e-9;       // speed of an island at rest, relative to that without forces
+    double path_rest_speed = 1e-3;  // the same at the end of the central path
     // Steps in an island, times its elements, after which no other search begins: about 100 ms. It is a count and no time,
     // so that runs stay the same.
     int max_work = 100000;
@@ -37,6 +39,9 @@ public:
     // load as equally compliant contacts do, so that their forces depend on the problem alone. Between several nodes
     // shares stay close to the guess.
     double solve(VecX& f);
+    // Hold the islands at rest that forces within the cones can hold, from the forces f of `solve`. Newton's method may
+    // find a motion where rest is possible as well. Return false if an island moves.
+    bool hold(VecX& f);
     // Compute the motion under the forces f. `solve` ends with that of its forces.
     void move(const VecX& f);
     // Errors of the laws at the last motion. Velocities are relative to those without forces, or to an element's own
@@ -58,6 +63,8 @@ private:
     double solve(int island, VecX& f);
     double solve_within_energy(int island, VecX& f);
     bool share(int island, VecX& f);
+    bool hold(int island, VecX& f);
+    void begin(int island);
     void clear(int island, VecX& f) const;
     void copy(const Island& island, const VecX& from, VecX& to) const;
     bool unloads(int island, const VecX& f) const;

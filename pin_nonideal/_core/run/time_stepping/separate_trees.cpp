@@ -45,6 +45,13 @@ double SeparateTrees::solve(const std::vector<ConeElement>& cones, const VecX& m
     return error;
 }
 
+void SeparateTrees::hold(const VecX& middle, VecX& f) {
+    exert(middle, f);
+    solver_.hold(f_);
+    f.head(solver_.problem.rows) = f_ + middle_;
+    f_moved_ = f.head(solver_.problem.rows);
+}
+
 // Compute the motion under the forces f, of which `middle` are constant, unless it is known.
 void SeparateTrees::exert(const VecX& middle, const VecX& f) {
     const int n = solver_.problem.rows;

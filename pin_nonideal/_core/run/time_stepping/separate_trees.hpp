@@ -19,6 +19,8 @@ public:
     // Solve the laws for the forces f, from a guess. `middle` are forces around which the boxes are centered. Return the
     // largest error of an element, relative to its forces.
     double solve(const std::vector<ConeElement>& cones, const VecX& middle, VecX& f);
+    // Change the forces f of the last call of `solve` where others hold trees at rest that move.
+    void hold(const VecX& middle, VecX& f);
     // Compute the acceleration a and the rows w under the forces f. `middle` as in `solve`.
     void move(const VecX& middle, const VecX& f, VecX& a, VecX& w);
     // Set the velocity v1 of trees to zero that were at rest, v0 = 0, and whose forces cancel over the step h.

@@ -117,10 +117,11 @@ bool StepForces::solve(double h, const VecX& q0, const VecX& v0) {
     const double error = separate_ ? trees_.solve(elements_.cones, middle_, f) : HUGE_VAL;
     bool solved = error <= parameters.max_residual;
     const bool starts = v0.cwiseAbs().maxCoeff() <= rest_speed && !(q_without_rest_.size() > 0 && q_without_rest_ == q0);
-    const bool searches = !solved && !(separate_ && n > parameters.max_rows_with_responses);
     if (solved && !(starts && moves())) return true;
+    if (separate_ && starts && hold_trees(q0)) return true;
+    if (separate_ && solved) return true;
     if (!solved) best_f_ = f.head(n);
-    if (!solved && !searches && !starts) return accept_best_forces(h);
+    if (separate_ && n > parameters.max_rows_with_responses) return accept_best_forces(h);
     responses_.find(p, w, elements_.rows);
     if (!solved) f.head(n) = guess_;
     const auto W = responses_.matrix(n);
@@ -128,12 +129,20 @@ bool StepForces::solve(double h, const VecX& q0, const VecX& v0) {
     end_rows.head(n) = free_rows_.head(n);
     end_rows.head(n).noalias() += W * middle_.head(n);
     solver_.search_briefly(error < parameters.max_brief_error);
-    if (searches)
+    if (!solved)
         solved = solver_.solve(W, end_rows.head(n), elements_.cones, true, f.head(n), true) == ConeStatus::solved &&
                  !add_energy(W, end_rows.head(n), f.head(n));
-    if (starts) solved = keep_rest(solved, q0) || solved;
+    if (starts && !separate_) solved = keep_rest(solved, q0) || solved;
     f.head(n) += middle_.head(n);
     return solved || (separate_ && trees_.miss().element >= 0 && accept_best_forces(h));
+}
+
+// Hold trees at rest that forces can hold. Return true if all rest.
+bool StepForces::hold_trees(const VecX& q0) {
+    trees_.hold(middle_, f);
+    if (!moves()) return true;
+    q_without_rest_ = q0;  // the next sweeps and the step after the start skip this check
+    return false;
 }
 
 // Accept the best forces found, which violate the laws of contact by the error of one element.

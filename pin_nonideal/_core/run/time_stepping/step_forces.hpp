@@ -76,6 +76,7 @@ private:
     void unload_held(const MeanVelocity& mean, const VecX& a_free);
     bool accept_best_forces(double h);
     bool moves();
+    bool hold_trees(const VecX& q0);
     bool keep_rest(bool solved, const VecX& q0);
 
     const Program& p;
