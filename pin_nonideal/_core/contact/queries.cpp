@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "constraints/redundancy.hpp"
 #include "dynamics/reactions.hpp"
@@ -82,10 +83,15 @@ bool coincide(const Program& p, const Workspace& w, int gap, int other) {
 }
 
 void remove_coincident(const Program& p, const Workspace& w, std::vector<int>& list, const Precedence& precedes) {
-    size_t left = 0;
+    std::sort(list.begin(), list.end(), [&](int i, int j) {
+        return std::make_pair(p.bodies_of_gap[i], i) < std::make_pair(p.bodies_of_gap[j], j);
+    });
+    size_t left = 0, first = 0;  // gaps kept, and the first of them between the same bodies
     for (int gap : list) {
+        if (left > 0 && !same_bodies(p, list[left - 1], gap)) first = left;
+        const auto begin = list.begin() + static_cast<std::ptrdiff_t>(first);
         const auto end = list.begin() + static_cast<std::ptrdiff_t>(left);
-        const auto same = std::find_if(list.begin(), end, [&](int other) { return coincide(p, w, gap, other); });
+        const auto same = std::find_if(begin, end, [&](int other) { return coincide(p, w, gap, other); });
         if (same == end) list[left++] = gap;
         else if (precedes(gap, *same)) *same = gap;
     }

@@ -33,7 +33,8 @@ TimeStepping::TimeStepping(System& system, Progress& progress, GapWatch& watch, 
     : p(system.p), w(system.w), system_(system), progress_(progress), options_(options), torques_(torques),
       output_(output), warnings_(warnings), value_events_(value_events), out_(out), moreau_(system),
       moreau_contacts_(system, watch), is_autonomous_(!may_differ(system.p, options)),
-      always_evaluated_(needs_forces_always(system.p, options)) {}
+      always_evaluated_(needs_forces_always(system.p, options)),
+      records_forces_(always_evaluated_ || options.record.evaluates()) {}
 
 // End of a step of this size: at a stop, a jump of the actuation or a due sample before it. Times that differ only by
 // rounding are one end, the latest of them.
@@ -104,7 +105,8 @@ void TimeStepping::try_part(double h, double end, double t_end) {
     t = whole ? end : t + h;
     const bool needs_forces_here = progress_.has_forces = whole && needs_forces(end, t_end);
     if (moreau_contacts_.project(t, progress_.y, progress_.numerical_energy)) {
-        if (needs_forces_here) system_.evaluate_step_end(t, progress_.y, progress_.rate, true);
+        progress_.has_forces = needs_forces_here && records_forces_;
+        if (progress_.has_forces) system_.evaluate_step_end(t, progress_.y, progress_.rate, true);
         return;
     }
     system_.settle(t, progress_.y, progress_.rate, needs_forces_here, true);
@@ -175,7 +177,8 @@ void TimeStepping::begin(double size) {
     ModeQuery first = make_first_mode_query(p, w, progress_.t, system_.q, system_.v);
     for (int e : first.at_rest) first.modes[e] = modes[e];
     set_contacts(p, w, closed, first.modes);
-    system_.evaluate_step_end(progress_.t, progress_.y, progress_.rate, true);
+    if (records_forces_ || !moreau_contacts_.is_separate())
+        system_.evaluate_step_end(progress_.t, progress_.y, progress_.rate, true);
 }
 
 void TimeStepping::step(double size, double stop, double t_end) {

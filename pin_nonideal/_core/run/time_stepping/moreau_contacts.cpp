@@ -228,16 +228,22 @@ void MoreauContacts::drop_opposed() {
         return gap_rate(p, w, other) < gap_rate(p, w, gap);
     };
     if (std::none_of(touching_.begin(), touching_.end(), [&](int gap) { return between_lines_[gap]; })) return;
-    const std::vector<int> all = touching_;
-    const auto is_inside = [&](int gap) {
-        if (!between_lines_[gap] || p.gaps[gap].pair < 0 || is_bare(p, gap)) return false;
-        const Vec3 n = normal(gap);
-        return std::any_of(all.begin(), all.end(), [&](int other) {
-            return p.gaps[other].pair == p.gaps[gap].pair && !is_bare(p, other) &&
-                   n.dot(normal(other)) < parameters.opposed && precedes(other, gap);
-        });
-    };
-    touching_.erase(std::remove_if(touching_.begin(), touching_.end(), is_inside), touching_.end());
+    all_touching_ = touching_;
+    touching_.clear();
+    size_t begin = 0, end = 0;  // contacts of one pair, which follow each other
+    for (int gap : all_touching_) {
+        const int pair = p.gaps[gap].pair;
+        if (end == 0 || p.gaps[all_touching_[begin]].pair != pair) {
+            begin = end;
+            while (end < all_touching_.size() && p.gaps[all_touching_[end]].pair == pair) ++end;
+        }
+        const bool may_be_inside = between_lines_[gap] && pair >= 0 && !is_bare(p, gap);
+        const auto opposes = [&](int other) {
+            return !is_bare(p, other) && normal(gap).dot(normal(other)) < parameters.opposed && precedes(other, gap);
+        };
+        if (!may_be_inside || std::none_of(all_touching_.begin() + begin, all_touching_.begin() + end, opposes))
+            touching_.push_back(gap);
+    }
 }
 
 // Find the contacts whose gap is closed at the step's middle, and contacts that were closed before. Their loads decide

@@ -51,6 +51,8 @@ public:
     // the scene must project it then.
     bool project(double t, VecX& y, double& numerical_energy);
 
+    // Check if the last step was solved tree by tree.
+    bool is_separate() const { return forces_.is_separate(); }
     // Contact whose laws the last step missed.
     const StepForces::LawMiss& law_miss() const { return forces_.law_miss(); }
 
@@ -86,7 +88,8 @@ private:
     double h_ = 0.0, t0_ = 0.0;  // length and start of the step
     VecX q0_;
     GapWatch& watch_;
-    std::vector<int> touching_;  // gaps that take part
+    std::vector<int> touching_;  // gaps that take part, ascending
+    std::vector<int> all_touching_;
     std::vector<int> near_edges_;  // gaps of edges and rims with a normal that a step may reach
     StepElements elements_;
     StepForces forces_;
