@@ -61,9 +61,7 @@ PN_INLINE void add_transpose(const double* A, int m, int n, const double* x, dou
 }
 
 // X := L^-1 X for X of n rows and m columns.
-template <int N = 0>
 PN_INLINE void solve_lower_columns(const double* L, int n, double* X, int m) {
-    if (N) n = m = N;
     for (int i = 0; i < n; ++i) {
         for (int l = 0; l < i; ++l) {
             const double a = L[i * n + l];
@@ -74,9 +72,7 @@ PN_INLINE void solve_lower_columns(const double* L, int n, double* X, int m) {
 }
 
 // C -= A B, with A (m, k) and B (k, n).
-template <int N = 0>
 PN_INLINE void subtract_product(double* C, const double* A, const double* B, int m, int k, int n) {
-    if (N) m = k = n = N;
     for (int i = 0; i < m; ++i)
         for (int l = 0; l < k; ++l) {
             const double a = A[i * k + l];
@@ -85,9 +81,7 @@ PN_INLINE void subtract_product(double* C, const double* A, const double* B, int
 }
 
 // C -= A^T B, with A (k, m) and B (k, n).
-template <int N = 0>
 PN_INLINE void subtract_transpose_product(double* C, const double* A, const double* B, int m, int k, int n) {
-    if (N) m = k = n = N;
     for (int l = 0; l < k; ++l)
         for (int i = 0; i < m; ++i) {
             const double a = A[l * m + i];
@@ -185,9 +179,7 @@ PN_INLINE bool eliminate(double* A, int* exchanges, int n) {
 }
 
 // X := A^-1 X for X of m columns, with the factors of eliminate.
-template <int N = 0>
 PN_INLINE void substitute(const double* A, const int* exchanges, int n, double* X, int m) {
-    if (N) n = m = N;
     for (int c = 0; c < n; ++c)
         if (exchanges[c] != c)
             for (int j = 0; j < m; ++j) std::swap(X[c * m + j], X[exchanges[c] * m + j]);

@@ -64,19 +64,29 @@ double rate_bound(const Terms& terms, const Block& block, const Vec3& point) {
     return bound;
 }
 
+// Return the part of a row's bias that its bodies accelerate, with the directions of the row held.
+double acceleration_of_bodies(const Mechanism& m, const Terms& terms, const Block& block, const Wrench& unit) {
+    double sum = 0.0;
+    if (block.joint1 > 0) sum += unit.force.dot(acceleration_at(m, terms.body[block.joint1], unit.point));
+    if (block.joint2 > 0) sum -= unit.force.dot(acceleration_at(m, terms.body[block.joint2], unit.point));
+    return sum;
+}
+
 }  // namespace
 
-// Half of the change of a row's rate in a step by the turn of its directions, over the step. At edges of small rounding
-// the directions turn far within a step. The rate is not linear in the step then, and the direction at the middle of the
-// step serves for the whole step.
+// Half of the change of a row's rate in a step at zero acceleration of the joints, over the step. At edges of small
+// rounding the directions turn far within a step. The rate is not linear in the step then, and the direction at the
+// middle of the step serves for the whole step.
 double StepForces::turning_rate(const StepRow& row, double h) const {
     const Block& block = p.blocks[row.block];
     const RowValues& values = w.now.values[row.block];
     const int k = block.kept[row.k];
-    const double half = 0.5 * values.bias[k];
-    if (!values.geometric) return half;
-    const double bound = parameters.max_turn * rate_bound(w.now.terms, block, values.wrench[k].point);
-    return h * std::abs(half) <= bound ? half : 0.0;
+    const double bias = values.bias[k];
+    if (!values.geometric) return 0.5 * bias;
+    const Wrench& unit = values.wrench[k];
+    const double turn = bias - acceleration_of_bodies(p.mechanism, w.now.terms, block, unit);
+    const double bound = parameters.max_turn * rate_bound(w.now.terms, block, unit.point);
+    return 0.5 * h * std::abs(turn) <= bound ? 0.5 * bias : 0.0;
 }
 
 // Compute the velocities at the step's end without the forces, over h.
