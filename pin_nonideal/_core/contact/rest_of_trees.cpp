@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "complementarity/blocks/solver.hpp"
-#include "contact/tree_blocks.hpp"
+#include "dynamics/tree_blocks.hpp"
 #include "math/tolerances.hpp"
 
 namespace pn {

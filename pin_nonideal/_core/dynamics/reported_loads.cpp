@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "complementarity/cone/solver.hpp"
+#include "complementarity/blocks/solver.hpp"
 #include "constraints/redundancy.hpp"
+#include "dynamics/tree_blocks.hpp"
 #include "math/decompositions.hpp"
 
 namespace pn {
@@ -15,9 +16,11 @@ namespace {
 // force as the current multipliers.
 struct StickingShares {
     std::vector<int> rows;
+    std::vector<StepRow> of_blocks;  // the same rows
     std::vector<ConeElement> cones;
     bool outside = false;  // a contact pulls, or its friction is beyond its limit
     bool known = true;     // a friction element other than a contact shares the load
+    bool joined = false;   // constraints share the load
 
     StickingShares(const Program& p, const Workspace& w, const VecX& lam, const MatX& free) {
         std::vector<char> taken(p.layout.rows, 0);
@@ -31,6 +34,7 @@ struct StickingShares {
             known &= row < p.constraint_rows();
             rows.push_back(row);
             cones.push_back({ConeElement::Kind::equality, 1, 0.0});
+            joined = true;
         }
     }
 
@@ -40,7 +44,11 @@ struct StickingShares {
         const int dim = sticks ? static_cast<int>(p.blocks[p.frictions[e].block].kept.size()) : 0;
         const double mu = sticks ? p.frictions[e].holding_limit(p.frictions[e].mu) : 0.0;
         rows.push_back(p.blocks[gap.block].row);
-        for (int k = 0; k < dim; ++k) rows.push_back(p.blocks[p.frictions[e].block].row + k);
+        of_blocks.push_back({gap.block, 0});
+        for (int k = 0; k < dim; ++k) {
+            rows.push_back(p.blocks[p.frictions[e].block].row + k);
+            of_blocks.push_back({p.frictions[e].block, k});
+        }
         for (int k = 0; k <= dim; ++k) taken[rows[rows.size() - 1 - k]] = 1;
         cones.push_back(ConeElement::contact(1 + dim, mu));
         double friction = 0.0;
@@ -57,6 +65,33 @@ bool all_stick(const Program& p, const Workspace& w) {
     return stick;
 }
 
+// Find forces f within the cones that exert the same forces on each tree as the forces `of_rows`. Contacts share the loads as
+// equally compliant ones do.
+bool share_tree_by_tree(const Program& p, const Workspace& w, const StickingShares& shares, const VecX& of_rows, VecX& f) {
+    TreeBlocks trees(p);
+    BlockSolver solver;
+    if (!trees.applies(p) || !trees.fill(p, w, shares.of_blocks, shares.cones, solver.problem) || !solver.pose()) return false;
+    solver.problem.offset.setZero(solver.problem.rows);
+    solver.release(VecX::Zero(p.mechanism.nv), -of_rows);
+    f.setZero();
+    solver.move(f);
+    return solver.hold(f);
+}
+
+// Find the shortest forces f within the cones that exert the same force as the forces `of_rows`. The columns of `free` are
+// multipliers that exert no force.
+bool share_shortest(const StickingShares& shares, const MatX& free, const VecX& of_rows, VecX& f) {
+    const int n = static_cast<int>(shares.rows.size());
+    MatX Z(n, free.cols());
+    for (int k = 0; k < n; ++k) Z.row(k) = free.row(shares.rows[k]);
+    const MatX S = Z.transpose() * Z;
+    Cholesky factor;
+    factor.compute(S);
+    const MatX Q = factor.solve_lower(Z.transpose()).transpose();
+    const MatX W = MatX::Identity(n, n) - Q * Q.transpose();  // zero for multipliers that exert no force
+    return ConeComplementarity().hold(W, -W * of_rows, shares.cones, f);
+}
+
 }  // namespace
 
 ReportedLoads::ReportedLoads(const Program& p, Workspace& w) : w_(w) {
@@ -70,19 +105,10 @@ ReportedLoads::ReportedLoads(const Program& p, Workspace& w) : w_(w) {
     if (!shares.outside || !shares.known) return;
 
     const int n = static_cast<int>(shares.rows.size());
-    MatX Z(n, free.cols());
-    VecX of_rows(n);
-    for (int k = 0; k < n; ++k) {
-        Z.row(k) = free.row(shares.rows[k]);
-        of_rows[k] = lam[shares.rows[k]];
-    }
-    const MatX S = Z.transpose() * Z;
-    Cholesky factor;
-    factor.compute(S);
-    const MatX Q = factor.solve_lower(Z.transpose()).transpose();
-    const MatX W = MatX::Identity(n, n) - Q * Q.transpose();  // zero for multipliers that exert no force
-    VecX f(n);
-    if (!ConeComplementarity().hold(W, -W * of_rows, shares.cones, f)) return;
+    VecX of_rows(n), f(n);
+    for (int k = 0; k < n; ++k) of_rows[k] = lam[shares.rows[k]];
+    const bool tree_by_tree = n > reported_loads_parameters.max_rows && !shares.joined && is_free;
+    if (!(tree_by_tree && share_tree_by_tree(p, w, shares, of_rows, f)) && !share_shortest(shares, free, of_rows, f)) return;
     minimum_norm_ = lam;
     Reactions& r = w.now.reactions;
     for (int k = 0; k < n; ++k) r.lam[shares.rows[k]] = f[k];

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "complementarity/blocks/least_move.hpp"
-#include "contact/tree_blocks.hpp"
+#include "dynamics/tree_blocks.hpp"
 #include "run/time_stepping/mean_velocity.hpp"
 
 namespace pn {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "complementarity/blocks/solver.hpp"
-#include "contact/tree_blocks.hpp"
+#include "dynamics/tree_blocks.hpp"
 
 namespace pn {
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "complementarity/cone/problem.hpp"
-#include "contact/tree_blocks.hpp"
+#include "dynamics/tree_blocks.hpp"
 #include "run/time_stepping/mean_velocity.hpp"
 
 namespace pn {

@@ -15,6 +15,9 @@ StepForces::StepForces(const Program& program, Workspace& workspace, const StepE
 
 void StepForces::pose(const MeanVelocity& mean, double h, const VecX& a_free, bool anew) {
     measure_free(mean, h, a_free);
+    const double largest = a_free.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm();
+    const auto free = free_rows_.head(static_cast<Eigen::Index>(elements_.rows.size()));
+    has_load_ = (free.array().abs() > parameters.row_rounding * largest).any();
     if (anew) {
         responses_.reset();
         separate_ = !elements_.limits_follow_loads(p) &&
@@ -193,6 +196,7 @@ bool StepForces::keep_rest(bool solved, const VecX& q0) {
 }
 
 ConeResiduals StepForces::residuals() {
+    if (!has_load_) return {};
     const int n = static_cast<int>(elements_.rows.size());
     if (separate_) return trees_.residuals(middle_, f);
     const auto W = responses_.matrix(n);

@@ -23,6 +23,8 @@ struct StepForcesParameters {
     double limit_rounding = 1e-9;
     // Rows at the step's end that count as rest, relative to the rows without the forces.
     double rest_rounding = 1e-9;
+    // Rounding of the rows without forces, relative to the largest acceleration. Smaller rows show no residual.
+    double row_rounding = 1e-12;
     // Accepted residual relative to the velocities. A step of a turning body can have no exact solution if corners
     // share its load. Also the accepted error of a limit, relative to the forces. The statistics report both.
     double max_residual = 1e-7;
@@ -84,6 +86,7 @@ private:
     const StepElements& elements_;
     SeparateTrees trees_;
     bool separate_ = false;
+    bool has_load_ = false;  // the rows without forces are more than rounding
     StepResponses responses_;
     ConeComplementarity solver_;
     LawMiss law_miss_;

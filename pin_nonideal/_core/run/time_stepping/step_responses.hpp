@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "contact/tree_blocks.hpp"
+#include "dynamics/tree_blocks.hpp"
 #include "dynamics/workspace.hpp"
 
 namespace pn {

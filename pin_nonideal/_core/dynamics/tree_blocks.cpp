@@ -1,4 +1,4 @@
-#include "contact/tree_blocks.hpp"
+#include "dynamics/tree_blocks.hpp"
 
 #include <algorithm>
 #include <cmath>
