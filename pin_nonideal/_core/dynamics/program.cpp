@@ -1,6 +1,7 @@
 #include "dynamics/program.hpp"
 
 #include <algorithm>
+#include <numeric>
 #include <map>
 
 namespace pn {
@@ -99,6 +100,25 @@ VecX Program::user_multipliers(const VecX& lam) const {
     return all;
 }
 
+// Find the dofs that constraints and contacts tie to a constraint that depends on time. Rows that can never act tie none.
+static void find_tied_to_drives(Program& p) {
+    std::vector<int> parent(p.mechanism.nv);
+    std::iota(parent.begin(), parent.end(), 0);
+    const auto root = [&](int dof) {
+        while (parent[dof] != dof) dof = parent[dof] = parent[parent[dof]];
+        return dof;
+    };
+    const auto acts = [&](int i) { return !p.blocks[i].kept.empty() && !p.blocks[i].support.empty(); };
+    for (int i = 0; i < p.constraints; ++i)
+        if (acts(i))
+            for (int dof : p.blocks[i].support) parent[root(dof)] = root(p.blocks[i].support[0]);
+    std::vector<char> drives(p.mechanism.nv, 0);
+    for (int i = 0; i < p.constraints; ++i)
+        if (acts(i) && pn::moves_in_time(p.blocks[i].kind)) drives[root(p.blocks[i].support[0])] = 1;
+    p.tied_to_drives.clear();
+    for (int dof = 0; dof < p.mechanism.nv; ++dof) p.tied_to_drives.push_back(drives[root(dof)]);
+}
+
 void Program::finish() {
     int row = 0;
     entries = 0;
@@ -160,6 +180,7 @@ void Program::finish() {
             searches_breaks |= pn::is_users(*f);
         }
     }
+    find_tied_to_drives(*this);
     driven_exactly = moves_in_time && !by_differences;
     has_user_rows = by_differences || !affine_rates;
     std::sort(breaks.begin(), breaks.end());

@@ -1,6 +1,7 @@
 // Program: the scene after its analysis, immutable and shared by threads.
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <string>
 #include <variant>
@@ -75,6 +76,13 @@ struct Program {
     bool driven = false;           // forces or actuation
     bool has_body_forces = false;  // given forces that act on bodies
     bool moves_in_time = false;    // some constraint depends on time
+    // By dof: constraints tie it to a constraint that depends on time, which may carry loads of friction on this dof.
+    std::vector<char> tied_to_drives;
+    // Check if a drive may decide the slip of an element.
+    bool follows_drives(int element) const {
+        const std::vector<int>& support = blocks[frictions[element].block].support;
+        return std::any_of(support.begin(), support.end(), [&](int dof) { return tied_to_drives[dof]; });
+    }
     bool driven_exactly = false;   // some constraint does, and all rates are exact derivatives, not differences
     std::vector<double> breaks;    // known break times of the functions of time, ascending
     bool searches_breaks = false;  // some user function of time does not declare its breaks

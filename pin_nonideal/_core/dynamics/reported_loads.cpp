@@ -65,12 +65,14 @@ bool all_stick(const Program& p, const Workspace& w) {
     return stick;
 }
 
-// Find forces f within the cones that exert the same forces on each tree as the forces `of_rows`. Contacts share the loads as
-// equally compliant ones do.
-bool share_tree_by_tree(const Program& p, const Workspace& w, const StickingShares& shares, const VecX& of_rows, VecX& f) {
+// Find forces f within the cones that exert the same forces on each tree as the forces `of_rows`. Contacts share the
+// loads as equally compliant ones do.
+bool share_tree_by_tree(const Program& p, const Workspace& w, const StickingShares& shares, const VecX& of_rows,
+                        VecX& f) {
     TreeBlocks trees(p);
     BlockSolver solver;
-    if (!trees.applies(p) || !trees.fill(p, w, shares.of_blocks, shares.cones, solver.problem) || !solver.pose()) return false;
+    const bool fits = trees.applies(p) && trees.fill(p, w, shares.of_blocks, shares.cones, solver.problem);
+    if (!fits || !solver.pose()) return false;
     solver.problem.offset.setZero(solver.problem.rows);
     solver.release(VecX::Zero(p.mechanism.nv), -of_rows);
     f.setZero();

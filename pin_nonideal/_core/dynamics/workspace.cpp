@@ -132,7 +132,7 @@ void select_rows(const Program& p, Workspace& w) {
             continue;
         }
         // Prescribed motions carry the loads of dofs that they hold, so sticking elements have rows beside theirs.
-        if (block.dof >= 0 && !p.moves_in_time)
+        if (block.dof >= 0 && !p.tied_to_drives[block.dof])
             for (int k = 0; k < block.total; ++k) w.now.terms.locked[block.dof + k] = 1;
         else
             for (size_t k = 0; k < block.kept.size(); ++k) w.now.rows.required[block.row + k] = 1;

@@ -69,9 +69,9 @@ bool EventLocator::is_stopped(int e) const {
 }
 
 std::optional<double> EventLocator::step_after_stop() const {
-    if (!follows_drives()) return std::nullopt;
     const auto stops = [&](int e) {
-        return is_rest(slip_velocity(w.now, p.frictions[e]).norm()) && !is_rest(system_.slip(stepper_.start_rate(), e));
+        return follows_drives(e) && is_rest(slip_velocity(w.now, p.frictions[e]).norm()) &&
+               !is_rest(system_.slip(stepper_.start_rate(), e));
     };
     if (std::none_of(w.now.slipping.begin(), w.now.slipping.end(), stops)) return std::nullopt;
     return parameters.part_after_stop * stepper_.h;
@@ -159,7 +159,7 @@ std::optional<FoundEvent> EventLocator::locate() {
         return FoundEvent{kind, index, stepper_.t0 + stepper_.h};
     };
     for (auto e = w.now.slipping.rbegin(); e != w.now.slipping.rend(); ++e)
-        if (has_arrived(*e) || (follows_drives() && is_stopped(*e))) return event_of(FoundKind::rest_or_limit, *e);
+        if (has_arrived(*e) || (follows_drives(*e) && is_stopped(*e))) return event_of(FoundKind::rest_or_limit, *e);
     time_to_rest_.reset();
     std::optional<Crossing> crossing = search_.first();
     if (crossing) step_onto(*crossing);

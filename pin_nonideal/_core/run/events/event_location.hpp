@@ -65,7 +65,7 @@ public:
 private:
     bool has_arrived(int element) const;
     // Prescribed motions may stop elements, which methods of SciPy do not release again.
-    bool follows_drives() const { return p.moves_in_time && !stepper_.method.outside(); }
+    bool follows_drives(int element) const { return p.follows_drives(element) && !stepper_.method.outside(); }
     bool is_rest(double slip) const;
     bool is_stopped(int element) const;
     bool passes_by_rest(int element) const;

@@ -241,3 +241,22 @@ def test_a_held_joint_with_friction_neither_slips_nor_takes_load_in_time_steps(c
 )
 def test_images_answer_as_their_scenes(name: str, transformation: str, function: str) -> None:
     check(name, transformation, [function])
+
+
+def test_a_drive_elsewhere_changes_no_loads_at_rest() -> None:
+    """Joints that friction holds share loads with a loop alike, with and without a driven cart."""
+    loop = pn.load("rough_four_bar")
+    model = loop.model.copy()
+    cart = model.addJoint(0, pin.JointModelPX(), pin.SE3.Identity(), "cart")
+    model.appendBodyToJoint(cart, pin.Inertia(1.0, np.zeros(3), 0.01 * np.eye(3)), pin.SE3.Identity())
+    parts = {"constraints": loop.constraints, "laws": loop.laws}
+    q0 = np.append(loop.q0, 0.0)
+    alone = pn.Scene(model, q0=q0, **parts)
+    drive = pn.PrescribedMotion("cart", pn.sinusoid(0.1, 1.0), name="drive")
+    beside = pn.Scene(model, q0=q0, **parts | {"constraints": [*loop.constraints, drive]})
+    assert pn.rest(beside).margin == pytest.approx(pn.rest(alone).margin, rel=1e-9)
+    q, v = beside.project()
+    stuck = [0] * len(loop.element_names)
+    one, other = (scene.solve(q, v, modes=stuck) for scene in (alone, beside))
+    rows = len(one.lam)
+    np.testing.assert_allclose(other.lam[:rows], one.lam, atol=1e-9)

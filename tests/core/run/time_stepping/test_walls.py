@@ -1,4 +1,4 @@
-"""Pyramids of bricks: rest is decided tree by tree, and the recorded forces hold each brick within the cones."""
+"""Pyramids of bricks: rest is decided tree by tree, and recorded forces hold each brick within the cones."""
 
 from __future__ import annotations
 
