@@ -104,13 +104,15 @@ ReportedLoads::ReportedLoads(const Program& p, Workspace& w) : w_(w) {
     const std::vector<char>& locked = w.now.terms.locked;
     const bool is_free = std::find(locked.begin(), locked.end(), char(1)) == locked.end();
     in_cones_ = shares.known && !shares.outside && is_free;
-    if (!shares.outside || !shares.known) return;
-
+    if (!shares.known) return;
     const int n = static_cast<int>(shares.rows.size());
     VecX of_rows(n), f(n);
     for (int k = 0; k < n; ++k) of_rows[k] = lam[shares.rows[k]];
+    // Many contacts share loads in one way, whether the minimum-norm multipliers happen to be within the cones or not.
     const bool tree_by_tree = n > reported_loads_parameters.max_rows && !shares.joined && is_free;
-    if (!(tree_by_tree && share_tree_by_tree(p, w, shares, of_rows, f)) && !share_shortest(shares, free, of_rows, f)) return;
+    if (!(tree_by_tree && share_tree_by_tree(p, w, shares, of_rows, f)) &&
+        !(shares.outside && share_shortest(shares, free, of_rows, f)))
+        return;
     minimum_norm_ = lam;
     Reactions& r = w.now.reactions;
     for (int k = 0; k < n; ++k) r.lam[shares.rows[k]] = f[k];
