@@ -4,6 +4,7 @@
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
+#include "complementarity/least_norm_friction.hpp"
 #include "complementarity/socp_mode_newton.hpp"
 #include "python/batch.hpp"
 #include "python/builder.hpp"
@@ -43,4 +44,14 @@ NB_MODULE(_core, m) {
                                  const Array& limits) {
         return to_numpy(friction_program(map(W), map(alpha0), dims, map(limits)));
     }, "W"_a, "alpha0"_a, "dims"_a, "limits"_a);
+    // Least-norm forces of friction on arrays, for tests.
+    m.def("least_norm_friction", [](const Array2& W, const std::vector<int>& dims, const Array& sizes,
+                                    const Array& middles, const Array& force) {
+        FrictionLimits limits;
+        limits.size = map(sizes);
+        limits.middle = map(middles);
+        VecX shared = map(force);
+        const bool found = LeastNormFriction().solve(map(W), dims, limits, shared);
+        return nb::make_tuple(found, to_numpy(shared));
+    }, "W"_a, "dims"_a, "sizes"_a, "middles"_a, "force"_a);
 }

@@ -239,26 +239,25 @@ void Moreau::solve_friction(double t) {
     }
 }
 
-// Replace the forces of elements that stick by the forces of least norm with the same motion, if their limits allow. The
-// components of each element count with its mean response.
+// Replace the forces of elements that stick by the forces of least norm with the same motion.
 void Moreau::share_loads() {
-    std::vector<int> sticking;
+    alpha_ = problem_.alpha0;
+    alpha_.noalias() += problem_.W * force_;
+    std::vector<int> sticking, rows, dims;
     for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e) {
-        if (!is_within_limit(e, at)) continue;
         const int dim = problem_.dims[e];
-        const double response = std::sqrt(problem_.W.diagonal().segment(at, dim).mean());
-        unit_.segment(at, dim).setConstant(response > 0.0 ? 1.0 / response : 0.0);
-        for (int k = 0; k < dim; ++k) sticking.push_back(at + k);
+        const bool sticks = is_within_limit(e, at) || alpha_.segment(at, dim).norm() <= slip_rounding();
+        if (!sticks || !(force_limit_[e] > 0.0)) continue;
+        sticking.push_back(e);
+        dims.push_back(dim);
+        for (int k = 0; k < dim; ++k) rows.push_back(at + k);
     }
     if (sticking.empty()) return;
-    const VecX unit = unit_(sticking);
-    const MatX W = unit.asDiagonal() * problem_.W(sticking, sticking);
-    const VecX shared = least_squares(W * unit.asDiagonal(), W * force_(sticking), parameters.dependent_pivot);
-    own_force_ = force_;
-    force_(sticking) = shared.cwiseProduct(unit);
-    for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e)
-        if (force_.segment(at, problem_.dims[e]) != own_force_.segment(at, problem_.dims[e]) && !is_within_limit(e, at))
-            return force_.swap(own_force_);
+    sticking_limit_.size = force_limit_.size(sticking);
+    sticking_limit_.middle = force_limit_.middle(rows);
+    sticking_force_ = force_(rows);
+    least_norm_.solve(problem_.W(rows, rows), dims, sticking_limit_, sticking_force_);
+    force_(rows) = sticking_force_;
 }
 
 // Compute the velocity and the modes at the step's end. A force below its limit holds its element.

@@ -10,6 +10,7 @@
 
 #include "complementarity/box_lcp.hpp"
 #include "complementarity/friction_limits.hpp"
+#include "complementarity/least_norm_friction.hpp"
 #include "friction/problem.hpp"
 #include "math/anderson.hpp"
 #include "run/integrators/system.hpp"
@@ -79,10 +80,13 @@ private:
     bool boxes_ = true;  // every element has one direction
     VecX force_, power_;                  // forces and powers of the elements
     FrictionLimits limit_, force_limit_;  // current limits, and the limits for which the force was found
+    LeastNormFriction least_norm_;
+    FrictionLimits sticking_limit_;
+    VecX sticking_force_;
     bool are_dependent_ = false;    // some forces do not move the bodies: elements that stick share loads
     bool symmetric_limits_ = true;  // all limits are equal forward and backward
     AndersonAcceleration loads_;
-    VecX shifted_, unit_, own_force_;
+    VecX shifted_, unit_;
 };
 
 }  // namespace pn
