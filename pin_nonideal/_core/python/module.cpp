@@ -1,6 +1,7 @@
 // Python bindings of the core: a Builder makes a program, a Runner evaluates and runs it.
 #include <string>
 
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
@@ -52,6 +53,6 @@ NB_MODULE(_core, m) {
         limits.middle = map(middles);
         VecX shared = map(force);
         const bool found = LeastNormFriction().solve(map(W), dims, limits, shared);
-        return nb::make_tuple(found, to_numpy(shared));
+        return std::pair(found, to_numpy(shared));
     }, "W"_a, "dims"_a, "sizes"_a, "middles"_a, "force"_a);
 }
