@@ -55,13 +55,6 @@ KNOWN: list[Known] = [
         functions="simulate (dop853|dopri5)",
     ),
     Known(
-        "two elements of friction on one freedom stick and slip in turn where they begin to slip",
-        ("robot worm_drive", "tonnes, kilometers, hours", "simulate dop853"),
-        scenes="robot worm_drive",
-        transformations="tonnes, kilometers, hours|milliseconds|a far contact",
-        functions="simulate .*|stepper|poses of a replay",
-    ),
-    Known(
         "time stepping splits the load of four feet otherwise if rows act or friction holds a joint",
         ("robot solo12_dropped", "an idle row", "simulate moreau"),
         scenes="robot solo12_dropped",

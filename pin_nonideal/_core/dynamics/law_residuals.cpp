@@ -209,8 +209,8 @@ void find_determined(const Program& p, Workspace& w, std::vector<char>& is_deter
         if (w.state.mode[e] != sticking) continue;
         const Block& block = p.blocks[f.block];
         bool shared = f.gap >= 0 && shares(p.blocks[p.gaps[f.gap].block]);
-        if (block.dof < 0) shared |= shares(block);
-        for (int k = 0; block.dof >= 0 && k < block.total; ++k) shared |= on_dofs[block.dof + k] > min_null_space_entry;
+        if (!is_locked(w, block)) shared |= shares(block);
+        else for (int k = 0; k < block.total; ++k) shared |= on_dofs[block.dof + k] > min_null_space_entry;
         is_determined[e] = !shared;
     }
 }

@@ -188,12 +188,11 @@ void set_contacts(const Program& p, Workspace& w, const std::vector<char>& close
 inline bool any_closed(const RunState& state) {
     return !state.closed.empty() && std::memchr(state.closed.data(), 1, state.closed.size());
 }
-// Check if an element belongs to an open contact.
 // Check if a sticking element of single dofs locks them. Else its rows hold them.
 inline bool is_locked(const Workspace& w, const Block& friction) {
     return friction.dof >= 0 && w.now.terms.locked[friction.dof];
 }
-
+// Check if an element belongs to an open contact.
 inline bool is_open(const Program& p, const Workspace& w, int element) {
     const int gap = p.frictions[element].gap;
     return gap >= 0 && !w.state.closed[gap];

@@ -10,6 +10,7 @@
 #include "dynamics/state_projection.hpp"
 #include "dynamics/friction_limit.hpp"
 #include "dynamics/step_start.hpp"
+#include "friction/problem.hpp"
 #include "friction/stick_slip.hpp"
 #include "math/tolerances.hpp"
 #include "run/events/unloaded_contacts.hpp"
@@ -44,6 +45,30 @@ void resolve_together(System& system, double t, ModeQuery& mode_query, bool stri
         std::for_each(moving, resting.end(), [&](int e) { follow_velocity(p, w, e, mode_query); });
         resting.erase(moving, resting.end());
     }
+}
+
+// Let elements at their limits stick that sticking elements and constraints hold, because they cannot move. Return true if
+// there are any.
+bool stick_if_held(System& system, double t, const std::vector<int>& resting) {
+    const Program& p = system.p;
+    Workspace& w = system.w;
+    std::vector<int> slipping;
+    for (int e : resting)
+        if (slips(w.state.mode[e])) slipping.push_back(e);
+    if (slipping.empty() || slipping.size() == resting.size()) return false;
+    FrictionProblem problem(p, w, slipping);
+    problem.clean(p, w);
+    std::vector<Mode> modes = w.state.mode;
+    bool changes = false;
+    for (size_t i = 0, row = 0; i < slipping.size(); row += problem.dims[i++]) {
+        if (problem.W.diagonal().segment(row, problem.dims[i]).any()) continue;
+        modes[slipping[i]] = sticking;
+        changes = true;
+    }
+    if (!changes) return false;
+    set_modes(p, w, modes);
+    begin_step(p, w, t, system.q, system.v);
+    return true;
 }
 
 // Check if the sticking elements share their load in several ways. Then one of them is beyond its limit, or the element
@@ -207,7 +232,9 @@ static std::vector<Event> select_modes(System& system, double t, VecX& y, VecX& 
     if (!p.frictions.empty() || !p.gaps.empty()) {
         set_direction_search(system, friction.mode_query.at_rest, event.has_value());
         system.write(y);
-        w.state.is_hyperstatic = shares_load(system, t, friction.mode_query.at_rest, friction.held);
+        const std::vector<int>& resting = friction.mode_query.at_rest;
+        const bool are_held = stick_if_held(system, t, resting);
+        w.state.is_hyperstatic = are_held || shares_load(system, t, resting, friction.held);
     }
     MotionState state;
     for (int i = 0; i < static_cast<int>(friction.rest.size()); ++i)
