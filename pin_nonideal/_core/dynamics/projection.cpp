@@ -26,6 +26,22 @@ void least_move(const Program& p, Workspace& w, VecX& x) {
     solve_Rt(p.mechanism, w.now.terms, x);
 }
 
+// Largest change of the residual of a user's row by a displacement of unit length.
+double row_size(const Program& p, const Workspace& w, const Block& block, size_t k) {
+    double size = 0.0;
+    const double* entry = w.now.A.data() + block.offset + k;
+    for (size_t l = 0; l < block.support.size(); ++l, entry += block.kept.size())
+        size = std::max(size, std::abs(*entry) / p.mechanism.lever[block.support[l]]);
+    return size;
+}
+
+// Factor that gives residuals of a user's row in other units about the size of those in meters.
+double unit_factor(const Program& p, const Workspace& w, const Block& block, size_t k) {
+    const double size = row_size(p, w, block, k), small = projection_parameters.small_row;
+    if (size == 0.0) return 1.0;
+    return size < small ? small / size : size * small > 1.0 ? 1.0 / (small * size) : 1.0;
+}
+
 // Store the negative residual or rate of each kept row in r. Return the largest magnitude of the rows in `counts`.
 template <class Value>
 double gather(const Program& p, Workspace& w, const std::vector<char>& counts, Value value) {
@@ -35,7 +51,9 @@ double gather(const Program& p, Workspace& w, const std::vector<char>& counts, V
         for (size_t k = 0; k < block.kept.size(); ++k) {
             const double x = value(i, static_cast<int>(k));
             w.scratch.r[block.row + k] = -x;
-            if (counts[block.row + k]) largest = std::max(largest, std::abs(x));
+            if (!counts[block.row + k]) continue;
+            const double size = block.affine_rate ? std::abs(x) : std::abs(x) * unit_factor(p, w, block, k);
+            largest = std::max(largest, size);
         }
     }
     return largest;

@@ -19,6 +19,9 @@ struct ProjectionParameters {
     // The third-order part of a step's move is used if its square is below this fraction of the second-order part's
     // square.
     double falling_square = 0.01;
+    // Change of the residual of a user's row by a displacement of unit length, below which the row is in other units than
+    // meters and radians. A change above the inverse counts alike.
+    double small_row = 1e-2;
     // Below this speed [rad/s or m/s] rows change only by rounding over a step of time stepping.
     double slow_speed = 1e-5;
     // Factorization at the new position costs less than this many iterations.

@@ -91,7 +91,7 @@ bool configure_step(const Program& p, Workspace& w, int max_rank) {
     w.state.has_ideal_row_choice = false;
     if (w.now.rows.blocks.empty()) return false;
     const RowSystem& rows = w.now.rows;
-    const bool due = p.gaps.empty() && is_choice_due(w.now.rows);  // contacts are chosen with their modes
+    const bool due = w.now.closed_gaps.empty() && is_choice_due(w.now.rows);  // contacts are chosen with their modes
     if (!rows.orthogonal && !due && rows.has_rank_up_to(max_rank)) return false;
     // The Cholesky factor proves that the active rows are independent: a new choice has at most as many.
     if (!rows.orthogonal) max_rank = std::min(max_rank, rows.active_count());
