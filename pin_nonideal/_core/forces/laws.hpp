@@ -61,6 +61,8 @@ struct Sigmoid {  // identified robot friction, phi1/(1+exp(-phi2 (v+phi3))) - p
         using std::exp;
         return phi1 / (1.0 + exp(-phi2 * (speed + phi3)));
     }
+    // Change of the force with the speed.
+    double slope(double speed) const { return phi2 * level(speed) * (1.0 - level(speed) / phi1); }
     template <class Sink>
     void act(const LawState& s, Sink& sink) const { sink.on_dof(dof, level(0.0) - level(s.v[dof])); }
 };
@@ -73,17 +75,28 @@ struct LuGre {  // F = sigma0 z + sigma1 dz + sigma2 v, dz = v - sigma0 |v| z / 
     static constexpr Reaction reaction = Reaction::none;
 
     template <class Real>
-    Real rate(const Real& speed, const Real& z) const {
+    Real rate(const Real& speed, const Real& z) const { return speed - decay(speed) * z; }
+    // Rate sigma0 |v| / g(v) at which the deflection decays to its limit.
+    template <class Real>
+    Real decay(const Real& speed) const {
         using std::abs, std::exp;
         const Real x = speed / stribeck_velocity;
-        const Real g = coulomb + (stiction - coulomb) * exp(-x * x);
-        return speed - sigma0 * abs(speed) / g * z;
+        return sigma0 * abs(speed) / (coulomb + (stiction - coulomb) * exp(-x * x));
     }
+    // Mean of the deflection over the time h after z0 at constant speed. Its rate is the mean rate.
+    double mean_deflection(double speed, double z0, double h) const {
+        const double x = h * decay(speed);
+        const double kept = x < 1e-5 ? 1.0 - x / 2.0 : -std::expm1(-x) / x;
+        const double moved = x < 1e-5 ? 0.5 - x / 6.0 : (1.0 - kept) / x;
+        return kept * z0 + moved * h * speed;
+    }
+    // Force that opposes the speed.
+    double resistance(double speed, double z) const { return sigma0 * z + sigma1 * rate(speed, z) + sigma2 * speed; }
     template <class Sink>
     void act(const LawState& s, Sink& sink) const {
-        const double speed = s.v[dof], z = s.z[state], dz = rate(speed, z);
-        sink.on_state(state, dz);
-        sink.on_dof(dof, -(sigma0 * z + sigma1 * dz + sigma2 * speed));
+        const double speed = s.v[dof], z = s.z[state];
+        sink.on_state(state, rate(speed, z));
+        sink.on_dof(dof, -resistance(speed, z));
     }
 };
 

@@ -1,5 +1,7 @@
 #include "run/time_stepping/joint_drives.hpp"
 
+#include <algorithm>
+
 #include "dynamics/given_forces.hpp"
 
 namespace pn {
@@ -29,13 +31,15 @@ JointDrives::JointDrives(const Program& p) {
     }
     stiffness_ += kp_;
     damping_ += kd_;
-    any_ = (stiffness_.array() != 0.0).any() || (damping_.array() != 0.0).any();
+    each_law<LuGre>(p.laws, [&](const LuGre& law) { bristles_.push_back(law); });
+    each_law<Sigmoid>(p.laws, [&](const Sigmoid& law) { sigmoids_.push_back(law); });
+    any_ = (stiffness_.array() != 0.0).any() || (damping_.array() != 0.0).any() || !bristles_.empty() || !sigmoids_.empty();
 }
 
 JointDrives::Step::Step(const JointDrives& drives, const Program& p, Workspace& w, double t, double h, const VecX& q0,
                         const VecX& v0)
-    : now_(w.now) {
-    ImplicitDrives& step = now_.drives;
+    : all_(drives), w_(w), h_(h) {
+    ImplicitDrives& step = w.now.drives;
     step.active = drives.any_;
     if (!drives.any_) return;
     step.h = h;
@@ -44,21 +48,36 @@ JointDrives::Step::Step(const JointDrives& drives, const Program& p, Workspace& 
     step.theta.resize(v0.size());
     step.inertia.resize(v0.size());
     step.force.setZero(v0.size());
-    if (!now_.has_override && !p.limits_effort()) return;
-    if (!now_.has_override) demanded_torque(p, w, t, q0, v0, now_.tau);
+    z0_ = w.state.z;
+    for (const LuGre& law : drives.bristles_)
+        if (!p.mechanism.is_deep[law.dof]) step.damping[law.dof] += std::max(0.0, slope(law, v0[law.dof]));
+    for (const Sigmoid& law : drives.sigmoids_)
+        if (!p.mechanism.is_deep[law.dof]) step.damping[law.dof] += std::max(0.0, law.slope(v0[law.dof]));
+    if (!w.now.has_override && !p.limits_effort()) return;
+    if (!w.now.has_override) demanded_torque(p, w, t, q0, v0, w.now.tau);
     for (int dof = 0; dof < v0.size(); ++dof) {
-        if (!now_.has_override && now_.tau[dof] > p.min_effort[dof] && now_.tau[dof] < p.max_effort[dof]) continue;
+        if (!w.now.has_override && w.now.tau[dof] > p.min_effort[dof] && w.now.tau[dof] < p.max_effort[dof]) continue;
         step.stiffness[dof] -= drives.kp_[dof];
         step.damping[dof] -= drives.kd_[dof];
     }
 }
 
+// Change of the mean force of bristles with the mean speed of the step.
+double JointDrives::Step::slope(const LuGre& law, double speed) const {
+    const auto force = [&](double u) { return law.resistance(u, law.mean_deflection(u, z0_[law.state], h_)); };
+    const double difference = parameters.slope_difference * law.stribeck_velocity;
+    return (force(speed + difference) - force(speed - difference)) / (2.0 * difference);
+}
+
 void JointDrives::Step::move(const VecX& v0, const VecX& v) {
-    if (now_.drives.active) now_.drives.set_velocity(v0, v);
+    if (!w_.now.drives.active) return;
+    w_.now.drives.set_velocity(v0, v);
+    for (const LuGre& law : all_.bristles_)
+        w_.state.z[law.state] = law.mean_deflection(v[law.dof], z0_[law.state], h_);
 }
 
 double JointDrives::Step::energy(const VecX& v0, const VecX& v1) const {
-    const ImplicitDrives& step = now_.drives;
+    const ImplicitDrives& step = w_.now.drives;
     double energy = 0.0;
     if (!step.active) return energy;
     for (int dof = 0; dof < v0.size(); ++dof)

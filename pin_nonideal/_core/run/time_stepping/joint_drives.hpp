@@ -1,12 +1,23 @@
-// Springs, dampers, viscous friction and position control of single dofs, which time steps take implicitly.
+// Springs, dampers, smooth friction and position control of single dofs, which time steps take implicitly.
+//
+// Bristles of a LuGre law follow the exact solution for the mean velocity of the step. Their mean deflection replaces the
+// deflection at the step's start.
 #pragma once
 
 #include "dynamics/workspace.hpp"
 
 namespace pn {
 
+struct JointDrivesParameters {
+    // Difference of speeds that gives the slope of a smooth friction law, relative to the speed at which it changes.
+    double slope_difference = 1e-6;
+};
+
 class JointDrives {
 public:
+    using Parameters = JointDrivesParameters;
+    static constexpr Parameters parameters{};
+
     explicit JointDrives(const Program& p);
 
     // Check if a dof has a spring or damper.
@@ -18,7 +29,7 @@ public:
         Step(const JointDrives& drives, const Program& p, Workspace& w, double t, double h, const VecX& q0,
              const VecX& v0);
         Step(const Step&) = delete;
-        ~Step() { now_.drives.active = false; }
+        ~Step() { w_.now.drives.active = false; }
 
         // Set the velocity at which the forces are taken.
         void move(const VecX& v0, const VecX& v);
@@ -26,13 +37,20 @@ public:
         double energy(const VecX& v0, const VecX& v1) const;
 
     private:
-        Evaluation& now_;
+        double slope(const LuGre& law, double speed) const;
+
+        const JointDrives& all_;
+        Workspace& w_;
+        double h_;
+        VecX z0_;  // states of the laws at the step's start
     };
 
 private:
     bool any_ = false;
     VecX stiffness_, damping_;  // of all drives
     VecX kp_, kd_;              // of the position control
+    std::vector<LuGre> bristles_;
+    std::vector<Sigmoid> sigmoids_;
 };
 
 }  // namespace pn

@@ -51,6 +51,7 @@ void Moreau::step(double t, double h, VecX& y, double& numerical_energy) {
     set_modes(p, w, unloaded_);
     mean_.begin(h, v0_, w.state.last_rates);
     system_.read(y);
+    system_.read_law_states(y);
     JointDrives::Step drives(drives_, p, w, t, h, system_.q, v0_);
     sweep(middle, drives, true);
     while (mean_.move()) sweep(middle, drives, p.has_user_rows);

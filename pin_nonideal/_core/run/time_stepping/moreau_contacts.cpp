@@ -93,6 +93,7 @@ void MoreauContacts::step(double t, double h, VecX& y, double& numerical_energy,
     select(open_, unloaded_, true);
     mean_.begin(h, v0_, w.state.last_rates);
     system_.read(y);
+    system_.read_law_states(y);
     JointDrives::Step drives(drives_, p, w, t, h, system_.q, v0_);
     begin_sweeps(middle, drives);
     while (mean_.move() && correct(middle, drives)) {}
