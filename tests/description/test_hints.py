@@ -67,7 +67,7 @@ def test_fixed_steps_that_overflow_name_shorter_ones():
         ": where steps of dt = 0.01 s are too long for the stiffest force the motion overflows; take a "
         'shorter dt, or method="dop853", with max_steps where it calls the scene stiff; the trajectory up'
     )
-    for method in ("rk4", "semi_implicit_euler"):
-        with refuses(words, NonFiniteError):
-            pn.simulate(scene, 10.0, method=method, dt=0.01)
-    assert np.abs(pn.simulate(scene, 10.0, method="moreau", dt=0.01).v).max() <= 1.0  # implicit springs
+    with refuses(words, NonFiniteError):
+        pn.simulate(scene, 10.0, method="rk4", dt=0.01)
+    for method in ("semi_implicit_euler", "moreau"):  # implicit springs
+        assert np.abs(pn.simulate(scene, 10.0, method=method, dt=0.01).v).max() <= 1.0

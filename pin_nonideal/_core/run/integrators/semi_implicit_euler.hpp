@@ -1,9 +1,11 @@
 // Semi-implicit Euler of order 1: v1 = v0 + h a(q0, v0). q1 is q0 moved by h v1, with a correction toward the
-// constraints. Law states and work follow Euler's rule.
+// constraints. Law states and work follow Euler's rule. Springs, dampers and position control of single dofs act
+// implicitly.
 #pragma once
 
 #include <utility>
 
+#include "run/integrators/joint_drives.hpp"
 #include "run/integrators/step.hpp"
 #include "run/integrators/system.hpp"
 
@@ -11,7 +13,7 @@ namespace pn {
 
 class SemiImplicitEuler {
 public:
-    explicit SemiImplicitEuler(Step& step) : step_(step), delta_(step.y0) {}
+    SemiImplicitEuler(Step& step, const Program& p) : step_(step), drives_(p), delta_(step.y0) {}
 
     // Compute y1 from y0 and the rate at y0. The workspace must be evaluated at y0.
     void advance(System& system);
@@ -26,7 +28,10 @@ public:
     }
 
 private:
+    void take_drives_implicitly(System& system);
+
     Step& step_;
+    JointDrives drives_;
     VecX delta_;
 };
 

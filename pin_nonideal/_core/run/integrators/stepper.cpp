@@ -8,7 +8,7 @@ Stepper::Stepper(const Method& chosen, System& system, ErrorNorm& norm)
     : Step(chosen.stages, chosen.rates(), system.ns, system.ny), method(chosen), system_(system), norm_(norm),
       collocation_(*this, system, norm) {
     if (method.scheme == Method::Scheme::runge_kutta) scheme_.emplace<RungeKutta>(method, *this);
-    if (method.scheme == Method::Scheme::semi_implicit_euler) scheme_.emplace<SemiImplicitEuler>(*this);
+    if (method.scheme == Method::Scheme::semi_implicit_euler) scheme_.emplace<SemiImplicitEuler>(*this, system.p);
     if (method.outside()) scheme_.emplace<OutsideStep>(method, *this);
     system.can_solve_directions = !method.outside();
     for (int i = 0; i < stages; ++i)

@@ -7,7 +7,7 @@
 // Meth. Engng. 31, 1991).
 #pragma once
 
-#include "run/time_stepping/joint_drives.hpp"
+#include "run/integrators/joint_drives.hpp"
 
 namespace pn {
 

@@ -15,7 +15,7 @@
 #include "math/anderson.hpp"
 #include "run/integrators/system.hpp"
 #include "run/time_stepping/free_flight.hpp"
-#include "run/time_stepping/joint_drives.hpp"
+#include "run/integrators/joint_drives.hpp"
 #include "run/time_stepping/mean_velocity.hpp"
 
 namespace pn {

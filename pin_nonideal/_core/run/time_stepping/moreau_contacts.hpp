@@ -9,7 +9,7 @@
 #include "run/events/gap_watch.hpp"
 #include "run/time_stepping/contact_projection.hpp"
 #include "run/time_stepping/free_flight.hpp"
-#include "run/time_stepping/joint_drives.hpp"
+#include "run/integrators/joint_drives.hpp"
 #include "run/time_stepping/mean_velocity.hpp"
 #include "run/time_stepping/step_forces.hpp"
 

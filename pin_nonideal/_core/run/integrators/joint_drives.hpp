@@ -20,6 +20,8 @@ public:
 
     explicit JointDrives(const Program& p);
 
+    // Check if the scene has such forces.
+    bool any() const { return any_; }
     // Check if a dof has a spring or damper.
     bool acts_on(int dof) const { return stiffness_[dof] != 0.0 || damping_[dof] != 0.0; }
     // Implicit forces during a step of length h from (t, q0, v0), until the object ends. Position control whose torque is

@@ -1,4 +1,4 @@
-#include "run/time_stepping/joint_drives.hpp"
+#include "run/integrators/joint_drives.hpp"
 
 #include <algorithm>
 
