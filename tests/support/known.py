@@ -49,10 +49,17 @@ KNOWN: list[Known] = [
         functions="simulate (rk4|semi_implicit_euler)|stepper",
     ),
     Known(
-        "a ball's last stick before modes are not found is found or not by rounding",
+        "a ball's last stick in fixed steps, or in other units of time, is found or not by rounding",
         ("ball loop 0", "milliseconds", "simulate dop853"),
         scenes="ball loop .*",
+        transformations="rk4|milliseconds|tonnes, kilometers, hours",
         functions="simulate (dop853|dopri5)",
+    ),
+    Known(
+        "a start far off its loop ends near the nearest position, at a place that rounding decides",
+        ("ball loop 19", "boosted", "simulate dop853"),
+        scenes="ball loop 19",
+        functions="simulate .*|stepper|poses of a replay",
     ),
     Known(
         "time stepping splits the load of four feet otherwise if rows act or friction holds a joint",

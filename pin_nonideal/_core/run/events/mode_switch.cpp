@@ -5,6 +5,7 @@
 #include "contact/queries.hpp"
 #include "dynamics/evaluation.hpp"
 #include "dynamics/friction_limit.hpp"
+#include "dynamics/projection.hpp"
 #include "dynamics/step_start.hpp"
 
 namespace pn {
@@ -177,7 +178,9 @@ bool ModeChanges::bridge_with_time_stepping(const Failure& failure, bool of_hand
     const bool of_elements = system_.ne > 0 && is_of_modes(failure) && failure.kind != Failure::Kind::unmet_law &&
                              !failure.elements.empty();
     const int element = of_elements ? failure.elements.front() : 0;
-    if (!(of_hand_over || is_undecided(failure) || chatter_.is_zeno() || is_creeping())) return false;
+    const bool creeps = is_creeping();
+    if (creeps && p.gaps.empty() && come_to_rest()) return true;
+    if (!(of_hand_over || is_undecided(failure) || chatter_.is_zeno() || creeps)) return false;
     bridge(element);
     return true;
 }
@@ -207,6 +210,34 @@ bool ModeChanges::is_creeping() const {
     return !slipping.empty() && std::all_of(slipping.begin(), slipping.end(), [&](int e) {
         return slip_velocity(w.now, p.frictions[e]).norm() <= max_slip;
     });
+}
+
+// Let all slipping elements stick where they are, if forces within their limits can hold them.
+bool ModeChanges::come_to_rest() {
+    const RunState before = w.state;
+    const VecX y = progress_.y, rate = progress_.rate;
+    const std::vector<int> slipping = w.now.slipping;
+    std::vector<Mode> modes = w.state.mode;
+    for (int e : slipping) modes[e] = sticking;
+    const auto failure = attempt([&] {
+        set_modes(p, w, modes);
+        system_.read(progress_.y);
+        begin_step(p, w, progress_.t, system_.q, system_.v);
+        project_velocity(p, w, progress_.t, system_.v);
+        system_.write(progress_.y);
+        switch_modes(system_, progress_.t, progress_.y, progress_.rate, std::nullopt);
+    });
+    if (failure || std::any_of(slipping.begin(), slipping.end(), [&](int e) { return slips(w.state.mode[e]); })) {
+        progress_.y = y;
+        progress_.rate = rate;
+        restore_modes(before);
+        return false;
+    }
+    for (const Event& change : changes_since(system_, progress_.t, before.closed, before.mode))
+        out_.events.push_back(change);
+    output_.configured_now();
+    output_.now();
+    return true;
 }
 
 void ModeChanges::select_new_modes() {

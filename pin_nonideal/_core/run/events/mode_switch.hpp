@@ -64,6 +64,7 @@ private:
     void restore_last(const RunState& before, bool has_impact);
     static bool is_undecided(const Failure& failure);
     bool is_creeping() const;
+    bool come_to_rest();
     void select_new_modes();
     bool step_with_drive(RunState& before);
     void restore_modes(const RunState& before);

@@ -24,7 +24,9 @@ SHORT = 1e-5  # step size below which no uniform grid has a sample inside [s]
 CLEAR, FORCE = 1e-4, 1e-6  # parts of the largest speed and acceleration
 WORK = 1e-8  # part of the work of friction
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
-SEEDS = [seed if seed < 1 else pytest.param(seed, marks=pytest.mark.stress) for seed in range(300)]
+# The slip of seed 109 turns so fast before it ends that no step reaches rest.
+BY_DEFAULT = (0, 109)
+SEEDS = [seed if seed in BY_DEFAULT else pytest.param(seed, marks=pytest.mark.stress) for seed in range(300)]
 ANCHORED = pytest.mark.parametrize(
     "anchored", [pytest.param(False, id="joint", marks=pytest.mark.slow), pytest.param(True, id="anchor")]
 )
