@@ -22,8 +22,7 @@ std::vector<MeanVelocity::FreeFlyer> MeanVelocity::flyers(const Program& p) {
 }
 
 MeanVelocity::MeanVelocity(const Program& p)
-    : flyers_(flyers(p)), unit_(p.mechanism.unit), turning_(VecX::Zero(p.mechanism.nv)),
-      tolerance_(p.gaps.empty() ? parameters.configuration_tolerance : parameters.contact_tolerance) {}
+    : flyers_(flyers(p)), unit_(p.mechanism.unit), turning_(VecX::Zero(p.mechanism.nv)) {}
 
 void MeanVelocity::begin(double h, const VecX& v0, const VelocityRates& last) {
     h_ = h;
@@ -73,9 +72,10 @@ void MeanVelocity::end(const VecX& a, VecX& v1) {
     for (const FreeFlyer& flyer : flyers_) flyer.turn_axes(v1, 0.5 * h_ * end_.segment<3>(flyer.dof + 3));
 }
 
-bool MeanVelocity::move() {
+bool MeanVelocity::move(bool touches) {
     next_ = 0.5 * (start_ + end_);
-    const double allowed = moves_ == 0 && !is_predicted_ ? parameters.configuration_rounding : tolerance_;
+    const double tolerance = touches ? parameters.contact_tolerance : parameters.configuration_tolerance;
+    const double allowed = moves_ == 0 && !is_predicted_ ? parameters.configuration_rounding : tolerance;
     if (moves_ == parameters.max_sweeps || h_ * size(next_ - value_) <= allowed) return false;
     value_ = next_;
     ++moves_;

@@ -51,7 +51,8 @@ public:
     // Compute the velocity at the step's end for the acceleration a.
     void end(const VecX& a, VecX& v1);
     // Move the mean to that of the step's start and end for another sweep. Return false if no further sweep is needed.
-    bool move();
+    // `touches`: contacts take part.
+    bool move(bool touches);
 
     bool is_first() const { return moves_ == 0; }  // no sweep has ended
     bool is_predicted() const { return is_predicted_; }  // the first sweep is at another velocity than the start
@@ -82,7 +83,6 @@ private:
     VecX value_, first_, start_, end_, next_;
     VecX turning_;  // rates of the linear velocities by turning axes
     VecX start_difference_;     // velocity of the start minus mean, plus h/2 of these rates
-    double tolerance_;
     int moves_ = 0;  // sweeps after the first one
     bool is_predicted_ = false;
 };

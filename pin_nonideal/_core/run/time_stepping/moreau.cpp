@@ -54,7 +54,7 @@ void Moreau::step(double t, double h, VecX& y, double& numerical_energy) {
     system_.read_law_states(y);
     JointDrives::Step drives(drives_, p, w, t, h, system_.q, v0_);
     sweep(middle, drives, true);
-    while (mean_.move()) sweep(middle, drives, p.has_user_rows);
+    while (mean_.move(false)) sweep(middle, drives, p.has_user_rows);
     mean_.keep_rate(w.state.last_rates);
     flight_.move(p, w, h, y.data(), v0_, mean_.value(), v1_);
     if (system_.energy) {
@@ -104,9 +104,10 @@ void Moreau::respond() {
 void Moreau::find_dependent() {
     are_dependent_ = false;
     if (!p.needs_reactions || w.now.rows.blocks.empty()) return;
-    unit_ = problem_.W.diagonal().cwiseSqrt().cwiseInverse();
+    const auto responses = problem_.W.diagonal().array();
+    unit_ = (responses > 0.0).select(responses.sqrt().inverse(), 0.0);
     Cholesky factor;
-    const bool is_definite = unit_.allFinite() && factor.compute(unit_.asDiagonal() * problem_.W * unit_.asDiagonal());
+    const bool is_definite = unit_.all() && factor.compute(unit_.asDiagonal() * problem_.W * unit_.asDiagonal());
     const double root = is_definite ? factor.factor().diagonal().minCoeff() : 0.0;
     are_dependent_ = root * root < parameters.dependent_pivot;
 }
@@ -122,6 +123,18 @@ void Moreau::pose_problem() {
             problem_.alpha0[at++] += w.scratch.r[block.row + k] / h_ + 0.5 * w.now.values[friction.block].bias[k];
     }
     unload_held();
+    if (are_dependent_ && !p.moves_in_time) drop_prevented_slip();
+}
+
+// Remove the slip that constraints at rest prevent. It is left of the rows at the step's middle, at which the velocity of
+// the start does not satisfy the constraints, and no force can change it.
+void Moreau::drop_prevented_slip() {
+    const Spectrum spectrum = symmetric_spectrum(unit_.asDiagonal() * problem_.W * unit_.asDiagonal());
+    const double smallest = parameters.dependent_pivot * spectrum.values[problem_.rows - 1];
+    const Eigen::Index rank = (spectrum.values.array() > smallest).count();
+    const auto range = spectrum.vectors.rightCols(rank);
+    const VecX slip = range * (range.transpose() * unit_.cwiseProduct(problem_.alpha0));
+    problem_.alpha0 = (unit_.array() > 0.0).select(slip.array() / unit_.array(), problem_.alpha0.array());
 }
 
 // Leave the loads of elements that constraints alone hold to the constraints. The rounding of their slip has no sign.

@@ -50,6 +50,7 @@ private:
     void respond();
     void pose_problem();
     void unload_held();
+    void drop_prevented_slip();
     void solve_friction(double t);
     void find_rest();
     bool give_way();

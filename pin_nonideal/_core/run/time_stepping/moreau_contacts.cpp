@@ -96,7 +96,7 @@ void MoreauContacts::step(double t, double h, VecX& y, double& numerical_energy,
     system_.read_law_states(y);
     JointDrives::Step drives(drives_, p, w, t, h, system_.q, v0_);
     begin_sweeps(middle, drives);
-    while (mean_.move() && correct(middle, drives)) {}
+    while (mean_.move(!touching_.empty()) && correct(middle, drives)) {}
     mean_.keep_rate(w.state.last_rates);
     flight_.begin();
     for (const StepRow& row : elements_.rows) flight_.touch(p.blocks[row.block]);

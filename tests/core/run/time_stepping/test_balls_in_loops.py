@@ -13,8 +13,7 @@ from ....support import loops
 DURATION = 1.5
 # Steps of 1 ms through a slip and a stick. The stick ends up to a step later.
 ERROR = 0.1
-# The ball may stick or slip under the loads of either mode, and no limit is found.
-UNSOLVED = (38, 46)
+JAMS = 46  # the loads of adaptive steps jam the ball at its first stick, and those of least norm do not
 PARADOX = 5  # the adaptive steps end in a FrictionParadoxError
 
 
@@ -28,18 +27,15 @@ def check(seed: int) -> None:
 @pytest.mark.parametrize(
     "many",
     [
-        pytest.param((0, 2, 3, 13, 19), id="5"),
+        pytest.param((0, 2, 3, 13, 19, 38), id="6"),
         pytest.param(range(100), id="100", marks=pytest.mark.slow),
     ],
 )
 def test_a_ball_sticks_in_a_loop(many: range) -> None:
     for seed in many:
-        if seed not in (*UNSOLVED, PARADOX):
+        if seed not in (JAMS, PARADOX):
             check(seed)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", UNSOLVED)
-@pytest.mark.xfail(strict=True, raises=pn.FrictionConvergenceError)
-def test_a_ball_whose_limit_is_not_found(seed: int) -> None:
-    check(seed)
+def test_a_ball_that_may_jam_slips_on() -> None:
+    pn.simulate(loops.ball_loop(JAMS), DURATION, method="moreau", dt=1e-3)

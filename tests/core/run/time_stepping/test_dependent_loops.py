@@ -10,6 +10,7 @@ import pytest
 
 import pin_nonideal as pn
 
+from ....scene.test_symmetries import check
 from ....support import loops
 from ....support.cases import case_of
 from ....support.seeds import ranges
@@ -37,3 +38,18 @@ def test_a_shaft_with_light_and_heavy_parts_turns_on(many: range, far_contact: b
         dt = min(0.1 * DURATION, ANGLE / float(np.abs(exact.v).max()))
         once, halved = (error(case.scene, exact, step) for step in (dt, 0.5 * dt))
         assert halved < max(once / LEAST_RATIO, FLOOR), seed
+
+
+@pytest.mark.parametrize(
+    ("scene", "transformation", "method"),
+    [
+        ("side rods 24", "rows by hand, times 1e-4", "moreau"),
+        ("Bennett 31", "a far contact", "semi_implicit_euler"),
+        ("free Cardan 8", "a far contact", "moreau"),
+        ("places 1", "turned mount", "moreau"),
+    ],
+)
+def test_fixed_steps_of_loops_do_not_depend_on_how_a_scene_is_written(
+    scene: str, transformation: str, method: str
+) -> None:
+    check(scene, transformation, [f"simulate {method}"])
