@@ -103,7 +103,7 @@ void Moreau::respond() {
 // Check if some forces of the elements do not move the bodies. Loads, and the limits by them, are then not unique.
 void Moreau::find_dependent() {
     are_dependent_ = false;
-    if (!p.needs_reactions || w.now.rows.blocks.empty()) return;
+    if (problem_.rows == 0 || !p.needs_reactions || w.now.rows.blocks.empty()) return;
     const auto responses = problem_.W.diagonal().array();
     unit_ = (responses > 0.0).select(responses.sqrt().inverse(), 0.0);
     Cholesky factor;

@@ -47,6 +47,7 @@ def test_a_shaft_with_light_and_heavy_parts_turns_on(many: range, far_contact: b
         ("Bennett 31", "a far contact", "semi_implicit_euler"),
         ("free Cardan 8", "a far contact", "moreau"),
         ("places 1", "turned mount", "moreau"),
+        ("law UserLaw", "accelerated", "moreau"),
     ],
 )
 def test_fixed_steps_of_loops_do_not_depend_on_how_a_scene_is_written(
