@@ -1,5 +1,6 @@
 #include "complementarity/least_norm_friction.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "math/decompositions.hpp"
@@ -7,6 +8,7 @@
 namespace pn {
 
 bool LeastNormFriction::solve(const MatX& W, const std::vector<int>& dims, const FrictionLimits& limits, VecX& force) {
+    if (force.size() == 0) return true;
     read(W, dims, limits, force);
     value_ = evaluate();
     for (int iteration = 0; !is_done(); ++iteration) {
@@ -54,9 +56,10 @@ double LeastNormFriction::evaluate() {
 
 // Check if all forces are within their limits, and at their limits where a multiplier is positive.
 bool LeastNormFriction::is_done() const {
+    const double rounding = parameters.force_rounding * g_.cwiseAbs().maxCoeff();
     for (const Element& e : elements_) {
         const double error = e.nu > 0.0 ? std::abs(e.excess()) : e.excess();
-        if (error > parameters.limit_tolerance * e.limit) return false;
+        if (error > parameters.limit_tolerance * e.limit + rounding) return false;
     }
     return true;
 }

@@ -100,7 +100,17 @@ VecX Program::user_multipliers(const VecX& lam) const {
     return all;
 }
 
-// Find the dofs that constraints and contacts tie to a constraint that depends on time. Rows that can never act tie none.
+// Return the dofs along which rows of a block may act: those between its bodies, or its coordinates.
+static std::vector<int> acting_dofs(const Program& p, const Block& block) {
+    if (block.kept.empty()) return {};
+    if (!frames(block.kind).first) return dofs(block.kind, p.mechanism);
+    std::vector<int> acting;
+    for (const Block::Entry& entry : block.entries) acting.push_back(entry.dof);
+    return acting;
+}
+
+// Find the dofs that constraints tie to a constraint that depends on time, and the friction elements along such dofs. Rows
+// that can never act tie none.
 static void find_tied_to_drives(Program& p) {
     std::vector<int> parent(p.mechanism.nv);
     std::iota(parent.begin(), parent.end(), 0);
@@ -108,15 +118,22 @@ static void find_tied_to_drives(Program& p) {
         while (parent[dof] != dof) dof = parent[dof] = parent[parent[dof]];
         return dof;
     };
-    const auto acts = [&](int i) { return !p.blocks[i].kept.empty() && !p.blocks[i].support.empty(); };
-    for (int i = 0; i < p.constraints; ++i)
-        if (acts(i))
-            for (int dof : p.blocks[i].support) parent[root(dof)] = root(p.blocks[i].support[0]);
+    std::vector<int> timed;  // a dof of each constraint that depends on time
+    for (int i = 0; i < p.constraints; ++i) {
+        const std::vector<int> acting = acting_dofs(p, p.blocks[i]);
+        for (int dof : acting) parent[root(dof)] = root(acting[0]);
+        if (!acting.empty() && pn::moves_in_time(p.blocks[i].kind)) timed.push_back(acting[0]);
+    }
     std::vector<char> drives(p.mechanism.nv, 0);
-    for (int i = 0; i < p.constraints; ++i)
-        if (acts(i) && pn::moves_in_time(p.blocks[i].kind)) drives[root(p.blocks[i].support[0])] = 1;
+    for (int dof : timed) drives[root(dof)] = 1;
     p.tied_to_drives.clear();
     for (int dof = 0; dof < p.mechanism.nv; ++dof) p.tied_to_drives.push_back(drives[root(dof)]);
+    p.elements_of_drives.clear();
+    for (const Friction& friction : p.frictions) {
+        const std::vector<int> acting = acting_dofs(p, p.blocks[friction.block]);
+        p.elements_of_drives.push_back(
+            std::any_of(acting.begin(), acting.end(), [&](int dof) { return p.tied_to_drives[dof]; }));
+    }
 }
 
 void Program::finish() {

@@ -78,11 +78,9 @@ struct Program {
     bool moves_in_time = false;    // some constraint depends on time
     // By dof: constraints tie it to a constraint that depends on time, which may carry loads of friction on this dof.
     std::vector<char> tied_to_drives;
+    std::vector<char> elements_of_drives;  // by friction element: its slip is along such a dof
     // Check if a drive may decide the slip of an element.
-    bool follows_drives(int element) const {
-        const std::vector<int>& support = blocks[frictions[element].block].support;
-        return std::any_of(support.begin(), support.end(), [&](int dof) { return tied_to_drives[dof]; });
-    }
+    bool follows_drives(int element) const { return elements_of_drives[element]; }
     bool driven_exactly = false;   // some constraint does, and all rates are exact derivatives, not differences
     std::vector<double> breaks;    // known break times of the functions of time, ascending
     bool searches_breaks = false;  // some user function of time does not declare its breaks

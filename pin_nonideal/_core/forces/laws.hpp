@@ -90,6 +90,10 @@ struct LuGre {  // F = sigma0 z + sigma1 dz + sigma2 v, dz = v - sigma0 |v| z / 
         const double moved = x < 1e-5 ? 0.5 - x / 6.0 : (1.0 - kept) / x;
         return kept * z0 + moved * h * speed;
     }
+    // Deflection after the time h at constant speed.
+    double deflection_after(double speed, double z0, double h) const {
+        return z0 + h * rate(speed, mean_deflection(speed, z0, h));
+    }
     // Force that opposes the speed.
     double resistance(double speed, double z) const { return sigma0 * z + sigma1 * rate(speed, z) + sigma2 * speed; }
     template <class Sink>

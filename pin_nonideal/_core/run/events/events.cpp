@@ -7,6 +7,7 @@
 #include "contact/queries.hpp"
 #include "dynamics/evaluation.hpp"
 #include "dynamics/law_residuals.hpp"
+#include "dynamics/projection.hpp"
 #include "dynamics/state_projection.hpp"
 #include "dynamics/friction_limit.hpp"
 #include "dynamics/step_start.hpp"
@@ -68,6 +69,7 @@ bool stick_if_held(System& system, double t, const std::vector<int>& resting) {
     if (!changes) return false;
     set_modes(p, w, modes);
     begin_step(p, w, t, system.q, system.v);
+    if (project_velocity(p, w, t, system.v)) begin_step(p, w, t, system.q, system.v);
     return true;
 }
 
@@ -231,9 +233,9 @@ static std::vector<Event> select_modes(System& system, double t, VecX& y, VecX& 
         *released = open_unloaded_contacts(system, t);
     if (!p.frictions.empty() || !p.gaps.empty()) {
         set_direction_search(system, friction.mode_query.at_rest, event.has_value());
-        system.write(y);
         const std::vector<int>& resting = friction.mode_query.at_rest;
         const bool are_held = stick_if_held(system, t, resting);
+        system.write(y);
         w.state.is_hyperstatic = are_held || shares_load(system, t, resting, friction.held);
     }
     MotionState state;

@@ -179,7 +179,8 @@ bool ModeChanges::bridge_with_time_stepping(const Failure& failure, bool of_hand
                              !failure.elements.empty();
     const int element = of_elements ? failure.elements.front() : 0;
     const bool creeps = is_creeping();
-    if (creeps && p.gaps.empty() && come_to_rest()) return true;
+    const double spacing = mode_switch_parameters.forced_switch_spacing * tiny_step_at(progress_.t);
+    if (creeps && p.gaps.empty() && progress_.t > rest_time_ + spacing && come_to_rest()) return true;
     if (!(of_hand_over || is_undecided(failure) || chatter_.is_zeno() || creeps)) return false;
     bridge(element);
     return true;
@@ -231,10 +232,14 @@ bool ModeChanges::come_to_rest() {
         progress_.y = y;
         progress_.rate = rate;
         restore_modes(before);
+        attempt([&] { evaluate_again(); });
         return false;
     }
-    for (const Event& change : changes_since(system_, progress_.t, before.closed, before.mode))
+    rest_time_ = progress_.t;
+    for (const Event& change : changes_since(system_, progress_.t, before.closed, before.mode)) {
         out_.events.push_back(change);
+        chatter_.count();
+    }
     output_.configured_now();
     output_.now();
     return true;
@@ -250,12 +255,16 @@ void ModeChanges::select_new_modes() {
 void ModeChanges::restore_last(const RunState& before, bool has_impact) {
     restore_modes(before);
     if (has_impact) return;
-    system_.read(progress_.y);
     attempt([&] {  // if this fails too, the previous sample is the last, and the first failure is reported
-        begin_step(p, w, progress_.t, system_.q, system_.v);
-        evaluate(p, w, progress_.t, system_.q, system_.v);
+        evaluate_again();
         output_.now();
     });
+}
+
+void ModeChanges::evaluate_again() {
+    system_.read(progress_.y);
+    begin_step(p, w, progress_.t, system_.q, system_.v);
+    evaluate(p, w, progress_.t, system_.q, system_.v);
 }
 
 }  // namespace pn

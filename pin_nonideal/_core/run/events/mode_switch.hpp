@@ -31,7 +31,7 @@ public:
                 ImpactHandler& impacts, TimeStepping& time_stepping, ChatterDetector& chatter, Recording& out);
 
     // Forget the mode switches of an earlier run.
-    void start() { drive_end_ = -HUGE_VAL; }
+    void start() { drive_end_ = rest_time_ = -HUGE_VAL; }
     // Switch modes and state at an event that has been reached.
     void change(FoundEvent event);
     // Forced switch: if no step is short enough, the motion of the current modes may have ended. `can_switch_modes`
@@ -65,6 +65,7 @@ private:
     static bool is_undecided(const Failure& failure);
     bool is_creeping() const;
     bool come_to_rest();
+    void evaluate_again();
     void select_new_modes();
     bool step_with_drive(RunState& before);
     void restore_modes(const RunState& before);
@@ -81,6 +82,7 @@ private:
     ChatterDetector& chatter_;
     Recording& out_;
     double drive_end_ = -HUGE_VAL, drive_length_ = 0.0;  // end and length [s] of the last time step with a drive
+    double rest_time_ = -HUGE_VAL;  // last time at which creeping slip came to rest
 };
 
 }  // namespace pn

@@ -31,16 +31,20 @@ JointDrives::JointDrives(const Program& p) {
     }
     stiffness_ += kp_;
     damping_ += kd_;
-    each_law<LuGre>(p.laws, [&](const LuGre& law) { bristles_.push_back(law); });
-    each_law<Sigmoid>(p.laws, [&](const Sigmoid& law) { sigmoids_.push_back(law); });
+    each_law<LuGre>(p.laws, [&](const LuGre& law) {
+        if (!m.is_deep[law.dof]) bristles_.push_back(law);
+    });
+    each_law<Sigmoid>(p.laws, [&](const Sigmoid& law) {
+        if (!m.is_deep[law.dof]) sigmoids_.push_back(law);
+    });
     any_ = (stiffness_.array() != 0.0).any() || (damping_.array() != 0.0).any() || !bristles_.empty() || !sigmoids_.empty();
 }
 
 JointDrives::Step::Step(const JointDrives& drives, const Program& p, Workspace& w, double t, double h, const VecX& q0,
-                        const VecX& v0)
-    : all_(drives), w_(w), h_(h) {
+                        const VecX& v0, Deflection deflection)
+    : all_(drives), w_(w), h_(h), deflection_(deflection) {
     ImplicitDrives& step = w.now.drives;
-    step.active = drives.any_;
+    step.active = false;
     if (!drives.any_) return;
     step.h = h;
     step.stiffness = drives.stiffness_;
@@ -50,21 +54,27 @@ JointDrives::Step::Step(const JointDrives& drives, const Program& p, Workspace& 
     step.force.setZero(v0.size());
     z0_ = w.state.z;
     for (const LuGre& law : drives.bristles_)
-        if (!p.mechanism.is_deep[law.dof]) step.damping[law.dof] += std::max(0.0, slope(law, v0[law.dof]));
+        step.damping[law.dof] += std::max(0.0, slope(law, v0[law.dof]));
     for (const Sigmoid& law : drives.sigmoids_)
-        if (!p.mechanism.is_deep[law.dof]) step.damping[law.dof] += std::max(0.0, law.slope(v0[law.dof]));
-    if (!w.now.has_override && !p.limits_effort()) return;
-    if (!w.now.has_override) demanded_torque(p, w, t, q0, v0, w.now.tau);
-    for (int dof = 0; dof < v0.size(); ++dof) {
+        step.damping[law.dof] += std::max(0.0, law.slope(v0[law.dof]));
+    const bool is_limited = w.now.has_override || p.limits_effort();
+    if (is_limited && !w.now.has_override) demanded_torque(p, w, t, q0, v0, w.now.tau);
+    for (int dof = 0; is_limited && dof < v0.size(); ++dof) {
         if (!w.now.has_override && w.now.tau[dof] > p.min_effort[dof] && w.now.tau[dof] < p.max_effort[dof]) continue;
         step.stiffness[dof] -= drives.kp_[dof];
         step.damping[dof] -= drives.kd_[dof];
     }
+    step.active = true;
 }
 
-// Change of the mean force of bristles with the mean speed of the step.
+double JointDrives::Step::deflection(const LuGre& law, double speed) const {
+    const double z0 = z0_[law.state];
+    return deflection_ == Deflection::mean ? law.mean_deflection(speed, z0, h_) : law.deflection_after(speed, z0, h_);
+}
+
+// Change of the force of bristles with the speed.
 double JointDrives::Step::slope(const LuGre& law, double speed) const {
-    const auto force = [&](double u) { return law.resistance(u, law.mean_deflection(u, z0_[law.state], h_)); };
+    const auto force = [&](double u) { return law.resistance(u, deflection(law, u)); };
     const double difference = parameters.slope_difference * law.stribeck_velocity;
     return (force(speed + difference) - force(speed - difference)) / (2.0 * difference);
 }
@@ -72,8 +82,11 @@ double JointDrives::Step::slope(const LuGre& law, double speed) const {
 void JointDrives::Step::move(const VecX& v0, const VecX& v) {
     if (!w_.now.drives.active) return;
     w_.now.drives.set_velocity(v0, v);
-    for (const LuGre& law : all_.bristles_)
-        w_.state.z[law.state] = law.mean_deflection(v[law.dof], z0_[law.state], h_);
+    for (const LuGre& law : all_.bristles_) w_.state.z[law.state] = deflection(law, v[law.dof]);
+}
+
+void JointDrives::Step::end_deflections(const VecX& v, Eigen::Ref<VecX> z) const {
+    for (const LuGre& law : all_.bristles_) z[law.state] = law.deflection_after(v[law.dof], z0_[law.state], h_);
 }
 
 double JointDrives::Step::energy(const VecX& v0, const VecX& v1) const {

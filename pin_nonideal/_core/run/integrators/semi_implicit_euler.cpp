@@ -19,7 +19,8 @@ void SemiImplicitEuler::take_drives_implicitly(System& system) {
     Workspace& w = system.w;
     system.read(step_.y0);
     system.read_law_states(step_.y0);
-    JointDrives::Step drives(drives_, system.p, w, step_.t0, step_.h, system.q, system.v);
+    JointDrives::Step drives(drives_, system.p, w, step_.t0, step_.h, system.q, system.v,
+                             JointDrives::Deflection::end);
     configure(system.p, w, step_.t0, system.q, system.v);
     drives.move(system.v, system.v);
     assemble_forces(system.p, w, step_.t0, system.v);
@@ -27,6 +28,7 @@ void SemiImplicitEuler::take_drives_implicitly(System& system) {
     step_.y1.segment(system.nq, system.nv) = system.v + step_.h * w.now.a;
     const auto of_laws = Eigen::seqN(system.nq + system.nv, system.nz);
     step_.y1(of_laws) = step_.y0(of_laws) + step_.h * w.now.dz;
+    drives.end_deflections(system.velocity(step_.y1), step_.y1.segment(system.nq + system.nv, system.nz));
 }
 
 void SemiImplicitEuler::learn(System& system) const { learn_third_order(system.p, system.w, step_.h); }

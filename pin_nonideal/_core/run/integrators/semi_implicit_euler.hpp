@@ -1,6 +1,6 @@
 // Semi-implicit Euler of order 1: v1 = v0 + h a(q0, v0). q1 is q0 moved by h v1, with a correction toward the
-// constraints. Law states and work follow Euler's rule. Springs, dampers and position control of single dofs act
-// implicitly.
+// constraints. Law states and work follow Euler's rule. Springs, dampers, smooth friction and position control of single
+// dofs act implicitly, and the deflections of bristles follow v1.
 #pragma once
 
 #include <utility>

@@ -123,18 +123,22 @@ void Moreau::pose_problem() {
             problem_.alpha0[at++] += w.scratch.r[block.row + k] / h_ + 0.5 * w.now.values[friction.block].bias[k];
     }
     unload_held();
-    if (are_dependent_ && !p.moves_in_time) drop_prevented_slip();
 }
 
-// Remove the slip that constraints at rest prevent. It is left of the rows at the step's middle, at which the velocity of
-// the start does not satisfy the constraints, and no force can change it.
+// Remove the slip that constraints prevent, of elements that no prescribed motion moves. It is left of the rows at the
+// step's middle, at which the velocity of the start does not satisfy the constraints, and no force can change it.
 void Moreau::drop_prevented_slip() {
-    const Spectrum spectrum = symmetric_spectrum(unit_.asDiagonal() * problem_.W * unit_.asDiagonal());
-    const double smallest = parameters.dependent_pivot * spectrum.values[problem_.rows - 1];
-    const Eigen::Index rank = (spectrum.values.array() > smallest).count();
-    const auto range = spectrum.vectors.rightCols(rank);
-    const VecX slip = range * (range.transpose() * unit_.cwiseProduct(problem_.alpha0));
-    problem_.alpha0 = (unit_.array() > 0.0).select(slip.array() / unit_.array(), problem_.alpha0.array());
+    std::vector<int> rows;
+    for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e)
+        for (int k = 0; k < problem_.dims[e]; ++k)
+            if (!p.follows_drives(e) && unit_[at + k] > 0.0) rows.push_back(at + k);
+    if (rows.empty()) return;
+    const VecX unit = unit_(rows);
+    const Spectrum spectrum = symmetric_spectrum(unit.asDiagonal() * problem_.W(rows, rows) * unit.asDiagonal());
+    const double smallest = parameters.dependent_pivot * spectrum.values.maxCoeff();
+    const MatX range = spectrum.vectors.rightCols((spectrum.values.array() > smallest).count());
+    const VecX slip = unit.cwiseProduct(problem_.alpha0(rows));
+    problem_.alpha0(rows) = (range * (range.transpose() * slip)).cwiseQuotient(unit);
 }
 
 // Leave the loads of elements that constraints alone hold to the constraints. The rounding of their slip has no sign.
@@ -229,6 +233,14 @@ void Moreau::solve_friction(double t) {
     for (const Friction& friction : p.frictions)
         for (int k = 0; k < friction.dim; ++k)
             initial_force_[at++] = w.state.percussion[p.blocks[friction.block].row + k];
+    if (find_forces(t)) return;
+    if (!are_dependent_) throw Failure(Failure::Kind::not_converged, t, problem_.elements);
+    drop_prevented_slip();  // friction may grow against it without end
+    if (!find_forces(t)) throw Failure(Failure::Kind::not_converged, t, problem_.elements);
+}
+
+// Alternate between the forces and the limits by their loads. Return false if this does not converge.
+bool Moreau::find_forces(double t) {
     force_.setZero(problem_.rows);
     double last_change = HUGE_VAL;
     loads_.restart();
@@ -240,7 +252,7 @@ void Moreau::solve_friction(double t) {
         const bool stalls = change > parameters.min_load_decrease * last_change &&
                             change <= parameters.stall_load_tolerance * largest;
         last_change = change;
-        if (pass > 0 && (change <= parameters.load_tolerance * largest || stalls || !p.needs_reactions)) return;
+        if (pass > 0 && (change <= parameters.load_tolerance * largest || stalls || !p.needs_reactions)) return true;
         if (pass > 0) accelerate_limits();
         if (!symmetric_limits_) force_ = friction_program(problem_.W, problem_.alpha0, problem_.dims, limit_);
         else if (problem_.rows > 0 && boxes_)
@@ -249,8 +261,8 @@ void Moreau::solve_friction(double t) {
         force_limit_ = limit_;
         if (are_dependent_) share_loads();
         initial_force_ = force_;
-        if (pass + 1 == parameters.max_load_passes) throw Failure(Failure::Kind::not_converged, t, problem_.elements);
     }
+    return false;
 }
 
 // Replace the forces of elements that stick by the forces of least norm with the same motion.

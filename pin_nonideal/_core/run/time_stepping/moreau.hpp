@@ -52,6 +52,7 @@ private:
     void unload_held();
     void drop_prevented_slip();
     void solve_friction(double t);
+    bool find_forces(double t);
     void find_rest();
     bool give_way();
     bool is_within_limit(int e, int at);

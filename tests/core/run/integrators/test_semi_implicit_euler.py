@@ -62,3 +62,13 @@ def test_stiff_bristles_take_steps_of_a_millisecond() -> None:
     exact = pn.simulate(scene, 1.0, method="Radau", rtol=1e-8)
     run = pn.simulate(scene, 1.0, method="semi_implicit_euler", dt=DT)
     assert run.q[-1] == pytest.approx(exact.q[-1], abs=2e-2)
+
+
+@pytest.mark.parametrize("method", ["semi_implicit_euler", "moreau"])
+@pytest.mark.parametrize(("stiffness", "damping"), [(1e5, 10.0), (1e6, 10.0), (1e8, 1e4)])
+def test_stiff_bristles_hold_a_load_at_rest(stiffness: float, damping: float, method: str) -> None:
+    law = pn.LuGre("upper", stiffness=stiffness, damping=damping, coulomb=0.9)
+    scene = pn.Scene(double_pendulum(), laws=[law, pn.JointFriction("lower", viscous=1.0)], q0=[0.02, -0.02])
+    run = pn.simulate(scene, 2.0, method=method, dt=DT)
+    assert abs(run.v[-1, 0]) < 1e-6
+    assert run.q[-1, 0] == pytest.approx(0.02, abs=1e-4)
