@@ -39,7 +39,7 @@ KNOWN: list[Known] = [
     Known(
         "reactions that elements at rest share are of least norm over forces and torques, see `rest`",
         ("places 2", "an idle row", "rest"),
-        scenes="(places|mechanism|ball loop) .*",
+        scenes="(places|mechanism|ball loop) .*|robot .*four_bar",
         functions="rest",
     ),
     Known(
@@ -131,7 +131,7 @@ KNOWN: list[Known] = [
     Known(
         "fixed steps pass the breaks of a user's rows, which nothing states",
         ("cart 17", "rows by hand, times 1e4", "simulate rk4"),
-        scenes="cart .*",
+        scenes="(cart|motion) .*",
         transformations="rows by hand.*",
         functions="simulate (rk4|semi_implicit_euler|moreau)|stepper",
     ),
