@@ -135,7 +135,7 @@ struct Evaluation {
     std::vector<Force> body_force;    // given forces on bodies
     VecX override_torque;
     bool has_override = false;
-    ImplicitDrives drives;            // springs and dampers that a time step takes implicitly
+    ImplicitDrives drives;            // springs, dampers and smooth friction that a fixed step takes implicitly
 
     // Invalidate the values derived from a motion.
     void renew() { reactions.current = has_holding = false; }

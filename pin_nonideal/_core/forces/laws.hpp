@@ -85,9 +85,10 @@ struct LuGre {  // F = sigma0 z + sigma1 dz + sigma2 v, dz = v - sigma0 |v| z / 
     }
     // Mean of the deflection over the time h after z0 at constant speed. Its rate is the mean rate.
     double mean_deflection(double speed, double z0, double h) const {
-        const double x = h * decay(speed);
-        const double kept = x < 1e-5 ? 1.0 - x / 2.0 : -std::expm1(-x) / x;
-        const double moved = x < 1e-5 ? 0.5 - x / 6.0 : (1.0 - kept) / x;
+        constexpr double slow = 1e-3;  // decay below which the series is accurate to 1e-14
+        const double x = h * decay(speed), tail = x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0));
+        const double kept = x < slow ? 1.0 - 0.5 * x * (1.0 - tail) : -std::expm1(-x) / x;
+        const double moved = x < slow ? 0.5 * (1.0 - tail) : (1.0 - kept) / x;
         return kept * z0 + moved * h * speed;
     }
     // Deflection after the time h at constant speed.

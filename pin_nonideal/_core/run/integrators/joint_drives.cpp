@@ -31,6 +31,7 @@ JointDrives::JointDrives(const Program& p) {
     }
     stiffness_ += kp_;
     damping_ += kd_;
+    controls_position_ = (kp_.array() != 0.0).any() || (kd_.array() != 0.0).any();
     each_law<LuGre>(p.laws, [&](const LuGre& law) {
         if (!m.is_deep[law.dof]) bristles_.push_back(law);
     });
@@ -57,7 +58,7 @@ JointDrives::Step::Step(const JointDrives& drives, const Program& p, Workspace& 
         step.damping[law.dof] += std::max(0.0, slope(law, v0[law.dof]));
     for (const Sigmoid& law : drives.sigmoids_)
         step.damping[law.dof] += std::max(0.0, law.slope(v0[law.dof]));
-    const bool is_limited = w.now.has_override || p.limits_effort();
+    const bool is_limited = drives.controls_position_ && (w.now.has_override || p.limits_effort());
     if (is_limited && !w.now.has_override) demanded_torque(p, w, t, q0, v0, w.now.tau);
     for (int dof = 0; is_limited && dof < v0.size(); ++dof) {
         if (!w.now.has_override && w.now.tau[dof] > p.min_effort[dof] && w.now.tau[dof] < p.max_effort[dof]) continue;
