@@ -70,14 +70,6 @@ KNOWN: list[Known] = [
         marks=(pytest.mark.slow,),
     ),
     Known(
-        "time stepping with contacts finds no limits for a ball that jams",
-        ("ball loop 38", "a far contact", "simulate moreau"),
-        scenes="ball loop .*",
-        transformations="a far contact",
-        functions="simulate moreau",
-        marks=(pytest.mark.slow,),
-    ),
-    Known(
         "time stepping splits the load of four feet otherwise if rows act or friction holds a joint",
         ("robot solo12_dropped", "an idle row", "simulate moreau"),
         scenes="robot solo12_dropped",

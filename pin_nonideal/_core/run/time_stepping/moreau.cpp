@@ -35,6 +35,8 @@ Moreau::Moreau(System& system)
       force_limit_(limit_) {
     problem_.alpha0 = alpha_ = initial_force_ = VecX::Zero(problem_.rows);
     for (int dim : problem_.dims) boxes_ = boxes_ && dim == 1;
+    all_rows_.resize(problem_.rows);
+    std::iota(all_rows_.begin(), all_rows_.end(), 0);
 }
 
 void Moreau::step(double t, double h, VecX& y, double& numerical_energy) {
@@ -103,13 +105,8 @@ void Moreau::respond() {
 // Check if some forces of the elements do not move the bodies. Loads, and the limits by them, are then not unique.
 void Moreau::find_dependent() {
     are_dependent_ = false;
-    if (problem_.rows == 0 || !p.needs_reactions || w.now.rows.blocks.empty()) return;
-    const auto responses = problem_.W.diagonal().array();
-    unit_ = (responses > 0.0).select(responses.sqrt().inverse(), 0.0);
-    Cholesky factor;
-    const bool is_definite = unit_.all() && factor.compute(unit_.asDiagonal() * problem_.W * unit_.asDiagonal());
-    const double root = is_definite ? factor.factor().diagonal().minCoeff() : 0.0;
-    are_dependent_ = root * root < parameters.dependent_pivot;
+    if (!p.needs_reactions || w.now.rows.blocks.empty()) return;
+    are_dependent_ = SharedFriction::are_dependent(problem_.W, all_rows_);
 }
 
 // Set up the friction problem. Slip velocities at the step's end over h replace slip accelerations.
@@ -125,20 +122,13 @@ void Moreau::pose_problem() {
     unload_held();
 }
 
-// Remove the slip that constraints prevent, of elements that no prescribed motion moves. It is left of the rows at the
-// step's middle, at which the velocity of the start does not satisfy the constraints, and no force can change it.
+// Remove the slip that constraints prevent, of elements that no prescribed motion moves.
 void Moreau::drop_prevented_slip() {
     std::vector<int> rows;
     for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e)
         for (int k = 0; k < problem_.dims[e]; ++k)
-            if (!p.follows_drives(e) && unit_[at + k] > 0.0) rows.push_back(at + k);
-    if (rows.empty()) return;
-    const VecX unit = unit_(rows);
-    const Spectrum spectrum = symmetric_spectrum(unit.asDiagonal() * problem_.W(rows, rows) * unit.asDiagonal());
-    const double smallest = parameters.dependent_pivot * spectrum.values.maxCoeff();
-    const MatX range = spectrum.vectors.rightCols((spectrum.values.array() > smallest).count());
-    const VecX slip = unit.cwiseProduct(problem_.alpha0(rows));
-    problem_.alpha0(rows) = (range * (range.transpose() * slip)).cwiseQuotient(unit);
+            if (!p.follows_drives(e) && problem_.W(at + k, at + k) > 0.0) rows.push_back(at + k);
+    SharedFriction::drop_prevented_slip(problem_.W, rows, problem_.alpha0);
 }
 
 // Leave the loads of elements that constraints alone hold to the constraints. The rounding of their slip has no sign.
@@ -269,21 +259,13 @@ bool Moreau::find_forces(double t) {
 void Moreau::share_loads() {
     alpha_ = problem_.alpha0;
     alpha_.noalias() += problem_.W * force_;
-    std::vector<int> sticking, rows, dims;
+    std::vector<SharedFriction::Element> sticking;
     for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e) {
         const int dim = problem_.dims[e];
         const bool sticks = is_within_limit(e, at) || alpha_.segment(at, dim).norm() <= slip_rounding();
-        if (!sticks || !(force_limit_[e] > 0.0)) continue;
-        sticking.push_back(e);
-        dims.push_back(dim);
-        for (int k = 0; k < dim; ++k) rows.push_back(at + k);
+        if (sticks && force_limit_[e] > 0.0) sticking.push_back({at, dim, force_limit_[e], force_limit_.middle[at]});
     }
-    if (sticking.empty()) return;
-    sticking_limit_.size = force_limit_.size(sticking);
-    sticking_limit_.middle = force_limit_.middle(rows);
-    sticking_force_ = force_(rows);
-    least_norm_.solve(problem_.W(rows, rows), dims, sticking_limit_, sticking_force_);
-    force_(rows) = sticking_force_;
+    shared_.share(problem_.W, sticking, force_);
 }
 
 // Compute the velocity and the modes at the step's end. A force below its limit holds its element.

@@ -10,13 +10,13 @@
 
 #include "complementarity/box_lcp.hpp"
 #include "complementarity/friction_limits.hpp"
-#include "complementarity/least_norm_friction.hpp"
 #include "friction/problem.hpp"
 #include "math/anderson.hpp"
 #include "run/integrators/system.hpp"
 #include "run/time_stepping/free_flight.hpp"
 #include "run/integrators/joint_drives.hpp"
 #include "run/time_stepping/mean_velocity.hpp"
+#include "run/time_stepping/shared_friction.hpp"
 
 namespace pn {
 
@@ -27,8 +27,6 @@ struct MoreauParameters {
     double stall_load_tolerance = 1e-9, min_load_decrease = 0.5;
     double limit_rounding = 1e-12;     // distance of a force at its limit, relative to the limit
     double slip_rest_rounding = 1e-9;  // slip at the end that counts as none, relative to that without friction
-    // Pivot of the response of unit forces, relative to its diagonal, below which forces depend on each other.
-    double dependent_pivot = 1e-10;
     // Maximum number of passes for load-dependent limits.
     int max_load_passes = 60;
 };
@@ -82,13 +80,12 @@ private:
     bool boxes_ = true;  // every element has one direction
     VecX force_, power_;                  // forces and powers of the elements
     FrictionLimits limit_, force_limit_;  // current limits, and the limits for which the force was found
-    LeastNormFriction least_norm_;
-    FrictionLimits sticking_limit_;
-    VecX sticking_force_;
+    SharedFriction shared_;
+    std::vector<int> all_rows_;
     bool are_dependent_ = false;    // some forces do not move the bodies: elements that stick share loads
     bool symmetric_limits_ = true;  // all limits are equal forward and backward
     AndersonAcceleration loads_;
-    VecX shifted_, unit_;
+    VecX shifted_;
 };
 
 }  // namespace pn

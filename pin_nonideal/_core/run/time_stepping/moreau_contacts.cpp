@@ -214,9 +214,10 @@ void MoreauContacts::find_loaded() {
     std::sort(loaded_.begin(), loaded_.end());
 }
 
-// Skip edges and rims that meet those of the other shape from inside. Contacts of two convex shapes push apart in about
-// one direction, and an edge from inside would push the other way. A face is right, else an edge that was closed before,
-// else the one that approaches faster.
+// Skip contacts that would push the other way than another contact of the same pair. All contacts of two convex shapes push
+// apart in about one direction. An edge that meets the other shape from inside pushes the other way, and so does a corner
+// at the far side of a shape of equal width. A face is right, else a contact that was closed before, else the one that
+// approaches faster.
 void MoreauContacts::drop_opposed() {
     const auto normal = [&](int gap) {
         const Block& block = p.blocks[p.gaps[gap].block];
@@ -224,25 +225,32 @@ void MoreauContacts::drop_opposed() {
         return block.joint1 < block.joint2 ? n : -n;
     };
     const auto precedes = [&](int other, int gap) {
-        if (!between_lines_[other]) return true;
+        if (between_lines_[other] != between_lines_[gap]) return !between_lines_[other];
         if (was_closed_[other] != was_closed_[gap]) return was_closed_[other] != 0;
-        return gap_rate(p, w, other) < gap_rate(p, w, gap);
+        const double rate = gap_rate(p, w, gap), its = gap_rate(p, w, other);
+        return its < rate || (its == rate && other < gap);
     };
-    if (std::none_of(touching_.begin(), touching_.end(), [&](int gap) { return between_lines_[gap]; })) return;
     all_touching_ = touching_;
     touching_.clear();
     size_t begin = 0, end = 0;  // contacts of one pair, which follow each other
+    const auto differs = [&](int gap) {
+        const int first = all_touching_[begin];
+        return is_bare(p, first) || is_bare(p, gap) || normal(first).dot(normal(gap)) < parameters.alike;
+    };
+    bool opposite = false;
     for (int gap : all_touching_) {
         const int pair = p.gaps[gap].pair;
         if (end == 0 || p.gaps[all_touching_[begin]].pair != pair) {
             begin = end;
             while (end < all_touching_.size() && p.gaps[all_touching_[end]].pair == pair) ++end;
+            const auto last = all_touching_.begin() + end;
+            opposite = pair >= 0 && std::any_of(all_touching_.begin() + begin, last, differs);
         }
-        const bool may_be_inside = between_lines_[gap] && pair >= 0 && !is_bare(p, gap);
         const auto opposes = [&](int other) {
             return !is_bare(p, other) && normal(gap).dot(normal(other)) < parameters.opposed && precedes(other, gap);
         };
-        if (!may_be_inside || std::none_of(all_touching_.begin() + begin, all_touching_.begin() + end, opposes))
+        if (!opposite || is_bare(p, gap) ||
+            std::none_of(all_touching_.begin() + begin, all_touching_.begin() + end, opposes))
             touching_.push_back(gap);
     }
 }
@@ -315,8 +323,16 @@ bool MoreauContacts::rest_within_limits(double t) {
            elements_.limits_hold(p, w, t, mean_, forces_.f);
 }
 
-// Find the forces of the step under limits that follow the loads.
-void MoreauContacts::find_forces(double t) {
+// Find the forces of the step under limits that follow the loads. As Moreau::solve_friction.
+void MoreauContacts::solve_forces(double t) {
+    if (find_forces(t)) return;
+    if (!forces_.are_dependent()) throw Failure(Failure::Kind::not_converged, t);
+    forces_.drop_prevented_slip();
+    if (!find_forces(t)) throw Failure(Failure::Kind::not_converged, t);
+}
+
+// Alternate between the forces and the limits by their loads. Return false if this does not converge.
+bool MoreauContacts::find_forces(double t) {
     const int n = static_cast<int>(elements_.rows.size());
     const bool loads =
         n > 0 && elements_.cones.back().is(ConeElement::Kind::box);  // limits that may depend on the motion
@@ -325,24 +341,26 @@ void MoreauContacts::find_forces(double t) {
         if (loads || pass > 0) apply();
         const double allowed = StepForces::parameters.max_residual * forces_.f.head(n).cwiseAbs().maxCoeff();
         if (elements_.limits_settle(p, w, t, mean_, allowed) && pass > 0) break;
+        if (pass > 0 && forces_.are_dependent()) elements_.accelerate_limits();
         if (pass == Moreau::parameters.max_load_passes && rest_within_limits(t)) break;
-        if (pass == Moreau::parameters.max_load_passes || !forces_.solve(h_, q0_, v0_))
-            throw Failure(Failure::Kind::not_converged, t);
+        if (pass == Moreau::parameters.max_load_passes || !forces_.solve(h_, q0_, v0_)) return false;
+        if (forces_.are_dependent()) forces_.share_loads(h_, v0_);
         ++w.counters.iterations;
     }
     if (n == 0) apply();
+    return true;
 }
 
 void MoreauContacts::solve(double t) {
     const int n = static_cast<int>(elements_.rows.size());
-    find_forces(t);
+    solve_forces(t);
     while (elements_.may_give_way(p)) {
         forces_.measure_end();
         const double largest = forces_.f.head(n).cwiseAbs().maxCoeff();
         if (!elements_.give_way(p, w, forces_.f, forces_.end_rows, StepForces::parameters.limit_rounding * largest,
                                 rest_rate(v0_) / h_))
             break;
-        find_forces(t);
+        solve_forces(t);
     }
     keep_percussions();
     if (n == 0) return;

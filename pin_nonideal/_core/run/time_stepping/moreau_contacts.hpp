@@ -20,6 +20,7 @@ struct MoreauContactsParameters {
     // Maximum penetration of edges and rims with a defined normal, relative to their rounding.
     double nearly_all = 0.999;
     double opposed = -0.7;  // cosine below which the normals of two contacts of one pair are opposite
+    double alike = 0.4;     // cosine to one normal above which no two normals are opposite
 };
 
 class MoreauContacts {
@@ -70,7 +71,8 @@ private:
     void find_touching(double t);
     void move_touching(double t);
     bool rest_within_limits(double t);
-    void find_forces(double t);
+    bool find_forces(double t);
+    void solve_forces(double t);
     void solve(double t);
     void apply();
     void find_loaded();

@@ -120,12 +120,16 @@ double StepElements::limit_left(size_t e, int at, const VecX& f) const {
 
 bool StepElements::limits_settle(const Program& p, Workspace& w, double t, const MeanVelocity& mean, double allowed) {
     double change = 0.0, largest = 0.0;
+    from_.clear();
+    to_.clear();
     for (size_t e = 0; e < parts.size(); ++e) {
         if (!cones[e].is(ConeElement::Kind::box)) continue;
         const SlipLimits now = limits(p, w, t, mean, e);
         const double limit = now.reach();
         change = std::max({change, std::abs(limit - cones[e].bound), std::abs(now.middle() - parts[e].middle)});
         largest = std::max(largest, limit);
+        from_.insert(from_.end(), {cones[e].bound, parts[e].middle});
+        to_.insert(to_.end(), {limit, now.middle()});
         cones[e].bound = std::max(0.0, limit);
         parts[e].middle = now.middle();
     }
@@ -133,6 +137,16 @@ bool StepElements::limits_settle(const Program& p, Workspace& w, double t, const
                          (change > parameters.max_load_contraction * last_change_ && change <= allowed);
     last_change_ = change;
     return settles;
+}
+
+void StepElements::accelerate_limits() {
+    const auto size = static_cast<Eigen::Index>(from_.size());
+    const VecX next = loads_.next(VecX::Map(from_.data(), size), VecX::Map(to_.data(), size));
+    for (size_t e = 0, at = 0; e < parts.size(); ++e) {
+        if (!cones[e].is(ConeElement::Kind::box)) continue;
+        cones[e].bound = std::max(0.0, next[at++]);
+        parts[e].middle = next[at++];
+    }
 }
 
 void StepElements::reduce_limits() {

@@ -9,6 +9,7 @@
 
 #include "complementarity/cone/problem.hpp"
 #include "dynamics/tree_blocks.hpp"
+#include "math/anderson.hpp"
 #include "run/time_stepping/mean_velocity.hpp"
 
 namespace pn {
@@ -59,10 +60,15 @@ public:
     // loads may not converge.
     bool limits_follow_loads(const Program& p) const;
     // Begin passes of limits_settle.
-    void begin_passes() { last_change_ = HUGE_VAL; }
+    void begin_passes() {
+        last_change_ = HUGE_VAL;
+        loads_.restart();
+    }
     // Update the limits of dry friction to the loads of the current motion. Return true if they have converged, or if
     // they change by at most `allowed` and do not converge.
     bool limits_settle(const Program& p, Workspace& w, double t, const MeanVelocity& mean, double allowed);
+    // Replace the limits of dry friction by the next iterate after the limits before their update.
+    void accelerate_limits();
     // Check if static friction holds an element that kinetic friction may not hold.
     bool may_give_way(const Program& p) const;
     // Replace static by kinetic friction where the forces f are at their limit, up to `clear`, and the element slips
@@ -86,7 +92,9 @@ private:
 
     std::vector<int> outside_contacts_;
     std::vector<int> rubbing_;  // friction elements that take part, except the sliding of contacts
-    double last_change_ = 0.0;  // of the limits between two passes
+    double last_change_ = 0.0;       // of the limits between two passes
+    std::vector<double> from_, to_;  // sizes and middles of the limits before and after the update
+    AndersonAcceleration loads_;
 };
 
 }  // namespace pn

@@ -27,7 +27,43 @@ void StepForces::pose(const MeanVelocity& mean, double h, const VecX& a_free, bo
     }
     if (!separate_) responses_.find(p, w, elements_.rows);
     recall_forces();
-    if (!separate_) unload_held(mean, a_free);
+    if (separate_) return;
+    if (anew) find_dependent();
+    unload_held(mean, a_free);
+}
+
+void StepForces::find_dependent() {
+    dry_rows_.clear();
+    are_dependent_ = false;
+    if (!elements_.limits_follow_loads(p) || w.now.rows.blocks.empty()) return;
+    for (size_t e = 0, at = 0; e < elements_.parts.size(); at += elements_.cones[e].dim, ++e)
+        if (elements_.parts[e].gap < 0)
+            for (int k = 0; k < elements_.cones[e].dim; ++k) dry_rows_.push_back(static_cast<int>(at) + k);
+    are_dependent_ = SharedFriction::are_dependent(responses_.matrix(static_cast<int>(elements_.rows.size())), dry_rows_);
+}
+
+void StepForces::share_loads(double h, const VecX& v0) {
+    const int n = static_cast<int>(elements_.rows.size());
+    const double clear = parameters.limit_rounding * f.head(n).cwiseAbs().maxCoeff(), still = rest_rate(v0) / h;
+    measure_end();
+    sticking_.clear();
+    for (int e = 0, at = 0; e < static_cast<int>(elements_.parts.size()); at += elements_.cones[e].dim, ++e) {
+        const ConeElement& cone = elements_.cones[e];
+        if (elements_.parts[e].gap >= 0 || !(cone.bound > 0.0)) continue;
+        if (elements_.limit_left(e, at, f) <= clear && end_rows.segment(at, cone.dim).norm() > still) continue;
+        sticking_.push_back({at, cone.dim, cone.bound, elements_.parts[e].middle});
+    }
+    shared_.share(responses_.matrix(n), sticking_, f);
+}
+
+void StepForces::drop_prevented_slip() {
+    const auto W = responses_.matrix(static_cast<int>(elements_.rows.size()));
+    std::vector<int> rows;
+    for (size_t e = 0, at = 0; e < elements_.parts.size(); at += elements_.cones[e].dim, ++e)
+        for (int i = static_cast<int>(at); i < static_cast<int>(at) + elements_.cones[e].dim; ++i)
+            if (elements_.parts[e].gap < 0 && !p.follows_drives(elements_.parts[e].element) && W(i, i) > 0.0)
+                rows.push_back(i);
+    SharedFriction::drop_prevented_slip(W, rows, free_rows_);
 }
 
 // As Moreau::unload_held.

@@ -6,6 +6,7 @@
 
 #include "complementarity/cone/solver.hpp"
 #include "run/time_stepping/separate_trees.hpp"
+#include "run/time_stepping/shared_friction.hpp"
 #include "run/time_stepping/step_elements.hpp"
 #include "run/time_stepping/step_responses.hpp"
 
@@ -47,6 +48,12 @@ public:
     void pose(const MeanVelocity& mean, double h, const VecX& a_free, bool anew);
     // Solve the laws tree by tree if possible, else with the responses of all rows. The step starts at (q0, v0).
     bool solve(double h, const VecX& q0, const VecX& v0);
+    // Check if some forces of dry friction outside of cones do not move the bodies.
+    bool are_dependent() const { return are_dependent_; }
+    // Replace the forces of such friction that sticks by the forces of least norm with the same motion.
+    void share_loads(double h, const VecX& v0);
+    // Remove the slip of such friction that constraints prevent, of elements that no prescribed motion moves.
+    void drop_prevented_slip();
     // Compute the rows at the step's end under the forces.
     void measure_end();
     // Errors of the laws for the forces.
@@ -76,6 +83,7 @@ private:
     double turning_rate(const StepRow& row, double h) const;
     void recall_forces();
     void unload_held(const MeanVelocity& mean, const VecX& a_free);
+    void find_dependent();
     bool accept_best_forces(double h);
     bool moves();
     bool hold_trees(const VecX& q0);
@@ -88,6 +96,10 @@ private:
     bool separate_ = false;
     bool has_load_ = false;  // the rows without forces are more than rounding
     StepResponses responses_;
+    SharedFriction shared_;
+    bool are_dependent_ = false;
+    std::vector<SharedFriction::Element> sticking_;
+    std::vector<int> dry_rows_;
     ConeComplementarity solver_;
     LawMiss law_miss_;
     VecX free_rows_, offset_, middle_, guess_, best_f_, q_without_rest_, a_;

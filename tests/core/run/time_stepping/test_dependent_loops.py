@@ -10,6 +10,7 @@ import pytest
 
 import pin_nonideal as pn
 
+from ....scene.test_symmetries import case as symmetric_case
 from ....scene.test_symmetries import check
 from ....support import loops
 from ....support.cases import case_of
@@ -38,6 +39,18 @@ def test_a_shaft_with_light_and_heavy_parts_turns_on(many: range, far_contact: b
         dt = min(0.1 * DURATION, ANGLE / float(np.abs(exact.v).max()))
         once, halved = (error(case.scene, exact, step) for step in (dt, 0.5 * dt))
         assert halved < max(once / LEAST_RATIO, FLOOR), seed
+
+
+@pytest.mark.parametrize("many", ranges(6, 60, 100))
+def test_a_far_contact_does_not_change_how_a_jamming_loop_shares_loads(many: range) -> None:
+    for seed in many:
+        case = symmetric_case(f"ball loop {seed}")
+        q0, v0 = case.scene.project(t=case.t0)
+        run, beside = (
+            pn.simulate(scene, case.duration, q0, v0, t0=case.t0, method="moreau", dt=case.dt)
+            for scene in (case.scene, ALL["a far contact"].make(case).case.scene)
+        )
+        np.testing.assert_allclose(beside.q, run.q, atol=1e-7, err_msg=str(seed))
 
 
 @pytest.mark.parametrize(
