@@ -28,6 +28,8 @@ bool OnsetMotion::slides() const {
 
 void OnsetMotion::to_modes(const Program& p, Workspace& w, ModeQuery& query) const {
     if (is_initial_guess) {
+        query.nearby_modes = modes;
+        query.nearby_directions = direction;
         query.nearby_friction = friction;
         return;
     }

@@ -21,7 +21,7 @@ struct OnsetMotion {
     bool is_initial_guess = false;  // true if this is only an initial guess for the search of the motion
 
     bool slides() const;  // some contact slips or begins to slip
-    // Set the modes of elements at rest and their slip directions at onset. An initial guess sets its friction only.
+    // Set the modes of elements at rest and their slip directions at onset. An initial guess is only nearby.
     void to_modes(const Program& p, Workspace& w, ModeQuery& query) const;
 };
 

@@ -126,6 +126,26 @@ HoldingForce holding_force(const Program& p, Workspace& w, int e, double t, cons
     return out;
 }
 
+bool shares_hold(const Program& p, Workspace& w, const std::vector<int>& list, double t, const VecX& q, const VecX& v) {
+    const Reactions& shared = reactions(p, w);
+    const auto presses = [&](int i) {
+        const Block& block = p.blocks[p.gaps[i].block];
+        return block.kept.empty() || !(shared.lam[block.row] < 0.0);
+    };
+    const auto holds = [&](int e) {
+        if (w.state.mode[e] != sticking) return true;
+        const Friction& friction = p.frictions[e];
+        const Block& block = p.blocks[friction.block];
+        if (is_locked(w, block) || static_cast<int>(block.kept.size()) != friction.dim) return false;
+        const SlipLimits limits = static_limits(p, w, e, t, q, v);
+        const auto force = shared.lam.segment(block.row, friction.dim);
+        return (friction.dim == 1 ? std::abs(force[0] - limits.middle()) : force.norm()) <= limits.reach();
+    };
+    const std::vector<int>& closed = w.now.closed_gaps;
+    return shared.loads_are_feasible && std::all_of(closed.begin(), closed.end(), presses) &&
+           std::all_of(list.begin(), list.end(), holds);
+}
+
 double current_limit(const Program& p, Workspace& w, int e, double t, const VecX& q, const VecX& v) {
     if (w.state.mode[e] == unloaded) return 0.0;
     if (w.state.mode[e] != sticking) return w.now.limit[e];

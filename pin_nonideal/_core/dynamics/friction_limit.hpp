@@ -43,6 +43,9 @@ struct HoldingForce {
     bool is_within(double slack) const { return force.norm() <= limit * (1.0 + slack); }
 };
 HoldingForce holding_force(const Program& p, Workspace& w, int element, double t, const VecX& q, const VecX& v);
+// Check if forces of the motion in the workspace hold the sticking elements of a list and press the closed contacts. The
+// shares of loads have minimum norm. Other shares may hold the elements if these do not.
+bool shares_hold(const Program& p, Workspace& w, const std::vector<int>& list, double t, const VecX& q, const VecX& v);
 // Nearest bound of the friction force of a sticking element, limit of a slipping element, zero without load.
 double current_limit(const Program& p, Workspace& w, int element, double t, const VecX& q, const VecX& v);
 // Add the force of a slipping element, for the limit in the workspace, to a generalized force. add_slip_forces adds the

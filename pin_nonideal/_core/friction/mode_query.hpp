@@ -14,7 +14,9 @@ struct ModeQuery {
     std::vector<int> at_limit;
     bool several = false;            // another motion than that of `modes` is known
     bool is_solved_jointly = false;  // `modes` belong to a motion solved with all contacts
-    std::vector<Vec3> nearby_friction = {};  // friction of all elements in a nearby motion, if known
+    // Modes, slip directions and friction of all elements in a nearby motion, if known.
+    std::vector<Mode> nearby_modes = {};
+    std::vector<Vec3> nearby_directions = {}, nearby_friction = {};
 };
 
 // Set up the query from the slip velocities of the rows last evaluated. Elements at rest stick or have come to rest

@@ -150,6 +150,34 @@ struct Search {
         apply(modes, false);
     }
 
+    // Check if an element that begins to slip does so along the direction of its mode.
+    bool slips_along_mode(int e, double noise) const {
+        if (!slips(w.state.mode[e])) return true;
+        const Friction& friction = p.frictions[e];
+        const Vec3 rate = slip_acceleration(p, w, friction);
+        const double size = rate.norm(), along = slip_rate_along_mode(p, w, e);
+        return size <= noise || along >= (1.0 - stick_slip_parameters.max_direction_deviation) * size;
+    }
+
+    // Try the modes of a nearby motion. They are right if their motion satisfies all laws. Few elements are searched for
+    // other motions instead.
+    bool keeps_nearby_modes() {
+        if (static_cast<int>(list.size()) <= max_searched_forces || query.nearby_modes.empty()) return false;
+        std::vector<Mode> modes = query.modes;
+        for (int e : list) {
+            modes[e] = query.nearby_modes[e];
+            if (modes[e] == unloaded) return false;
+            if (slips(modes[e]) && p.frictions[e].dim > 1)
+                w.state.slip_direction[e] = w.state.last_direction[e] = query.nearby_directions[e];
+        }
+        if (attempt({Failure::Kind::paradox, Failure::Kind::not_converged, Failure::Kind::inconsistent},
+                    [&] { apply(modes, false); }))
+            return false;
+        const double noise = relative_acceleration_rounding * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
+        return shares_hold(p, w, list, t, q, v) &&
+               std::all_of(list.begin(), list.end(), [&](int e) { return slips_along_mode(e, noise); });
+    }
+
     void run() {
         if (query.is_solved_jointly) {
             apply(query.modes, false);
@@ -157,6 +185,7 @@ struct Search {
             w.now.several_element = list.front();
             return;
         }
+        if (keeps_nearby_modes()) return;
         std::vector<Mode> modes = query.modes;
         for (int e : list) modes[e] = unloaded;
         bool found = false;

@@ -16,6 +16,8 @@ struct StickSlipParameters {
     // long chain without large loads may be as small as this rounding.
     double limit_force_rounding = 64 * std::numeric_limits<double>::epsilon();
     int max_limit_iterations = 100;  // maximum iterations of forces and limits
+    // Deviation of a slip's acceleration from the direction of its friction (1 - cosine) that counts as rounding.
+    double max_direction_deviation = 1e-10;
 };
 
 inline constexpr StickSlipParameters stick_slip_parameters{};

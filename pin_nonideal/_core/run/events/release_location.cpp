@@ -23,6 +23,11 @@ std::optional<double> ReleaseLocator::release_rate(double t, const VecX& y, cons
     mode_query = {modes, {}, {}};
     for (int e = 0; e < system_.ne; ++e)
         if (!is_open(p, w, e) && at_rest(p, w, e, system_.v)) mode_query.at_rest.push_back(e);
+    // Contacts hold as long as any forces within their cones do, not only those of minimum norm.
+    if (!p.gaps.empty() && closed_contacts_hold(p, w, t, system_.q, system_.v)) {
+        begin_step(p, w, t, system_.q, system_.v);
+        return std::nullopt;
+    }
     double rate = 0.0;
     const auto failure = attempt({Failure::Kind::paradox, Failure::Kind::not_converged}, [&] {
         resolve_modes(p, w, t, system_.q, system_.v, mode_query);
@@ -30,17 +35,14 @@ std::optional<double> ReleaseLocator::release_rate(double t, const VecX& y, cons
             if (modes[e] == sticking && w.state.mode[e] != sticking)
                 rate = std::max(rate, std::abs(slip_rate_along_mode(p, w, e)));
     });
-    if (failure && p.gaps.empty()) throw *failure;
     if (failure) rate = HUGE_VAL;  // sticking fails: unilateral contacts change together with the elements
     const double noise = relative_acceleration_rounding * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
     set_modes(p, w, modes);
     w.state.slip_direction = directions;
     w.state.last_direction = last_directions;
-    // Contacts hold as long as any forces within their cones do, not only those of minimum norm.
-    const bool hold = rate > noise && !p.gaps.empty() && closed_contacts_hold(p, w, t, system_.q, system_.v);
-    if (failure && failure->kind == Failure::Kind::paradox && !hold) throw *failure;
+    if (failure && (p.gaps.empty() || failure->kind == Failure::Kind::paradox)) throw *failure;
     begin_step(p, w, t, system_.q, system_.v);
-    if (rate <= noise || hold) return std::nullopt;  // an element held by others does not move, whatever its force
+    if (rate <= noise) return std::nullopt;  // an element held by others does not move, whatever its force
     return rate;
 }
 
@@ -132,7 +134,10 @@ std::optional<FoundEvent> ReleaseLocator::release_together() {
     if (!w.state.is_hyperstatic) return std::nullopt;
     const std::vector<Mode> modes = w.state.mode;
     ModeQuery mode_query;
-    std::optional<double> rate = release_rate_at_end(modes, mode_query);
+    std::optional<double> rate;
+    system_.read(stepper_.y1);
+    if (!shares_hold(p, w, w.now.loaded_elements, stepper_.t0 + stepper_.h, system_.q, system_.v))
+        rate = release_rate_at_end(modes, mode_query);
     if (!rate) rate = release_rate_inside(modes, mode_query);
     if (!rate) return std::nullopt;
     const double full = stepper_.h;

@@ -19,10 +19,16 @@ bool may_differ(const Program& p, const Options& options) {
            std::holds_alternative<SampledTorque>(p.actuation) || p.torque_table() != nullptr;
 }
 
-// Check if accelerations and forces are needed at the end of every step.
+// Check if anything reads accelerations and forces at the ends of steps.
+bool reads_forces(const Program& p, const Options& options) {
+    return options.record.evaluates() || options.record.dense || options.callback || options.save ||
+           !options.events.empty() || !p.contacts.empty() || p.calls_functions;
+}
+
+// Check if they are evaluated at the end of every step.
 bool needs_forces_always(const Program& p, const Options& options) {
-    return options.method.scheme != Method::Scheme::moreau || options.output_dt == 0.0 || options.record.dense ||
-           options.callback || options.save || !options.events.empty() || !p.contacts.empty() || p.calls_functions;
+    return options.method.scheme != Method::Scheme::moreau || options.output_dt == 0.0 ||
+           (reads_forces(p, options) && !options.record.evaluates());
 }
 
 }  // namespace
@@ -34,7 +40,7 @@ TimeStepping::TimeStepping(System& system, Progress& progress, GapWatch& watch, 
       output_(output), warnings_(warnings), value_events_(value_events), out_(out), moreau_(system),
       moreau_contacts_(system, watch), is_autonomous_(!may_differ(system.p, options)),
       always_evaluated_(needs_forces_always(system.p, options)),
-      records_forces_(always_evaluated_ || options.record.evaluates()) {}
+      reads_forces_(reads_forces(system.p, options)) {}
 
 // End of a step of this size: at a stop, a jump of the actuation or a due sample before it. Times that differ only by
 // rounding are one end, the latest of them.
@@ -105,7 +111,7 @@ void TimeStepping::try_part(double h, double end, double t_end) {
     t = whole ? end : t + h;
     const bool needs_forces_here = progress_.has_forces = whole && needs_forces(end, t_end);
     if (moreau_contacts_.project(t, progress_.y, progress_.numerical_energy)) {
-        progress_.has_forces = needs_forces_here && records_forces_;
+        progress_.has_forces = needs_forces_here && reads_forces_;
         if (progress_.has_forces) system_.evaluate_step_end(t, progress_.y, progress_.rate, true);
         return;
     }
@@ -177,7 +183,7 @@ void TimeStepping::begin(double size) {
     ModeQuery first = make_first_mode_query(p, w, progress_.t, system_.q, system_.v);
     for (int e : first.at_rest) first.modes[e] = modes[e];
     set_contacts(p, w, closed, first.modes);
-    if (records_forces_ || !moreau_contacts_.is_separate())
+    if (reads_forces_ || !moreau_contacts_.is_separate())
         system_.evaluate_step_end(progress_.t, progress_.y, progress_.rate, true);
 }
 
@@ -195,7 +201,8 @@ void TimeStepping::step(double size, double stop, double t_end) {
         open_before_ = !watched;
     }
     const VecX y_from = options_.record.dense ? y : VecX();
-    if (!progress_.is_stationary || (!progress_.has_forces && needs_forces(end, t_end))) take(end, t_end);
+    const bool lacks_forces = !progress_.has_forces && (reads_forces_ || system_.ng == 0) && needs_forces(end, t_end);
+    if (!progress_.is_stationary || lacks_forces) take(end, t_end);
     t = end;
     ++out_.steps;
     output_.configured_now();

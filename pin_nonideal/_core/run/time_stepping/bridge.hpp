@@ -55,7 +55,7 @@ private:
     bool misses_laws_ = false;  // the last step missed the laws of contact
     double rounding_ = 0.0;  // difference of two times that are one end of a step
     const bool always_evaluated_;  // accelerations are needed at every step's end
-    const bool records_forces_;    // samples of separate trees need accelerations: the modes are those of the step
+    const bool reads_forces_;      // anything reads accelerations and forces: the modes are those of the step
     VecX y_from_;
     Modes before_, before_step_;
     std::vector<char> closed_before_, closed_before_step_;

@@ -191,3 +191,18 @@ def test_samples_of_a_long_run_are_due_on_time():
     grid = np.append(0.03 * np.arange(3334), 100.0)
     assert len(run.t) == len(grid)
     assert np.abs(run.t - grid).max() < 1e-10
+
+
+def test_samples_without_forces_evaluate_none():
+    """A run that records positions only needs no accelerations at the ends of its steps."""
+    model, geometry = bodies(np.random.default_rng(0), [coal.Box(0.2, 0.2, 0.2)] * 2, gravity=9.81)
+    geometry.addGeometryObject(pn.ground())
+    scene = pn.Scene(model, contacts=pn.ground_contacts(model, geometry, mu=0.3), collision_model=geometry)
+    q, v = [0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0], np.zeros(12)
+    v[[0, 6]] = 1.0
+    steps = 100
+    brief = pn.simulate(scene, steps * DT, q, v, method="moreau", dt=DT)
+    whole = pn.simulate(scene, steps * DT, q, v, method="moreau", dt=DT, record="forces")
+    np.testing.assert_array_equal(brief.q, whole.q)
+    assert brief.stats.evaluations <= steps + 5
+    assert whole.stats.evaluations >= 2 * steps
