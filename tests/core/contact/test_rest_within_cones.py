@@ -95,7 +95,7 @@ def test_runs_from_rest(family, method, seed):
 
 @families
 @pytest.mark.parametrize("method", ["dop853", "moreau"])
-@pytest.mark.parametrize("seed", seeds(range(200), count=5))
+@pytest.mark.parametrize("seed", seeds(range(200), always=[37], count=5))  # 37: a table at its limit
 def test_recorded_forces_at_rest_lie_within_the_cones_and_hold_the_bodies(family, method, seed):
     case = family(seed)
     options = {} if method.startswith("dop") else {"dt": 1e-3}

@@ -16,8 +16,9 @@ public:
     using Parameters = EndModeParameters;
     static constexpr Parameters parameters{};
 
-    // v: velocity of the scene.
-    explicit EndModes(const VecX& v) : fastest_(1.0 + v.cwiseAbs().maxCoeff()), still_(rest_rate(v)) {}
+    // v: velocity of the scene. `error`: error of the slips.
+    explicit EndModes(const VecX& v, double error = 0.0)
+        : fastest_(1.0 + v.cwiseAbs().maxCoeff()), still_(rest_rate(v) + error) {}
 
     // Check if a slip is zero up to rounding.
     bool is_rest(double slip) const { return slip <= still_; }

@@ -396,7 +396,7 @@ void MoreauContacts::end_velocity() {
         std::fill(modes_.begin(), modes_.end(), unloaded);
     }
     if (n == 0) return;
-    const EndModes rule(v1_);
+    const EndModes rule(v1_, h_ * forces_.row_error());
     const double clear = StepForces::parameters.limit_rounding * f.head(n).cwiseAbs().maxCoeff();
     end.head(n) *= h_;
     for (size_t e = 0, at = 0; e < parts.size(); at += cones[e].dim, ++e) {

@@ -164,6 +164,7 @@ bool StepForces::solve(double h, const VecX& q0, const VecX& v0) {
     elements_.middles(middle_);
     guess_ = f.head(n);
     const double error = separate_ ? trees_.solve(elements_.cones, middle_, f) : HUGE_VAL;
+    error_ = separate_ ? error : 0.0;
     bool solved = error <= parameters.max_residual;
     const bool starts = v0.cwiseAbs().maxCoeff() <= rest_speed && !(q_without_rest_.size() > 0 && q_without_rest_ == q0);
     if (solved && !(starts && moves())) return true;
@@ -178,9 +179,11 @@ bool StepForces::solve(double h, const VecX& q0, const VecX& v0) {
     end_rows.head(n) = free_rows_.head(n);
     end_rows.head(n).noalias() += W * middle_.head(n);
     solver_.search_briefly(error < parameters.max_brief_error);
-    if (!solved)
+    if (!solved) {
         solved = solver_.solve(W, end_rows.head(n), elements_.cones, true, f.head(n), true) == ConeStatus::solved &&
                  !add_energy(W, end_rows.head(n), f.head(n));
+        error_ = solver_.error();
+    }
     if (starts && !separate_) solved = keep_rest(solved, q0) || solved;
     f.head(n) += middle_.head(n);
     return solved || (separate_ && trees_.miss().element >= 0 && accept_best_forces(h));
@@ -208,6 +211,11 @@ void StepForces::measure_end() {
     if (separate_) return trees_.move(middle_, f, a_, end_rows);
     end_rows.head(n) = free_rows_.head(n);
     end_rows.head(n).noalias() += responses_.matrix(n) * f.head(n);
+}
+
+double StepForces::row_error() const {
+    const auto n = static_cast<Eigen::Index>(elements_.rows.size());
+    return std::min(error_, parameters.max_residual) * free_rows_.head(n).cwiseAbs().maxCoeff();
 }
 
 bool StepForces::moves() {

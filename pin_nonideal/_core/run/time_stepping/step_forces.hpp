@@ -56,6 +56,8 @@ public:
     void drop_prevented_slip();
     // Compute the rows at the step's end under the forces.
     void measure_end();
+    // Error of the rows at the step's end, if the laws are met.
+    double row_error() const;
     // Errors of the laws for the forces.
     ConeResiduals residuals();
 
@@ -94,6 +96,7 @@ private:
     const StepElements& elements_;
     SeparateTrees trees_;
     bool separate_ = false;
+    double error_ = 0.0;     // of the last solution, relative to the rows without forces
     bool has_load_ = false;  // the rows without forces are more than rounding
     StepResponses responses_;
     SharedFriction shared_;
