@@ -118,7 +118,7 @@ KNOWN: list[Known] = [
     Known(
         "works are no part of the error of a step, and drives that move all bodies leave no other error",
         ("started loop 66", "friction without limit", "simulate dop853"),
-        scenes="started loop (66|81)",
+        scenes="started loop (66|81)|cart 0",
         functions="simulate dop853",
     ),
     Known(

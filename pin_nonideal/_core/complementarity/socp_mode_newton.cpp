@@ -245,9 +245,12 @@ VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>&
     return ball_program(W, alpha0, dims, s);
 }
 
-VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const FrictionLimits& limits) {
-    if (limits.middle.isZero(0.0)) return friction_program(W, alpha0, dims, limits.size);
-    return limits.middle + friction_program(W, alpha0 + W * limits.middle, dims, limits.size);
+VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const FrictionLimits& limits,
+                      const VecX* initial) {
+    if (limits.middle.isZero(0.0)) return friction_program(W, alpha0, dims, limits.size, initial);
+    const VecX from_middle = initial ? VecX(*initial - limits.middle) : VecX();
+    return limits.middle + friction_program(W, alpha0 + W * limits.middle, dims, limits.size,
+                                            initial ? &from_middle : nullptr);
 }
 
 VecX onset_accelerations(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const FrictionLimits& limits) {

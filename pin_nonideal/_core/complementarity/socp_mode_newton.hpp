@@ -22,10 +22,12 @@ struct SocpParameters {
 inline constexpr SocpParameters socp_parameters{};
 
 VecX ball_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& s);
-// Solve the same program, as a box program if every element has one direction.
+// Solve the same program, as a box program if every element has one direction. Only a box program uses `initial`: forces
+// of a similar program.
 VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& s,
                       const VecX* initial = nullptr);
-VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const FrictionLimits& limits);
+VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const FrictionLimits& limits,
+                      const VecX* initial = nullptr);
 // Return slip accelerations slightly beyond the load of slip onset. At onset the slip accelerations are rounding. If
 // elements share a load, their forces give the directions of a common slip only to the square root of rounding.
 VecX onset_accelerations(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const FrictionLimits& limits);

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "dynamics/acceleration.hpp"
+#include "math/decompositions.hpp"
 #include "math/lanes.hpp"
 #include "math/tolerances.hpp"
 #include "tree/mass_factor.hpp"
@@ -75,6 +76,17 @@ PN_WIDE void gram(const MatX& X, int n, MatX& W) {
 void FrictionProblem::acceleration(const Program& p, Workspace& w, const VecX& f, VecX& a) const {
     a.noalias() = response * f;
     if (scaled) solve_Rt(p.mechanism, w.now.terms, a);
+}
+
+bool FrictionProblem::has_unique_forces() const {
+    std::vector<int> movable;
+    for (int i = 0; i < rows; ++i)
+        if (W(i, i) > 0.0) movable.push_back(i);
+    if (movable.empty()) return true;
+    const VecX scale = W.diagonal()(movable).cwiseSqrt().cwiseInverse();
+    Cholesky factor;
+    return factor.compute(scale.asDiagonal() * W(movable, movable) * scale.asDiagonal()) &&
+           factor.factor().diagonal().cwiseAbs2().minCoeff() > parameters.min_pivot;
 }
 
 VecX FrictionProblem::along(const Program& p, Workspace& w, const VecX& x) const {

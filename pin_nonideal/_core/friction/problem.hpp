@@ -6,7 +6,14 @@
 
 namespace pn {
 
+struct FrictionProblemParameters {
+    double min_pivot = 1e-10;  // pivot of the scaled W below which forces depend on each other
+};
+
 struct FrictionProblem {
+    using Parameters = FrictionProblemParameters;
+    static constexpr Parameters parameters{};
+
     std::vector<int> elements, dims;  // element i has dims[i] consecutive rows of alpha and f
     int rows = 0;
     VecX alpha0;       // without any friction of these elements
@@ -23,6 +30,8 @@ struct FrictionProblem {
     FrictionProblem(const Program& p, const std::vector<int>& elements);
     // Compute the responses at half the cost, if few forces need their motion: W = X^T X for scaled responses X.
     void respond_in_step(const Program& p, Workspace& w);
+    // Check if the accelerations determine the forces, except along directions that the constraints hold.
+    bool has_unique_forces() const;
     // Compute the acceleration due to friction forces f.
     void acceleration(const Program& p, Workspace& w, const VecX& f, VecX& a) const;
 

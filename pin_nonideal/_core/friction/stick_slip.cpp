@@ -121,8 +121,12 @@ struct Search {
             limits.middle[row] = now.middle();
         }
         double change = 0.0;
+        VecX f;
+        const bool are_unique = problem.has_unique_forces();
         for (int turn = 0; turn < stick_slip_parameters.max_limit_iterations; ++turn) {
-            const VecX f = friction_program(problem.W, problem.alpha0, problem.dims, limits);
+            // Forces that are not unique would depend on the initial ones.
+            const VecX last = f;
+            f = friction_program(problem.W, problem.alpha0, problem.dims, limits, turn > 0 && are_unique ? &last : nullptr);
             const std::vector<Mode> next = modes_of(w, query, problem, f, limits);
             if (next == modes && change <= stick_slip_parameters.limit_tolerance) return true;
             modes = next;
