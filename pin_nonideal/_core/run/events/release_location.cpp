@@ -13,6 +13,11 @@
 
 namespace pn {
 
+// Check if the shares of the motion in the workspace hold all sticking elements, at the state last read.
+bool ReleaseLocator::shares_hold_at(double t) {
+    return shares_hold(p, w, w.now.loaded_elements, t, system_.q, system_.v);
+}
+
 // Return the acceleration with which sticking elements begin to slip at a state of the step. Return nothing if forces
 // within all limits can hold them.
 std::optional<double> ReleaseLocator::release_rate(double t, const VecX& y, const std::vector<Mode>& modes,
@@ -95,8 +100,9 @@ double ReleaseLocator::release_part(double rate, const std::vector<Mode>& modes,
         const double t = stepper_.t0 + next * full;
         stepper_.interpolate(next, y);
         system_.read(y);
-        update_kinematics(p, w, t, system_.q, system_.v);
-        const std::optional<double> found_rate = release_rate(t, y, modes, mode_query);
+        begin_step(p, w, t, system_.q, system_.v);
+        std::optional<double> found_rate;
+        if (!shares_hold_at(t)) found_rate = release_rate(t, y, modes, mode_query);
         falls = found_rate && rate < HUGE_VAL && *found_rate < parameters.max_rate_ratio * rate;
         if (found_rate) {
             beyond = std::exchange(high, next);
@@ -136,8 +142,7 @@ std::optional<FoundEvent> ReleaseLocator::release_together() {
     ModeQuery mode_query;
     std::optional<double> rate;
     system_.read(stepper_.y1);
-    if (!shares_hold(p, w, w.now.loaded_elements, stepper_.t0 + stepper_.h, system_.q, system_.v))
-        rate = release_rate_at_end(modes, mode_query);
+    if (!shares_hold_at(stepper_.t0 + stepper_.h)) rate = release_rate_at_end(modes, mode_query);
     if (!rate) rate = release_rate_inside(modes, mode_query);
     if (!rate) return std::nullopt;
     const double full = stepper_.h;

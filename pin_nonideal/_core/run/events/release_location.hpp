@@ -34,6 +34,7 @@ public:
     std::optional<FoundEvent> lift_together();
 
 private:
+    bool shares_hold_at(double t);
     std::optional<double> release_rate(double t, const VecX& y, const std::vector<Mode>& modes, ModeQuery& mode_query);
     std::optional<double> release_rate_at_end(const std::vector<Mode>& modes, ModeQuery& mode_query);
     double release_part(double rate, const std::vector<Mode>& modes, ModeQuery& mode_query);
