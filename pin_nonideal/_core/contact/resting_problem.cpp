@@ -28,9 +28,10 @@ bool OnsetMotion::slides() const {
 
 void OnsetMotion::to_modes(const Program& p, Workspace& w, ModeQuery& query) const {
     if (is_initial_guess) {
+        query.nearby_friction = friction;
+        if (several) return;  // the modes are not unique
         query.nearby_modes = modes;
         query.nearby_directions = direction;
-        query.nearby_friction = friction;
         return;
     }
     for (int e : query.at_rest) {

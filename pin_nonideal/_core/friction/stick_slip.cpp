@@ -168,15 +168,22 @@ struct Search {
     bool keeps_nearby_modes() {
         if (static_cast<int>(list.size()) <= max_searched_forces || query.nearby_modes.empty()) return false;
         std::vector<Mode> modes = query.modes;
-        for (int e : list) {
-            modes[e] = query.nearby_modes[e];
-            if (modes[e] == unloaded) return false;
+        for (int e : list) modes[e] = query.nearby_modes[e];
+        if (std::any_of(list.begin(), list.end(), [&](int e) { return modes[e] == unloaded; })) return false;
+        const std::vector<Vec3> directions = w.state.slip_direction, last_directions = w.state.last_direction;
+        for (int e : list)
             if (slips(modes[e]) && p.frictions[e].dim > 1)
                 w.state.slip_direction[e] = w.state.last_direction[e] = query.nearby_directions[e];
-        }
-        if (attempt({Failure::Kind::paradox, Failure::Kind::not_converged, Failure::Kind::inconsistent},
-                    [&] { apply(modes, false); }))
-            return false;
+        const auto failure = attempt({Failure::Kind::paradox, Failure::Kind::not_converged, Failure::Kind::inconsistent},
+                                     [&] { apply(modes, false); });
+        if (!failure && satisfies_laws()) return true;
+        w.state.slip_direction = directions;
+        w.state.last_direction = last_directions;
+        return false;
+    }
+
+    // Check if the forces of the current motion hold what sticks and oppose what begins to slip.
+    bool satisfies_laws() {
         const double noise = relative_acceleration_rounding * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
         return shares_hold(p, w, list, t, q, v) &&
                std::all_of(list.begin(), list.end(), [&](int e) { return slips_along_mode(e, noise); });

@@ -36,7 +36,7 @@ JointDrives::JointDrives(const Program& p) {
         if (!m.is_deep[law.dof]) bristles_.push_back(law);
     });
     each_law<Sigmoid>(p.laws, [&](const Sigmoid& law) {
-        if (!m.is_deep[law.dof]) sigmoids_.push_back(law);
+        if (!m.is_deep[law.dof] && law.phi1 != 0.0) sigmoids_.push_back(law);
     });
     any_ = (stiffness_.array() != 0.0).any() || (damping_.array() != 0.0).any() || !bristles_.empty() || !sigmoids_.empty();
 }

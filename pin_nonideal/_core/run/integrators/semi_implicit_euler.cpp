@@ -2,6 +2,7 @@
 
 #include "dynamics/evaluation.hpp"
 #include "dynamics/projection.hpp"
+#include "dynamics/step_start.hpp"
 #include "tree/lie_group.hpp"
 
 namespace pn {
@@ -12,6 +13,12 @@ void SemiImplicitEuler::advance(System& system) {
     system.v = step_.h * system.velocity(step_.y1);
     follow_constraints(system.p, system.w, step_.h, system.v);
     retract(system.p.mechanism, step_.y0.data(), system.v.data(), step_.y1.data());
+}
+
+void SemiImplicitEuler::return_to_start(System& system) {
+    system.read(step_.y0);
+    system.read_law_states(step_.y0);
+    begin_step(system.p, system.w, step_.t0, system.q, system.v);
 }
 
 // Replace the velocity and the states of the laws at the step's end by those under implicit drives.

@@ -17,6 +17,8 @@ public:
 
     // Compute y1 from y0 and the rate at y0. The workspace must be evaluated at y0.
     void advance(System& system);
+    // Evaluate the workspace at y0 again, for a repeated step.
+    void return_to_start(System& system);
     // Store the multipliers that the projection of the step's end has shown, for the next step.
     void learn(System& system) const;
 

@@ -59,6 +59,7 @@ void Stepper::stand() {
 }
 
 void Stepper::repeat(double size) {
+    if (auto* euler = std::get_if<SemiImplicitEuler>(&scheme_)) euler->return_to_start(system_);
     take(t0, size);
     if (collocates_ && !collocation_.is_solved()) throw Failure(Failure::Kind::not_converged, t0);
 }

@@ -63,7 +63,8 @@ void Output::end_time_step(double rounding) {
     const double t = progress_.t;
     const bool on_grid = options_.output_dt > 0.0 && next() <= t + std::max(rounding, same_time(t));
     progress_.samples += on_grid;
-    if (options_.output_dt == 0.0 || on_grid || t >= options_.end()) now();
+    if (options_.output_dt != 0.0 && !on_grid && t < options_.end()) return;
+    emit(t, progress_.y, progress_.has_forces || system_.ng == 0);
 }
 
 template <class Visit>

@@ -70,7 +70,7 @@ void Recorder::sample(double t, const VecX& y, const Jumps& jumps, bool evaluate
     if (!evaluated && options.evaluates()) {
         system.read_law_states(y);
         evaluate(p, w, t, system.q, system.v);
-    } else if (!evaluated && p.constraints > 0) {
+    } else if (!evaluated && (p.constraints > 0 || !w.now.closed_gaps.empty())) {
         update_kinematics(p, w, t, system.q, system.v);
     }
     double position, velocity;

@@ -19,16 +19,10 @@ bool may_differ(const Program& p, const Options& options) {
            std::holds_alternative<SampledTorque>(p.actuation) || p.torque_table() != nullptr;
 }
 
-// Check if anything reads accelerations and forces at the ends of steps.
-bool reads_forces(const Program& p, const Options& options) {
-    return options.record.evaluates() || options.record.dense || options.callback || options.save ||
-           !options.events.empty() || !p.contacts.empty() || p.calls_functions;
-}
-
-// Check if they are evaluated at the end of every step.
-bool needs_forces_always(const Program& p, const Options& options) {
-    return options.method.scheme != Method::Scheme::moreau || options.output_dt == 0.0 ||
-           (reads_forces(p, options) && !options.record.evaluates());
+// Check if accelerations and forces are read at the end of every step, whatever the samples record.
+bool reads_forces_always(const Program& p, const Options& options) {
+    return options.record.dense || options.callback || options.save || !options.events.empty() || !p.contacts.empty() ||
+           p.calls_functions;
 }
 
 }  // namespace
@@ -39,8 +33,9 @@ TimeStepping::TimeStepping(System& system, Progress& progress, GapWatch& watch, 
     : p(system.p), w(system.w), system_(system), progress_(progress), options_(options), torques_(torques),
       output_(output), warnings_(warnings), value_events_(value_events), out_(out), moreau_(system),
       moreau_contacts_(system, watch), is_autonomous_(!may_differ(system.p, options)),
-      always_evaluated_(needs_forces_always(system.p, options)),
-      reads_forces_(reads_forces(system.p, options)) {}
+      samples_every_step_(options.method.scheme != Method::Scheme::moreau || options.output_dt == 0.0 ||
+                          reads_forces_always(system.p, options)),
+      reads_forces_(options.record.evaluates() || reads_forces_always(system.p, options)) {}
 
 // End of a step of this size: at a stop, a jump of the actuation or a due sample before it. Times that differ only by
 // rounding are one end, the latest of them.
@@ -66,10 +61,10 @@ bool TimeStepping::rests() const {
     return is_autonomous_ && (system_.velocity(progress_.y).array() == 0.0).all() && is_immobile(p, w);
 }
 
-// Check if accelerations and forces are needed at the step's end: by a sample, by the end of the run, or by slip. Slip
-// needs them if its direction or limit depends on them.
+// Check if the step's end is a sample or the end of the run, or if slip without contacts needs accelerations and forces
+// there. Slip needs them if its direction or limit depends on them.
 bool TimeStepping::needs_forces(double end, double t_end) const {
-    if (always_evaluated_ || end >= t_end || end >= options_.end() || output_.next() <= end + rounding_)
+    if (samples_every_step_ || end >= t_end || end >= options_.end() || output_.next() <= end + rounding_)
         return true;
     return system_.ng == 0 && std::any_of(w.now.slipping.begin(), w.now.slipping.end(), [&](int e) {
         return p.frictions[e].dim > 1 || p.frictions[e].reaction != Reaction::none;
@@ -210,7 +205,9 @@ void TimeStepping::step(double size, double stop, double t_end) {
     if (watched || system_.watches())
         for (const Event& change : changes_since(system_, t, closed_before_, before_)) out_.events.push_back(change);
     warnings_.check_tension(std::nullopt);
-    warnings_.check_uniqueness(false);
+    // What a run records must not change the events of its bridged stretches.
+    const bool is_evaluated = progress_.has_forces && options_.method.scheme == Method::Scheme::moreau;
+    if (is_evaluated || system_.ng == 0) warnings_.check_uniqueness(false);
     output_.keep_time_step(from, y_from);
     value_events_.sample_end(t, y);
     value_events_.append_events(t, out_.events);

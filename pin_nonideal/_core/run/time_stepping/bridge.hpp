@@ -54,8 +54,9 @@ private:
     const bool is_autonomous_;  // a state that a step leaves unchanged stays unchanged
     bool misses_laws_ = false;  // the last step missed the laws of contact
     double rounding_ = 0.0;  // difference of two times that are one end of a step
-    const bool always_evaluated_;  // accelerations are needed at every step's end
-    const bool reads_forces_;      // anything reads accelerations and forces: the modes are those of the step
+    const bool samples_every_step_;  // every step's end is a sample, or is read like one
+    // Something reads accelerations and forces. If nothing does, steps of separate trees evaluate none.
+    const bool reads_forces_;
     VecX y_from_;
     Modes before_, before_step_;
     std::vector<char> closed_before_, closed_before_step_;

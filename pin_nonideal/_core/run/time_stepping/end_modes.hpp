@@ -16,12 +16,11 @@ public:
     using Parameters = EndModeParameters;
     static constexpr Parameters parameters{};
 
-    // v: velocity of the scene. `error`: error of the slips.
-    explicit EndModes(const VecX& v, double error = 0.0)
-        : fastest_(1.0 + v.cwiseAbs().maxCoeff()), still_(rest_rate(v) + error) {}
+    // v: velocity of the scene.
+    explicit EndModes(const VecX& v) : fastest_(1.0 + v.cwiseAbs().maxCoeff()), still_(rest_rate(v)) {}
 
-    // Check if a slip is zero up to rounding.
-    bool is_rest(double slip) const { return slip <= still_; }
+    // Check if a slip is zero up to rounding and its `error`.
+    bool is_rest(double slip, double error = 0.0) const { return slip <= still_ + error; }
     // Check if a slip is so slow that an element stops if its force can hold it.
     bool is_stopped(double slip) const { return slip <= parameters.max_stopped_slip * fastest_; }
     // Check if a slip misses rest by less than the force misses its limit, each relative to its scale. A solution that

@@ -232,26 +232,28 @@ void MoreauContacts::drop_opposed() {
     };
     all_touching_ = touching_;
     touching_.clear();
-    size_t begin = 0, end = 0;  // contacts of one pair, which follow each other
-    const auto differs = [&](int gap) {
-        const int first = all_touching_[begin];
-        return is_bare(p, first) || is_bare(p, gap) || normal(first).dot(normal(gap)) < parameters.alike;
-    };
-    bool opposite = false;
-    for (int gap : all_touching_) {
-        const int pair = p.gaps[gap].pair;
-        if (end == 0 || p.gaps[all_touching_[begin]].pair != pair) {
-            begin = end;
-            while (end < all_touching_.size() && p.gaps[all_touching_[end]].pair == pair) ++end;
-            const auto last = all_touching_.begin() + end;
-            opposite = pair >= 0 && std::any_of(all_touching_.begin() + begin, last, differs);
-        }
-        const auto opposes = [&](int other) {
-            return !is_bare(p, other) && normal(gap).dot(normal(other)) < parameters.opposed && precedes(other, gap);
+    for (size_t begin = 0, end = 0; begin < all_touching_.size(); begin = end) {  // contacts of a pair follow each other
+        const int first = all_touching_[begin], pair = p.gaps[first].pair;
+        while (end < all_touching_.size() && p.gaps[all_touching_[end]].pair == pair) ++end;
+        std::vector<int>& list = of_pair_;
+        list.assign(all_touching_.begin() + begin, all_touching_.begin() + end);
+        const auto differs = [&](int gap) {
+            return is_bare(p, first) || is_bare(p, gap) || normal(first).dot(normal(gap)) < parameters.alike;
         };
-        if (!opposite || is_bare(p, gap) ||
-            std::none_of(all_touching_.begin() + begin, all_touching_.begin() + end, opposes))
-            touching_.push_back(gap);
+        if (pair >= 0 && std::any_of(list.begin(), list.end(), differs)) {
+            std::sort(list.begin(), list.end(), precedes);
+            const auto opposes = [&](int one, int other) {
+                return !is_bare(p, one) && !is_bare(p, other) && normal(one).dot(normal(other)) < parameters.opposed;
+            };
+            size_t kept = 0;
+            for (size_t i = 0; i < list.size(); ++i) {
+                const auto against = [&](int other) { return opposes(list[i], other); };
+                if (std::none_of(list.begin(), list.begin() + kept, against)) list[kept++] = list[i];
+            }
+            list.resize(kept);
+            std::sort(list.begin(), list.end());
+        }
+        touching_.insert(touching_.end(), list.begin(), list.end());
     }
 }
 
@@ -396,7 +398,7 @@ void MoreauContacts::end_velocity() {
         std::fill(modes_.begin(), modes_.end(), unloaded);
     }
     if (n == 0) return;
-    const EndModes rule(v1_, h_ * forces_.row_error());
+    const EndModes rule(v1_);
     const double clear = StepForces::parameters.limit_rounding * f.head(n).cwiseAbs().maxCoeff();
     end.head(n) *= h_;
     for (size_t e = 0, at = 0; e < parts.size(); at += cones[e].dim, ++e) {
@@ -407,11 +409,12 @@ void MoreauContacts::end_velocity() {
         const double limit = cones[e].bound * (head ? f[at] : 1.0);
         const double size = dim == 1 ? std::abs(f[at + head] - part.middle) : f.segment(at + head, dim).norm();
         const double slip = end.segment(at + head, dim).norm();
+        const bool rests = rule.is_rest(slip, h_ * forces_.row_error(static_cast<int>(at), cones[e].dim));
         const bool holds =
             limit - size > clear && (rule.is_stopped(slip) || rule.is_nearer_to_rest(slip, size, limit));
         const bool forward = dim > 1 || (dim > 0 && end[at + head] > 0.0);
         const Block& block = p.blocks[p.frictions[part.element].block];
-        const Mode mode = EndModes::settle(holds || rule.is_rest(slip), forward, block, v1_);
+        const Mode mode = EndModes::settle(holds || rests, forward, block, v1_);
         modes_[part.element] = dim > 0 ? mode : slip_minus;
     }
     forces_.stop_resting_trees(h_, v0_, v1_);

@@ -91,7 +91,7 @@ private:
     VecX q0_;
     GapWatch& watch_;
     std::vector<int> touching_;  // gaps that take part, ascending
-    std::vector<int> all_touching_;
+    std::vector<int> all_touching_, of_pair_;
     std::vector<int> near_edges_;  // gaps of edges and rims with a normal that a step may reach
     StepElements elements_;
     StepForces forces_;

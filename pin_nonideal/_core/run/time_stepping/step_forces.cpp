@@ -14,6 +14,7 @@ StepForces::StepForces(const Program& program, Workspace& workspace, const StepE
 }
 
 void StepForces::pose(const MeanVelocity& mean, double h, const VecX& a_free, bool anew) {
+    if (anew) are_dependent_ = false;
     measure_free(mean, h, a_free);
     const double largest = a_free.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm();
     const auto free = free_rows_.head(static_cast<Eigen::Index>(elements_.rows.size()));
@@ -34,7 +35,6 @@ void StepForces::pose(const MeanVelocity& mean, double h, const VecX& a_free, bo
 
 void StepForces::find_dependent() {
     dry_rows_.clear();
-    are_dependent_ = false;
     if (!elements_.limits_follow_loads(p) || w.now.rows.blocks.empty()) return;
     for (size_t e = 0, at = 0; e < elements_.parts.size(); at += elements_.cones[e].dim, ++e)
         if (elements_.parts[e].gap < 0)
@@ -57,6 +57,7 @@ void StepForces::share_loads(double h, const VecX& v0) {
 }
 
 void StepForces::drop_prevented_slip() {
+    recall_forces();
     const auto W = responses_.matrix(static_cast<int>(elements_.rows.size()));
     std::vector<int> rows;
     for (size_t e = 0, at = 0; e < elements_.parts.size(); at += elements_.cones[e].dim, ++e)
@@ -184,7 +185,10 @@ bool StepForces::solve(double h, const VecX& q0, const VecX& v0) {
                  !add_energy(W, end_rows.head(n), f.head(n));
         error_ = solver_.error();
     }
-    if (starts && !separate_) solved = keep_rest(solved, q0) || solved;
+    if (starts && !separate_ && keep_rest(solved, q0)) {
+        solved = true;
+        error_ = 0.0;
+    }
     f.head(n) += middle_.head(n);
     return solved || (separate_ && trees_.miss().element >= 0 && accept_best_forces(h));
 }
@@ -192,7 +196,10 @@ bool StepForces::solve(double h, const VecX& q0, const VecX& v0) {
 // Hold trees at rest that forces can hold. Return true if all rest.
 bool StepForces::hold_trees(const VecX& q0) {
     trees_.hold(middle_, f);
-    if (!moves()) return true;
+    if (!moves()) {
+        error_ = 0.0;
+        return true;
+    }
     q_without_rest_ = q0;  // the next sweeps and the step after the start skip this check
     return false;
 }
@@ -213,9 +220,9 @@ void StepForces::measure_end() {
     end_rows.head(n).noalias() += responses_.matrix(n) * f.head(n);
 }
 
-double StepForces::row_error() const {
-    const auto n = static_cast<Eigen::Index>(elements_.rows.size());
-    return std::min(error_, parameters.max_residual) * free_rows_.head(n).cwiseAbs().maxCoeff();
+double StepForces::row_error(int at, int dim) const {
+    if (dim == 0) return 0.0;
+    return std::min(error_, parameters.max_residual) * free_rows_.segment(at, dim).cwiseAbs().maxCoeff();
 }
 
 bool StepForces::moves() {

@@ -72,3 +72,15 @@ def test_stiff_bristles_hold_a_load_at_rest(stiffness: float, damping: float, me
     run = pn.simulate(scene, 2.0, method=method, dt=DT)
     assert abs(run.v[-1, 0]) < 1e-6
     assert run.q[-1, 0] == pytest.approx(0.02, abs=1e-4)
+
+
+@pytest.mark.parametrize("coefficient", [0.0, 1e-300])
+def test_laws_of_nothing_change_no_step_before_an_event(coefficient: float) -> None:
+    scene = pn.load("rough_four_bar")
+    joint = scene.model.names[-1]
+    law = pn.SigmoidFriction(joint, coefficient, 1.0)
+    more = scene.replace(laws=[*scene.laws, law])
+    options = {"method": "semi_implicit_euler", "dt": 1e-3}
+    run, again = (pn.simulate(one, 0.5, **options) for one in (scene, more))
+    assert len(run.events) > 2
+    np.testing.assert_allclose(again.q, run.q, rtol=0, atol=1e-11)

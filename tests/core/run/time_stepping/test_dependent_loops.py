@@ -67,3 +67,18 @@ def test_fixed_steps_of_loops_do_not_depend_on_how_a_scene_is_written(
     scene: str, transformation: str, method: str
 ) -> None:
     check(scene, transformation, [f"simulate {method}"])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_records_beside_a_callback_change_no_step(seed: int) -> None:
+    case = ALL["a far contact"].make(symmetric_case(f"ball loop {seed}")).case
+    options = {
+        "method": "moreau",
+        "dt": case.dt,
+        "output_dt": 10.0 * case.dt,
+        "callback": lambda t, q, v: None,
+    }
+    run, recorded = (pn.simulate(case.scene, 0.3, record=record, **options) for record in ((), "forces"))
+    np.testing.assert_array_equal(recorded.q, run.q)
+    np.testing.assert_array_equal(recorded.v, run.v)
+    assert recorded.events == run.events

@@ -203,6 +203,45 @@ def test_samples_without_forces_evaluate_none():
     steps = 100
     brief = pn.simulate(scene, steps * DT, q, v, method="moreau", dt=DT)
     whole = pn.simulate(scene, steps * DT, q, v, method="moreau", dt=DT, record="forces")
-    np.testing.assert_array_equal(brief.q, whole.q)
+    for field in ("q", "v", "modes", "closed", "violation", "violation_rate"):
+        np.testing.assert_array_equal(getattr(brief, field), getattr(whole, field), err_msg=field)
     assert brief.stats.evaluations <= steps + 5
     assert whole.stats.evaluations >= 2 * steps
+
+
+def test_a_falling_ball_shows_its_penetration_whatever_is_recorded():
+    model, geometry = bodies(np.random.default_rng(0), [coal.Sphere(0.1)], gravity=9.81)
+    geometry.addGeometryObject(pn.ground())
+    scene = pn.Scene(model, contacts=pn.ground_contacts(model, geometry, mu=0.3), collision_model=geometry)
+    q = [0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0]
+    runs = [
+        pn.simulate(scene, 0.3, q, method="moreau", dt=DT, output_dt=output_dt, record=record)
+        for output_dt in (None, DT)
+        for record in ((), "forces")
+    ]
+    assert 1e-5 < runs[0].violation.max() < 2.0 * DT
+    assert runs[0].violation_rate.max() < 1e-12
+    for run in runs[1:]:
+        np.testing.assert_array_equal(run.violation, runs[0].violation)
+        np.testing.assert_array_equal(run.violation_rate, runs[0].violation_rate)
+
+
+def test_samples_at_events_record_their_own_accelerations():
+    """A user's event reads the accelerations of each step, whatever the samples record."""
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelRY(), pin.SE3.Identity(), "swing")
+    inertia = pin.Inertia(1.0, np.array([0.5, 0.0, 0.0]), 0.01 * np.eye(3))
+    model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
+    run = pn.simulate(
+        pn.Scene(model),
+        1.0,
+        method="moreau",
+        dt=DT,
+        output_dt=0.2,
+        record=("a", "reactions"),
+        events=lambda t, q, v: q[0] - 1.0,
+    )
+    data = model.createData()
+    exact = [pin.aba(model, data, q, v, np.zeros(1)) for q, v in zip(run.q, run.v, strict=True)]
+    assert len(run.t) == 7
+    np.testing.assert_allclose(run.a, exact, rtol=1e-12)
