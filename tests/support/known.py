@@ -135,4 +135,20 @@ KNOWN: list[Known] = [
         transformations="rows by hand.*",
         functions="simulate (rk4|semi_implicit_euler|moreau)|stepper",
     ),
+    Known(
+        "the time within which bounces accumulate is in seconds",
+        ("touching UserContact", "tonnes, kilometers, hours", "simulate semi_implicit_euler"),
+        scenes="touching (UserContact|JointLimit)",
+        transformations="tonnes, kilometers, hours",
+        functions="simulate semi_implicit_euler",
+        marks=(pytest.mark.slow,),
+    ),
+    Known(
+        "SciPy's Radau takes ten times the steps for driven shafts with a weld",
+        ("driven Cardan 1", "split by a weld", "simulate Radau"),
+        scenes="driven Cardan .*",
+        transformations="split by a weld",
+        functions="simulate Radau",
+        marks=(pytest.mark.slow,),
+    ),
 ]
