@@ -90,8 +90,11 @@ def outcome_fields(compiled: CompiledScene, outcome: core.Outcome, options: Any)
         fields["modes"] = elements.modes(outcome.modes.reshape(nt, elements.count))
 
     def states() -> ContactStates:
-        modes = fields.get("modes", np.zeros((nt, 0), dtype=np.int8))
-        return ContactStates(t, fields["closed"], compiled.contacts.names, modes, elements.names)
+        closed = outcome.closed.reshape(nt, compiled.contacts.count).astype(bool)
+        modes = outcome.modes.reshape(nt, elements.count)
+        return ContactStates(
+            t, compiled.contacts, compiled.point_names, closed, elements, compiled.element_names, modes
+        )
 
     events = [_event(compiled, event, options.event_names) for event in outcome.events]
     fields |= {

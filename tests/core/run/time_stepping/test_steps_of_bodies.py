@@ -245,3 +245,34 @@ def test_samples_at_events_record_their_own_accelerations():
     exact = [pin.aba(model, data, q, v, np.zeros(1)) for q, v in zip(run.q, run.v, strict=True)]
     assert len(run.t) == 7
     np.testing.assert_allclose(run.a, exact, rtol=1e-12)
+
+
+def summary(run):
+    return [(event.kind, event.time, event.element) for event in run.events]
+
+
+@pytest.mark.parametrize("seed", seeds(range(60)))
+def test_sparse_samples_keep_all_events(seed):
+    """Events of a contact follow from those of its points, not from samples."""
+    rng = np.random.default_rng(seed)
+    model, geometry = bodies(rng, [coal.Box(*rng.uniform(0.1, 0.3, 3)) for _ in range(3)], gravity=9.81)
+    geometry.addGeometryObject(pn.ground())
+    pairs = [("body0", "body1"), ("body1", "body2")]
+    contacts = pn.ground_contacts(model, geometry, mu=0.4) + [
+        pn.GeometryContact(*pair, mu=0.4) for pair in pairs
+    ]
+    scene = pn.Scene(model, contacts=contacts, collision_model=geometry)
+    q = np.concatenate(
+        [
+            [0.02 * k, 0.0, 0.25 + 0.4 * k, *pin.Quaternion(pin.exp3(0.3 * rng.normal(size=3))).coeffs()]
+            for k in range(3)
+        ]
+    )
+    v = rng.normal(size=18)
+    dense, sparse = (
+        pn.simulate(scene, 512 * DT, q, v, method="moreau", dt=DT, output_dt=output_dt)
+        for output_dt in (None, 64 * DT)
+    )
+    np.testing.assert_array_equal(sparse.q[-1], dense.q[-1])
+    assert len(dense.events) > 1
+    assert summary(sparse) == summary(dense)
