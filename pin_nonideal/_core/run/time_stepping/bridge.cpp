@@ -61,8 +61,8 @@ bool TimeStepping::rests() const {
     return is_autonomous_ && (system_.velocity(progress_.y).array() == 0.0).all() && is_immobile(p, w);
 }
 
-// Check if the step's end is a sample or the end of the run, or if slip without contacts needs accelerations and forces
-// there. Slip needs them if its direction or limit depends on them.
+// Check if accelerations and forces are due at the step's end: at a sample, at the end of the run, or for slip without
+// contacts. Slip needs them if its direction or limit depends on them.
 bool TimeStepping::needs_forces(double end, double t_end) const {
     if (samples_every_step_ || end >= t_end || end >= options_.end() || output_.next() <= end + rounding_)
         return true;
