@@ -19,16 +19,13 @@
 namespace pn {
 
 MoreauContacts::MoreauContacts(System& system, GapWatch& watch)
-    : system_(system), p(system.p), w(system.w), mean_(p), drives_(p), flight_(p, drives_), watch_(watch),
+    : system_(system), p(system.p), w(system.w), mean_(p), drives_(p), flight_(p, drives_), opposed_(p), watch_(watch),
       elements_(p), forces_(p, w, elements_), was_closed_(system.ng, 0), closed_(system.ng, 0), open_(system.ng, 0),
       modes_(system.ne, unloaded), unloaded_(modes_), q_mid_(VecX::Zero(system.nq)), v0_(VecX::Zero(system.nv)), v1_(v0_),
       a_free_(v0_), power_(VecX::Zero(system.nw)), projection_(system.p), force_(v0_) {
     projection_.energy = system.energy;
     if (system.ng == 0) return;
-    for (const Gap& gap : p.gaps) {
-        rounded_by_.push_back(rounded_by(p.blocks[gap.block].kind));
-        between_lines_.push_back(is_between_lines(p.blocks[gap.block].kind));
-    }
+    for (const Gap& gap : p.gaps) rounded_by_.push_back(rounded_by(p.blocks[gap.block].kind));
     rounded_ = std::any_of(rounded_by_.begin(), rounded_by_.end(), [](double r) { return r < HUGE_VAL; });
     lam_free_ = VecX::Zero(p.layout.rows);
     touching_.reserve(system.ng);
@@ -214,49 +211,6 @@ void MoreauContacts::find_loaded() {
     std::sort(loaded_.begin(), loaded_.end());
 }
 
-// Skip contacts that would push the other way than another contact of the same pair. All contacts of two convex shapes push
-// apart in about one direction. An edge that meets the other shape from inside pushes the other way, and so does a corner
-// at the far side of a shape of equal width. A face is right, else a contact that was closed before, else the one that
-// approaches faster.
-void MoreauContacts::drop_opposed() {
-    const auto normal = [&](int gap) {
-        const Block& block = p.blocks[p.gaps[gap].block];
-        const Vec3& n = w.now.values[p.gaps[gap].block].wrench[block.kept[0]].force;
-        return block.joint1 < block.joint2 ? n : -n;
-    };
-    const auto precedes = [&](int other, int gap) {
-        if (between_lines_[other] != between_lines_[gap]) return !between_lines_[other];
-        if (was_closed_[other] != was_closed_[gap]) return was_closed_[other] != 0;
-        const double rate = gap_rate(p, w, gap), its = gap_rate(p, w, other);
-        return its < rate || (its == rate && other < gap);
-    };
-    all_touching_ = touching_;
-    touching_.clear();
-    for (size_t begin = 0, end = 0; begin < all_touching_.size(); begin = end) {  // contacts of a pair follow each other
-        const int first = all_touching_[begin], pair = p.gaps[first].pair;
-        while (end < all_touching_.size() && p.gaps[all_touching_[end]].pair == pair) ++end;
-        std::vector<int>& list = of_pair_;
-        list.assign(all_touching_.begin() + begin, all_touching_.begin() + end);
-        const auto differs = [&](int gap) {
-            return is_bare(p, first) || is_bare(p, gap) || normal(first).dot(normal(gap)) < parameters.alike;
-        };
-        if (pair >= 0 && std::any_of(list.begin(), list.end(), differs)) {
-            std::sort(list.begin(), list.end(), precedes);
-            const auto opposes = [&](int one, int other) {
-                return !is_bare(p, one) && !is_bare(p, other) && normal(one).dot(normal(other)) < parameters.opposed;
-            };
-            size_t kept = 0;
-            for (size_t i = 0; i < list.size(); ++i) {
-                const auto against = [&](int other) { return opposes(list[i], other); };
-                if (std::none_of(list.begin(), list.begin() + kept, against)) list[kept++] = list[i];
-            }
-            list.resize(kept);
-            std::sort(list.begin(), list.end());
-        }
-        touching_.insert(touching_.end(), list.begin(), list.end());
-    }
-}
-
 // Find the contacts whose gap is closed at the step's middle, and contacts that were closed before. Their loads decide
 // if they stay closed.
 void MoreauContacts::find_touching(double t) {
@@ -275,7 +229,7 @@ void MoreauContacts::find_touching(double t) {
         for (int e : p.gaps[i].elements) evaluate_block(p, w, t, mean_.start(), p.frictions[e].block);
     }
     if (touching_.size() > 1) {
-        drop_opposed();
+        opposed_.drop(p, w, was_closed_, touching_);
         remove_coincident(p, w, touching_, [&](int i, int other) { return was_closed_[i] && !was_closed_[other]; });
     }
 }

@@ -11,6 +11,7 @@
 #include "run/time_stepping/free_flight.hpp"
 #include "run/integrators/joint_drives.hpp"
 #include "run/time_stepping/mean_velocity.hpp"
+#include "run/time_stepping/opposed_contacts.hpp"
 #include "run/time_stepping/step_forces.hpp"
 
 namespace pn {
@@ -19,8 +20,6 @@ struct MoreauContactsParameters {
     double width_rounding = 1e-12;  // uncertainty of a gap at rest, relative to the scene's size
     // Maximum penetration of edges and rims with a defined normal, relative to their rounding.
     double nearly_all = 0.999;
-    double opposed = -0.7;  // cosine below which the normals of two contacts of one pair are opposite
-    double alike = 0.4;     // cosine to one normal above which no two normals are opposite
 };
 
 class MoreauContacts {
@@ -76,7 +75,6 @@ private:
     void solve(double t);
     void apply();
     void find_loaded();
-    void drop_opposed();
     void keep_percussions();
     void end_velocity();
     void book_work(VecX& y, double& numerical_energy, double& impact_energy);
@@ -87,18 +85,17 @@ private:
     MeanVelocity mean_;
     JointDrives drives_;
     FreeFlight flight_;
+    OpposedContacts opposed_;
     double h_ = 0.0, t0_ = 0.0;  // length and start of the step
     VecX q0_;
     GapWatch& watch_;
     std::vector<int> touching_;  // gaps that take part, ascending
-    std::vector<int> all_touching_, of_pair_;
     std::vector<int> near_edges_;  // gaps of edges and rims with a normal that a step may reach
     StepElements elements_;
     StepForces forces_;
     std::vector<char> was_closed_, closed_, open_;
     std::vector<Mode> modes_, unloaded_;
     std::vector<double> rounded_by_;   // rounding of each gap
-    std::vector<char> between_lines_;  // true for each gap between edges or rims
     bool rounded_ = false;             // a gap has rounding
     bool had_contacts_ = false;  // the last step had a closed contact or an active element
     bool has_unknown_percussions_ = true;  // other rows than these may have percussions

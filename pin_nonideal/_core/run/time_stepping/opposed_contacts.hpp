@@ -1,0 +1,34 @@
+// Contacts of a pair of convex shapes that would push against each other in a time step.
+//
+// All contacts of two convex shapes push apart in about one direction. An edge that meets the other shape from inside pushes
+// the other way, and so does a corner at the far side of a shape of equal width.
+#pragma once
+
+#include <vector>
+
+#include "dynamics/workspace.hpp"
+
+namespace pn {
+
+struct OpposedContactsParameters {
+    double opposed = -0.7;  // cosine below which the normals of two contacts of one pair are opposite
+    double alike = 0.4;     // cosine to one normal above which no two normals are opposite
+};
+
+class OpposedContacts {
+public:
+    using Parameters = OpposedContactsParameters;
+    static constexpr Parameters parameters{};
+
+    explicit OpposedContacts(const Program& p);
+
+    // Remove contacts that push against others of their pair from the ascending list `touching`. A face is right, else a
+    // contact that was closed before, else the one that approaches faster. The contacts must be evaluated.
+    void drop(const Program& p, const Workspace& w, const std::vector<char>& was_closed, std::vector<int>& touching);
+
+private:
+    std::vector<char> between_lines_;  // true for each gap between edges or rims
+    std::vector<int> all_, of_pair_;
+};
+
+}  // namespace pn
