@@ -15,6 +15,10 @@ Vec3 slip_velocity(const Evaluation& now, const Friction& f) {
     return u;
 }
 
+Vec3 bearing_axis(const Terms& terms, const Friction& f) {
+    return f.axis_dof >= 0 ? terms.J[f.axis_dof].ang : terms.body[f.joint].R * f.axis;
+}
+
 static PN_INLINE LoadVectors vectors_of_load(const Program& p, Workspace& w, const Friction& f) {
     using Load = Friction::Load;
     const Vec3 none = Vec3::Zero();
@@ -27,19 +31,13 @@ static PN_INLINE LoadVectors vectors_of_load(const Program& p, Workspace& w, con
     Vec3 axis;
     if (f.joint > 0) {
         r = joint_wrench(p, w, f.joint);
-        axis = f.axis_dof >= 0 ? w.now.terms.J[f.axis_dof].ang : w.now.terms.body[f.joint].R * f.axis;
+        axis = bearing_axis(w.now.terms, f);
     } else {
         r = anchor_wrench(p, w, f.anchor);
         const Frame& frame = *frames(p.blocks[f.anchor].kind).first;
         axis = w.now.terms.body[frame.joint].R * (frame.R * f.axis);
     }
-    const double rub = f.mu * f.radius;
-    if (f.load == Load::spherical) return {rub * r.lin, none, none};
-    const Vec3 axial = r.lin.dot(axis) * axis, radial = r.lin - axial;
-    if (f.load == Load::prismatic) return {f.mu * radial, f.mu * f.inverse_span * r.ang, none};
-    const Vec3 bending = r.ang - r.ang.dot(axis) * axis;
-    if (f.load == Load::planar) return {f.mu * axial, f.mu * f.inverse_span * bending, none};
-    return {rub * radial, rub * f.inverse_span * bending, f.mu * f.axial_radius * axial};
+    return BearingLoad(f, axis, r).vectors;
 }
 
 LoadVectors load_vectors(const Program& p, Workspace& w, const Friction& f) { return vectors_of_load(p, w, f); }
@@ -157,8 +155,7 @@ void reset_slip_directions(Workspace& w) {
     std::fill(w.state.slip_direction.begin(), w.state.slip_direction.end(), Vec3::Zero());
 }
 
-// Unit direction of the friction force of a slipping element.
-static Vec3 force_direction(const Program& p, Workspace& w, int e) {
+Vec3 force_direction(const Program& p, Workspace& w, int e) {
     const Friction& f = p.frictions[e];
     if (f.dim == 1) return Vec3(-w.state.mode[e], 0.0, 0.0);
     if (w.state.solves_directions) return -w.state.last_direction[e];

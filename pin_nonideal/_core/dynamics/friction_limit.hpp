@@ -1,10 +1,10 @@
 // Friction elements in the current motion: slip, load, friction limit and force.
 #pragma once
 
-#include <array>
 #include <utility>
 
 #include "dynamics/workspace.hpp"
+#include "forces/bearing_load.hpp"
 
 namespace pn {
 
@@ -20,9 +20,9 @@ double slip_rate_along_mode(const Program& p, Workspace& w, int element);
 std::pair<double, double> slip_toward_rest(const Program& p, Workspace& w, int element);
 // Friction limit under a load at the current slip speed. A sticking element has slip speed zero.
 double limit_under(const Program& p, const Workspace& w, int element, double load);
-// Load vectors of an element in the current motion, linear in the reactions. The lengths of these vectors add up to the
-// load-dependent part of the limit. Vectors that a bearing type does not use are zero, and all are zero for a user's limit.
-using LoadVectors = std::array<Vec3, 3>;
+// Axis of an element that bears the load of a tree joint.
+Vec3 bearing_axis(const Terms& terms, const Friction& f);
+// Load vectors of an element in the current motion, linear in the reactions. All are zero for a user's limit.
 LoadVectors load_vectors(const Program& p, Workspace& w, const Friction& f);
 // Friction limits of an element at rest due to its load, without the static ratio, for the motion in the workspace.
 SlipLimits load_limits(const Program& p, Workspace& w, const Friction& f, double t, const VecX& q, const VecX& v);
@@ -48,6 +48,8 @@ HoldingForce holding_force(const Program& p, Workspace& w, int element, double t
 bool shares_hold(const Program& p, Workspace& w, const std::vector<int>& list, double t, const VecX& q, const VecX& v);
 // Nearest bound of the friction force of a sticking element, limit of a slipping element, zero without load.
 double current_limit(const Program& p, Workspace& w, int element, double t, const VecX& q, const VecX& v);
+// Unit direction of the friction force of a slipping element.
+Vec3 force_direction(const Program& p, Workspace& w, int element);
 // Add the force of a slipping element, for the limit in the workspace, to a generalized force. add_slip_forces adds the
 // forces of all slipping elements, with (`load_dependent`) or without a load from reactions.
 void add_slip_force(const Program& p, Workspace& w, int element, VecX& C);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "dynamics/loaded_trees.hpp"
 #include "dynamics/reactions.hpp"
 #include "dynamics/acceleration.hpp"
 #include "dynamics/force_decomposition.hpp"
@@ -25,21 +26,29 @@ struct Implicit : Unknowns {
                                          : 1);
     }
 
-    // Check if the equation contracts near its solution y. If so, restore the motion of y.
-    bool contracts(const VecX& y) {
-        ReactionEquation& arrays = w.scratch.equation;
-        const FrozenZeroLoads frozen(p, w);
-        equation(y, arrays);
-        if (!arrays.finite()) throw Failure(Failure::Kind::not_finite, t);
-        arrays.steepest(w.scratch.jacobian);
-        const double bound = spectral_bound(w.scratch.jacobian);
+    // Check if the equation contracts for any limits, which proves that its solution y is unique. The motion in the workspace
+    // stays that of y.
+    bool contracts(const VecX& y, bool by_trees) {
+        MatX& L = w.scratch.jacobian;
+        if (by_trees) bound_loads_of_trees(*this, L);
+        else bound_loads(y, L);
+        const double bound = spectral_bound(L);
         if (!(bound < 1.0 - uniqueness_parameters.min_determinant)) return false;
         w.state.spectral_bound = bound;
         w.state.steps_since = 0;
         w.state.unique = shares_contact_loads(p, w) ? Uniqueness::not_shown : Uniqueness::shown;
+        if (by_trees) return true;
         set(y);
         motion();
         return true;
+    }
+
+    void bound_loads(const VecX& y, MatX& L) {
+        ReactionEquation& arrays = w.scratch.equation;
+        const FrozenZeroLoads frozen(p, w);
+        equation(y, arrays);
+        if (!arrays.finite()) throw Failure(Failure::Kind::not_finite, t);
+        arrays.steepest(L);
     }
 
     // Solve for one zero-load set after the other until a solution is consistent with its own set. Other sets are searched
@@ -141,6 +150,16 @@ struct Implicit : Unknowns {
         throw Failure(Failure::Kind::paradox, t, elements(), w.now.determinant);
     }
 
+    // Solve trees without rows in O(n). Return false, with the previous guess, if this does not converge.
+    bool solve_trees() {
+        if (!bearings || !are_limits_of_trees(*this)) return false;
+        VecX &y = w.scratch.unknown, &before = w.scratch.before;
+        before = y;
+        if (solve_loaded_trees(*this, y)) return true;
+        y = before;
+        return false;
+    }
+
     // Iterate the fixed point from the previous solution. Return false if it contracts slowly.
     bool iterate() {
         VecX &y = w.scratch.unknown, &g = w.scratch.image;
@@ -186,7 +205,8 @@ struct Implicit : Unknowns {
         if (w.state.warm)
             exchange([&](int k, int place, int count) { y.segment(k, count) = kept.segment(place, count); });
         w.state.warm = false;  // the state after a failure is no initial guess
-        if (!iterate() || (bearings && is_due() && !contracts(y))) {
+        const bool by_trees = solve_trees();
+        if (!(by_trees || iterate()) || (bearings && is_due() && !contracts(y, by_trees))) {
             VecX& solution = w.scratch.solution;
             solution = y.head(n);
             if (bearings && shares_contact_loads(p, w)) solve_zero_load_sets(solution);

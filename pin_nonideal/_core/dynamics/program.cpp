@@ -136,6 +136,21 @@ static void find_tied_to_drives(Program& p) {
     }
 }
 
+// Check if each element that reads the reaction to its own force acts on dofs of the tree joint whose load it bears.
+static bool loads_are_of_trees(const Program& p) {
+    if (p.mechanism.provider != Provider::core) return false;
+    for (const Friction& f : p.frictions) {
+        if (f.reaction != Reaction::total) continue;
+        const int dof = p.blocks[f.block].dof;
+        if (f.load == Friction::Load::user || f.joint <= 0 || dof < 0 || p.mechanism.dof_joint[dof] != f.joint) return false;
+    }
+    bool reads = false, pushes_bodies = false;
+    each_law<UserLaw>(p.laws, [&](const UserLaw& law) { reads |= law.reaction == Reaction::total; });
+    each_law<Drag>(p.laws, [&](const Drag&) { pushes_bodies = true; });
+    each_law<Viscous>(p.laws, [&](const Viscous& law) { pushes_bodies |= law.block >= 0 && p.blocks[law.block].dof < 0; });
+    return !reads && (p.mechanism.deep_dofs.empty() || !pushes_bodies);
+}
+
 void Program::finish() {
     int row = 0;
     entries = 0;
@@ -186,6 +201,7 @@ void Program::finish() {
     // Group laws by kind, so that the order of their descriptions does not affect rounding.
     std::stable_sort(laws.begin(), laws.end(), [](const Law& a, const Law& b) { return a.index() < b.index(); });
     each_law<UserLaw>(laws, [&](const UserLaw& law) { needs_reactions |= law.reaction != Reaction::none; });
+    loads_are_of_trees = pn::loads_are_of_trees(*this);
     bool by_differences = false;
     for (int i = 0; i < constraints; ++i) {
         moves_in_time |= pn::moves_in_time(blocks[i].kind);

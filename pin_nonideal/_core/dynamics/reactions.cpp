@@ -144,6 +144,14 @@ PullMargin contact_pull_margin(const Program& p, Workspace& w, int contact) {
     return press(p.blocks, w.now.B, p.described, p.pressing, w.now.rows, shared, contact);
 }
 
+void sum_subtree_forces(const Program& p, Workspace& w, std::vector<Force>& body) {
+    gather_body_forces(p, w, body);
+    for (size_t i = body.size(); i-- > 1;) {
+        const Joint& j = p.mechanism.joints[i];
+        if (!j.deep && j.parent != 0) body[j.parent] += body[i];
+    }
+}
+
 Force joint_wrench(const Program& p, Workspace& w, int joint) {
     reactions(p, w);
     Reactions& r = w.now.reactions;

@@ -71,6 +71,10 @@ private:
 double normal_force(const Program& p, Workspace& w, int contact);
 PullMargin contact_pull_margin(const Program& p, Workspace& w, int contact);
 
+// Sums of the forces on the bodies of each subtree whose bodies share a reference point, except those that act inside tree
+// joints. No row may be in use.
+void sum_subtree_forces(const Program& p, Workspace& w, std::vector<Force>& body);
+
 // Wrench of a joint on its child body, [force; moment about the joint's origin], world axes. anchor_wrench: wrench of
 // an anchor on the body of frame 1, about the anchor's point.
 Force joint_wrench(const Program& p, Workspace& w, int joint);

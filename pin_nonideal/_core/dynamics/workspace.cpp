@@ -67,6 +67,7 @@ static void size(const Program& p, const Evaluation& now, Scratch& scratch) {
     scratch.position_lam_steps.assign(max_projection_iterations, scratch.position_lam);
     scratch.ideal_locked.assign(nv, 0);
     scratch.unknown = scratch.image = scratch.shifted = VecX::Zero(p.unknowns());
+    if (p.loads_are_of_trees) scratch.loaded.sweep.resize(p.mechanism);
     scratch.subtree_force = scratch.body_inertia = scratch.body_residual = now.body_force;
     scratch.law_force.assign(p.law_names.size(), VecX::Zero(nv));
     MotionForces& forces = scratch.forces;

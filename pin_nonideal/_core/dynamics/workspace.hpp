@@ -14,6 +14,7 @@
 #include "complementarity/fixed_point/equation.hpp"
 #include "math/bytes.hpp"
 #include "math/tolerances.hpp"
+#include "tree/oblique_sweep.hpp"
 
 namespace pn {
 
@@ -141,6 +142,23 @@ struct Evaluation {
     void renew() { reactions.current = has_holding = false; }
 };
 
+// Friction that follows the loads of tree joints, linearized (dynamics/loaded_trees.hpp).
+struct LoadedJoint {
+    const Friction* friction = nullptr;
+    int joint = 0, dof = 0;
+    double factor = 1.0;  // limit per load
+    Vec3 axis, along;     // axis of the bearing, and direction of the friction force
+    Force wrench;         // wrench of the joint about its origin
+    Force beyond;         // part of the wrench that the reaction of the sweep does not contain, about the body's reference
+    Motion gradient;      // derivative of the load by the wrench about the body's reference
+    double rest = 0.0;    // load minus the gradient times the reaction of the sweep
+};
+struct LoadedJoints {
+    std::vector<LoadedJoint> elements;
+    ObliqueSweep sweep;
+    VecX known, x;  // generalized forces that read no reaction to themselves, and forces or accelerations of the sweep
+};
+
 struct Scratch {
     VecX scaled, scaled_free, trial, work, r, residual, lam_step;
     std::vector<char> ideal_locked;
@@ -150,6 +168,7 @@ struct Scratch {
     std::vector<VecX> position_lam_steps;
     VecX unknown, image, shifted;  // implicit reaction equation
     VecX before, solution;
+    LoadedJoints loaded;           // friction that follows the loads of tree joints (dynamics/loaded_trees.hpp)
     ReactionEquation equation;
     ReactionNewton newton;
     MatX jacobian;
