@@ -140,11 +140,23 @@ void BoxProgram::descend(const MatX& W, const VecX& alpha0, const VecX& s) {
     }
 }
 
-// Block principal pivoting, with single pivots (largest index) once it makes no progress. Return false if the free
-// elements cannot all stick, or if pivoting does not end.
+// Sweeps over the elements: each takes the best force within its limits for the forces of the others. The elements at their
+// limits after a few sweeps are a better set to pivot from than the ones among which pivoting makes no progress.
+void BoxProgram::relax(const MatX& W, const VecX& alpha0, const VecX& s) {
+    const int n = static_cast<int>(s.size());
+    f_ = f_.cwiseMin(s).cwiseMax(-s);
+    for (int sweep = 0; sweep < parameters.relaxing_sweeps; ++sweep)
+        for (int i = 0; i < n; ++i)
+            if (W(i, i) > 0.0)
+                f_[i] = std::clamp(f_[i] - (alpha0[i] + W.col(i).dot(f_)) / W(i, i), -s[i], s[i]);
+    for (int i = 0; i < n; ++i) is_free_[i] = std::abs(f_[i]) < s[i];
+}
+
+// Block principal pivoting. Once it makes no progress, it starts again from relaxed forces, and at last pivots one element
+// (largest index). Return false if the free elements cannot all stick, or if pivoting does not end.
 bool BoxProgram::pivot_blocks(const MatX& W, const VecX& alpha0, const VecX& s) {
     const int n = static_cast<int>(s.size());
-    int fewest = n + 1, patience = parameters.max_stalled_rounds;
+    int fewest = n + 1, patience = parameters.max_stalled_rounds, relaxations = parameters.max_relaxations;
     for (int it = 0; it < 200 + 50 * n; ++it) {
         for (int i = 0; i < n; ++i)
             if (is_free_[i]) f_[i] = 0.0;
@@ -167,7 +179,12 @@ bool BoxProgram::pivot_blocks(const MatX& W, const VecX& alpha0, const VecX& s) 
         if (static_cast<int>(wrong_.size()) < fewest) {
             fewest = static_cast<int>(wrong_.size());
             patience = parameters.max_stalled_rounds;
-        } else if (--patience < 0) {
+        } else if (--patience < 0 && relaxations-- > 0) {
+            relax(W, alpha0, s);
+            fewest = n + 1;
+            patience = parameters.max_stalled_rounds;
+            continue;
+        } else if (patience < 0) {
             wrong_.assign(1, wrong_.back());
         }
         for (int i : wrong_) {

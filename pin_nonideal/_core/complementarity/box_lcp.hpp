@@ -20,6 +20,8 @@ struct BoxLcpParameters {
     // orthogonal one.
     double min_pivot = 1e-3;
     int max_stalled_rounds = 10;  // rounds of block pivoting without progress
+    int relaxing_sweeps = 20;     // sweeps over the elements before block pivoting starts again
+    int max_relaxations = 3;      // maximum number of such starts
 };
 
 // Solver with persistent buffers: a program no larger than an earlier one allocates no memory.
@@ -37,6 +39,7 @@ public:
 
 private:
     void start(const VecX& s, const VecX* initial);
+    void relax(const MatX& W, const VecX& alpha0, const VecX& s);
     bool pivot_blocks(const MatX& W, const VecX& alpha0, const VecX& s);
     void descend(const MatX& W, const VecX& alpha0, const VecX& s);
     void solve_free(const MatX& W);

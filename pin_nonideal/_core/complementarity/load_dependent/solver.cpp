@@ -144,19 +144,52 @@ void rest_residual(const RestEquation& equation, const VecX& x, VecX& residual, 
     }
 }
 
+// Rounding of the residual of rest.
+double rest_rounding(const RestEquation& equation, const VecX& x) {
+    VecX alpha;
+    FrictionLimits limits;
+    equation.respond(x, alpha, limits);
+    return load_dependent_parameters.limit_rounding * largest_force_scale(equation, x, limits);
+}
+
+enum class Holding { holds, slips, undecided };
+
+// Zero accelerations determine the forces unless elements are redundant. Newton's method finds these forces, and their limits
+// decide. On return from an undecided search x is unchanged.
+Holding hold_by_unique_forces(const RestEquation& equation, VecX& x) {
+    const int n = equation.n;
+    VecX there = x, residual, step;
+    MatX J;
+    LU lu;
+    for (int it = 0; it < load_dependent_parameters.max_newton; ++it) {
+        rest_residual(equation, there, residual, J);
+        const double allowed = rest_rounding(equation, there);
+        const bool accelerates = !(residual.head(n).cwiseAbs().maxCoeff() <= allowed);
+        if (!accelerates && it > 0) {
+            x = there;
+            return residual.tail(n).cwiseAbs().maxCoeff() <= allowed ? Holding::holds : Holding::slips;
+        }
+        lu.compute(J.topRows(n));
+        if (!(lu.reciprocal_condition() > response_rank_threshold)) return Holding::undecided;
+        lu.solve(residual.head(n), step);
+        there -= step;
+        if (!there.allFinite()) return Holding::undecided;
+    }
+    return Holding::undecided;
+}
+
 }  // namespace
 
-// Gauss-Newton method. If limits are linear in the forces (contacts), the residual is convex.
+// Forces of redundant elements are found by the Gauss-Newton method. If limits are linear in the forces (contacts), the
+// residual is convex.
 bool hold_at_rest(const RestEquation& equation, VecX& x) {
+    const Holding holding = hold_by_unique_forces(equation, x);
+    if (holding != Holding::undecided) return holding == Holding::holds;
     VecX residual, there, ahead;
     MatX J, J_there;
     rest_residual(equation, x, residual, J);
     for (int it = 0; it < load_dependent_parameters.max_newton; ++it) {
-        VecX alpha;
-        FrictionLimits limits;
-        equation.respond(x, alpha, limits);
-        const double allowed = load_dependent_parameters.limit_rounding * largest_force_scale(equation, x, limits);
-        if (residual.cwiseAbs().maxCoeff() <= allowed) return true;
+        if (residual.cwiseAbs().maxCoeff() <= rest_rounding(equation, x)) return true;
         const VecX step = least_squares(J, residual, response_rank_threshold);
         const double now = residual.norm();
         double length = 1.0;
