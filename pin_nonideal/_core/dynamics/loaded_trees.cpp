@@ -147,7 +147,8 @@ struct LoadedTrees {
         int k = 0;
         u.each([&](size_t e) {
             const LoadedJoint& element = loaded.elements[k++];
-            w.now.load[e] = element.friction->constant + dot(element.gradient, loaded.sweep.reaction[element.joint]) + element.rest;
+            const double load = dot(element.gradient, loaded.sweep.reaction[element.joint]) + element.rest;
+            w.now.load[e] = element.friction->constant + load;
         }, [](const UserLaw&) {});
         if (shallow) return u.motion();
         w.now.C = w.now.base_C;

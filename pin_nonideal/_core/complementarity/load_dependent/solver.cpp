@@ -154,8 +154,8 @@ double rest_rounding(const RestEquation& equation, const VecX& x) {
 
 enum class Holding { holds, slips, undecided };
 
-// Zero accelerations determine the forces unless elements are redundant. Newton's method finds these forces, and their limits
-// decide. On return from an undecided search x is unchanged.
+// Zero accelerations determine the forces unless elements are redundant. Newton's method finds these forces, and their
+// limits decide. On return from an undecided search x is unchanged.
 Holding hold_by_unique_forces(const RestEquation& equation, VecX& x) {
     const int n = equation.n;
     VecX there = x, residual, step;

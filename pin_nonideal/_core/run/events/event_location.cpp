@@ -141,6 +141,8 @@ void EventLocator::correct_instant(const Crossing& crossing, double full) {
         correct_end_to(next);
         size = next;
         margin = margin_at_end(watch);
+        const bool is_rounding = it > 0 && std::abs(margin) > parameters.margin_ratio * std::abs(before);
+        if (is_rounding && std::abs(change) < parameters.settled_part * size) return;
         if (const double secant = (margin - before) / change; secant < 0.0) rate = secant;
     }
 }

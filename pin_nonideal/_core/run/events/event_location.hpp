@@ -35,10 +35,13 @@ struct EventLocationParameters {
     int max_closed_before = 4;
     // Corrections of the instant that end its location: relative to the time, and relative to the step.
     double time_rounding = 2e-16, end_tolerance = 1e-13;
-    // Maximum move of the step's end along the rate there, relative to the step. Longer moves repeat the step. A move
-    // neglects half of its square times the change of the rate per step. A flight can be a millionth of the tried step,
-    // and a move over all of it would neglect the fall.
-    double moved_part = 1e-6;
+    // Maximum move of the step's end along the rate there and its mean change, relative to the step. Longer moves repeat the
+    // step. A move neglects a quarter of its square times the second difference of the rate in the step. A flight can be
+    // a millionth of the tried step, and a move over all of it would neglect the fall.
+    double moved_part = 1e-5;
+    // Ratio of margins of two passes from which the margin is rounding, if the instant moves by less than `settled_part` of
+    // the step. Newton's method reduces other margins faster.
+    double margin_ratio = 0.25, settled_part = 1e-5;
 };
 
 class EventLocator {

@@ -70,8 +70,8 @@ void Stepper::end_at(double size) {
 }
 
 void Stepper::move_end(double dt) {
+    y1 += dt * end_rate() + 0.5 * dt * (dt / h) * (end_rate() - start_rate());
     h += dt;
-    y1 += dt * end_rate();
     system_.normalize(y1);
     has_interpolant_ = false;
 }
