@@ -9,15 +9,13 @@
 namespace pn {
 
 struct LoadSharing {
-    // Rows for which the matrices hold: entries of B of the blocks in use, and flags.
-    std::vector<double> entries;
-    std::vector<char> active, required;
-    bool orthogonal = false;
+    long factorization = 0;              // RowSystem::factorization for which the matrices hold
+    std::vector<char> active, required;  // rows for which they hold
 
     std::vector<int> dependent;  // required rows that depend on the active rows
     MatX W;                      // their coefficients: A_dependent = W A_active
     MatX taken;                  // multipliers of minimum norm of the dependent rows, per multiplier of the rows in use
-    MatX free;                   // basis of multipliers that exert no force, computed at first use
+    MatX free;                   // basis of multipliers that exert no force by position, computed at first use
     bool has_free = false;
 };
 

@@ -93,15 +93,9 @@ static std::pair<VecX, VecX> inverse_weights(const DescribedRows& all, const std
 static LoadSharing& load_sharing(const std::vector<Block>& blocks, const std::vector<double>& B, const DescribedRows& all,
                                  RowSystem& s) {
     LoadSharing& sharing = s.sharing;
-    std::vector<double> entries;
-    for (int i : s.blocks) {
-        const auto first = B.begin() + blocks[i].offset;
-        entries.insert(entries.end(), first, first + blocks[i].support.size() * blocks[i].kept.size());
-    }
-    if (sharing.orthogonal == s.orthogonal && sharing.active == s.active && sharing.required == s.required &&
-        sharing.entries == entries)
+    if (sharing.factorization == s.factorization && sharing.active == s.active && sharing.required == s.required)
         return sharing;
-    sharing = {std::move(entries), s.active, s.required, s.orthogonal, dependent_rows(s), {}, {}, {}};
+    sharing = {s.factorization, s.active, s.required, dependent_rows(s), {}, {}, {}, false};
     const std::vector<int>& rows = s.envelope.row_at;
     sharing.W = dependence(blocks, B, s, sharing.dependent);
     // With weights g and x + W^T y = lam, sum(x^2/g) + sum(y^2/g) is minimal if (1/g + W (1/g) W^T) y = W (1/g) lam.
@@ -127,23 +121,41 @@ void share_multipliers(const std::vector<Block>& blocks, const std::vector<doubl
     for (size_t k = 0; k < sharing.dependent.size(); ++k) shared[sharing.dependent[k]] = y[k];
 }
 
-const MatX& free_multipliers(const std::vector<Block>& blocks, const std::vector<double>& B,
-                             const DescribedRows& all, RowSystem& s) {
+FreeMultipliers free_multipliers(const std::vector<Block>& blocks, const std::vector<double>& B, const DescribedRows& all,
+                                 RowSystem& s) {
     LoadSharing& sharing = load_sharing(blocks, B, all, s);
-    if (sharing.has_free) return sharing.free;
+    const FreeMultipliers free(s.envelope, sharing.free);
+    if (sharing.has_free) return free;
     sharing.has_free = true;
-    const std::vector<int>& rows = s.envelope.row_at;
-    const VecX inverse = inverse_weights(all, rows, sharing).first;
+    const VecX inverse = inverse_weights(all, s.envelope.row_at, sharing).first;
     MatX used = -sharing.W.transpose();
     for (size_t k = 0; k < sharing.dependent.size(); ++k)
         used(s.envelope.position[sharing.dependent[k]], static_cast<Eigen::Index>(k)) = 1.0;
     const MatX S = used.transpose() * inverse.asDiagonal() * used;
     Cholesky factor;
     factor.compute(S);
-    used = factor.solve_lower(used.transpose()).transpose();
-    sharing.free = MatX::Zero(s.scale.size(), used.cols());
-    for (size_t l = 0; l < rows.size(); ++l) sharing.free.row(rows[l]) = used.row(static_cast<Eigen::Index>(l));
-    return sharing.free;
+    sharing.free = factor.solve_lower(used.transpose()).transpose();
+    return free;
+}
+
+VecX FreeMultipliers::of_row(int row) const {
+    if (!is_used(row)) return VecX::Zero(count());
+    return basis_.row(envelope_.position[row]).transpose();
+}
+
+double FreeMultipliers::norm_of_row(int row) const {
+    return is_used(row) ? basis_.row(envelope_.position[row]).norm() : 0.0;
+}
+
+void FreeMultipliers::add(const VecX& z, VecX& lam) const {
+    const VecX sum = basis_ * z;
+    for (int l = 0; l < envelope_.size(); ++l) lam[envelope_.row_at[l]] += sum[l];
+}
+
+std::vector<int> FreeMultipliers::rows() const {
+    std::vector<int> list = envelope_.row_at;
+    std::sort(list.begin(), list.end());
+    return list;
 }
 
 }  // namespace pn

@@ -53,9 +53,31 @@ MatX dependence(const std::vector<Block>& blocks, const std::vector<double>& B, 
 void share_multipliers(const std::vector<Block>& blocks, const std::vector<double>& B,
                        const DescribedRows& all, RowSystem& s, const VecX& lam, VecX& shared);
 
-// Return a basis of the multipliers by kept row that together exert no force. The basis is orthonormal in the norm of the
-// described rows.
-const MatX& free_multipliers(const std::vector<Block>& blocks, const std::vector<double>& B,
-                             const DescribedRows& all, RowSystem& s);
+// Basis of the multipliers by kept row that together exert no force. The basis is orthonormal in the norm of the described
+// rows. It has entries for the rows in use only, which may be a small part of all rows.
+class FreeMultipliers {
+public:
+    FreeMultipliers(const Envelope& envelope, const MatX& basis) : envelope_(envelope), basis_(basis) {}
+
+    Eigen::Index count() const { return basis_.cols(); }
+    // Multipliers of a kept row, one for each element of the basis. Zero if the row is not in use.
+    VecX of_row(int row) const;
+    double norm_of_row(int row) const;
+    // Add the sum of the basis, weighted by z, to multipliers.
+    void add(const VecX& z, VecX& lam) const;
+    // Rows in use, ascending.
+    std::vector<int> rows() const;
+
+private:
+    bool is_used(int row) const {
+        const int at = envelope_.position[row];
+        return at < envelope_.size() && envelope_.row_at[at] == row;
+    }
+
+    const Envelope& envelope_;
+    const MatX& basis_;  // by position in the envelope
+};
+FreeMultipliers free_multipliers(const std::vector<Block>& blocks, const std::vector<double>& B, const DescribedRows& all,
+                                 RowSystem& s);
 
 }  // namespace pn

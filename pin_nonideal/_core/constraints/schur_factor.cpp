@@ -123,6 +123,7 @@ static PN_INLINE bool factor_cholesky(RowSystem& s) {
 }
 
 PN_WIDE void factor_rows(const std::vector<Block>& blocks, const std::vector<double>& B, RowSystem& s) {
+    ++s.factorization;
     delassus(blocks, B, s);
     scale_to_unit_length(s.active, s);
     s.min_pivot = 1.0;

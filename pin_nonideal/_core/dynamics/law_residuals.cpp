@@ -191,15 +191,16 @@ struct Laws {
 // are.
 void find_determined(const Program& p, Workspace& w, std::vector<char>& is_determined) {
     if (!w.now.rows.redundant) return;
-    const MatX& free = free_multipliers(p.blocks, w.now.B, p.described, w.now.rows);
+    const FreeMultipliers free = free_multipliers(p.blocks, w.now.B, p.described, w.now.rows);
     const auto shares = [&](const Block& block) {
         for (size_t k = 0; k < block.kept.size(); ++k)
-            if (free.row(block.row + k).norm() > min_null_space_entry) return true;
+            if (free.norm_of_row(block.row + static_cast<int>(k)) > min_null_space_entry) return true;
         return false;
     };
     VecX on_dofs = VecX::Zero(p.mechanism.nv), force = on_dofs, column(p.layout.rows);
-    for (Eigen::Index c = 0; c < free.cols(); ++c) {
-        column = free.col(c);
+    for (Eigen::Index c = 0; c < free.count(); ++c) {
+        column.setZero();
+        free.add(VecX::Unit(free.count(), c), column);
         force.setZero();
         for (int i : w.now.rows.blocks) add_transpose(p.blocks[i], w.now.A, column, force);
         on_dofs = on_dofs.cwiseMax(force.cwiseAbs());

@@ -72,10 +72,10 @@ static void press_all(const Program& p, Workspace& w, Reactions& r) {
     const Evaluation& now = w.now;
     std::vector<int> gaps;
     bool pulls = false;
-    for (size_t i = 0; i < p.gaps.size(); ++i) {
+    for (int i : now.closed_gaps) {
         const Block& block = p.blocks[p.gaps[i].block];
-        if (!w.state.closed[i] || block.kept.empty()) continue;
-        gaps.push_back(static_cast<int>(i));
+        if (block.kept.empty()) continue;
+        gaps.push_back(i);
         pulls |= r.lam[block.row] < 0.0;
     }
     r.loads_are_feasible = true;
@@ -83,23 +83,23 @@ static void press_all(const Program& p, Workspace& w, Reactions& r) {
         r.has_zero_load.assign(p.gaps.size(), 0);
         if (!pulls) return;
     }
-    const MatX& free = free_multipliers(p.blocks, now.B, p.described, w.now.rows);
-    MatX Z(gaps.size(), free.cols());
+    const FreeMultipliers free = free_multipliers(p.blocks, now.B, p.described, w.now.rows);
+    MatX Z(gaps.size(), free.count());
     VecX N(gaps.size());
     std::vector<char> has_zero_load(gaps.size());
     for (size_t k = 0; k < gaps.size(); ++k) {
         const int row = p.blocks[p.gaps[gaps[k]].block].row;
-        Z.row(k) = free.row(row);
+        Z.row(k) = free.of_row(row).transpose();
         if (!(Z.row(k).norm() > min_null_space_entry)) Z.row(k).setZero();
         N[k] = r.lam[row];
         has_zero_load[k] = r.has_zero_load[gaps[k]];
     }
     if (r.is_zero_load_set_frozen) {
-        r.lam += free * shortest_with_zeros(Z, N, has_zero_load);
+        free.add(shortest_with_zeros(Z, N, has_zero_load), r.lam);
         return;
     }
     const NonnegativeSum found = shortest_nonnegative(Z, N);
-    r.lam += free * found.z;
+    free.add(found.z, r.lam);
     r.loads_are_feasible = found.is_feasible;
     for (size_t k = 0; k < gaps.size(); ++k) {
         r.has_zero_load[gaps[k]] = found.held[k];

@@ -22,15 +22,15 @@ struct StickingShares {
     bool known = true;     // a friction element other than a contact shares the load
     bool joined = false;   // constraints share the load
 
-    StickingShares(const Program& p, const Workspace& w, const VecX& lam, const MatX& free) {
+    StickingShares(const Program& p, const Workspace& w, const VecX& lam, const FreeMultipliers& free) {
         std::vector<char> taken(p.layout.rows, 0);
         for (size_t i = 0; i < p.gaps.size(); ++i) {
             const Block& normal = p.blocks[p.gaps[i].block];
             if (!w.state.closed[i] || normal.kept.empty()) continue;
             add_contact(p, w, lam, p.gaps[i], taken);
         }
-        for (int row = 0; row < p.layout.rows; ++row) {
-            if (taken[row] || !(free.row(row).norm() > reported_loads_parameters.min_part)) continue;
+        for (int row : free.rows()) {
+            if (taken[row] || !(free.norm_of_row(row) > reported_loads_parameters.min_part)) continue;
             known &= row < p.constraint_rows();
             rows.push_back(row);
             cones.push_back({ConeElement::Kind::equality, 1, 0.0});
@@ -80,12 +80,11 @@ bool share_tree_by_tree(const Program& p, const Workspace& w, const StickingShar
     return solver.hold(f);
 }
 
-// Find the shortest forces f within the cones that exert the same force as the forces `of_rows`. The columns of `free` are
-// multipliers that exert no force.
-bool share_shortest(const StickingShares& shares, const MatX& free, const VecX& of_rows, VecX& f) {
+// Find the shortest forces f within the cones that exert the same force as the forces `of_rows`.
+bool share_shortest(const StickingShares& shares, const FreeMultipliers& free, const VecX& of_rows, VecX& f) {
     const int n = static_cast<int>(shares.rows.size());
-    MatX Z(n, free.cols());
-    for (int k = 0; k < n; ++k) Z.row(k) = free.row(shares.rows[k]);
+    MatX Z(n, free.count());
+    for (int k = 0; k < n; ++k) Z.row(k) = free.of_row(shares.rows[k]).transpose();
     const MatX S = Z.transpose() * Z;
     Cholesky factor;
     factor.compute(S);
@@ -99,7 +98,7 @@ bool share_shortest(const StickingShares& shares, const MatX& free, const VecX& 
 ReportedLoads::ReportedLoads(const Program& p, Workspace& w) : w_(w) {
     if (p.gaps.empty() || !w.now.rows.redundant || !all_stick(p, w)) return;
     const VecX lam = reactions(p, w).lam;
-    const MatX& free = free_multipliers(p.blocks, w.now.B, p.described, w.now.rows);
+    const FreeMultipliers free = free_multipliers(p.blocks, w.now.B, p.described, w.now.rows);
     const StickingShares shares(p, w, lam, free);
     const std::vector<char>& locked = w.now.terms.locked;
     const bool is_free = std::find(locked.begin(), locked.end(), char(1)) == locked.end();
