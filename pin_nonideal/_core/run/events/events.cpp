@@ -61,8 +61,10 @@ bool stick_if_held(System& system, double t, const std::vector<int>& resting) {
     problem.clean(p, w);
     std::vector<Mode> modes = w.state.mode;
     bool changes = false;
+    const double noise = relative_acceleration_rounding * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
     for (size_t i = 0, row = 0; i < slipping.size(); row += problem.dims[i++]) {
         if (problem.W.diagonal().segment(row, problem.dims[i]).any()) continue;
+        if (slip_acceleration(p, w, p.frictions[slipping[i]]).norm() > noise) continue;
         modes[slipping[i]] = sticking;
         changes = true;
     }

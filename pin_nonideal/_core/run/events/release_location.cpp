@@ -90,8 +90,9 @@ double ReleaseLocator::release_part(double rate, const std::vector<Mode>& modes,
     bool falls = false;  // the rate falls toward the instant
     VecX y(system_.ny);
     stepper_.make_interpolant();
-    while (high - low > width) {
+    for (int asks = 0; high - low > width; ++asks) {
         double next = 0.5 * (low + high);
+        if (low == 0.0 && asks == parameters.asks_before_start) next = width;  // released from the start on
         if (falls) {
             const double vanishes = high - rate * (beyond - high) / (rate_beyond - rate);
             if (high - vanishes <= width) break;

@@ -15,6 +15,7 @@ struct ReleaseLocationParameters {
     double time_tolerance = 1e-12;  // tolerance of the instant, relative to the step or the time
     double max_rate_ratio = 0.7;    // maximum ratio of two rates for which their secant is used
     double short_of_root = 1e-2;    // distance kept from the root of the secant, relative to the distance to it
+    int asks_before_start = 3;       // places that release the elements before the search tries the step's start
     // Extension of a repeated step that does not show the release of its interpolant. The first extension is relative
     // to the step, and each further one is longer by a factor.
     double min_extension = 1e-11, further_part = 10.0;
