@@ -1,7 +1,7 @@
 """Dry joints in closed legs begin to slip from rest, where some of them hardly move.
 
-Two feet on the ground leave the legs few freedoms, and a joint whose motion is a millionth of the others' still
-slips. A run starts in the modes of `Scene.solve`, and no event repeats itself.
+Two feet on the ground leave the legs few freedoms, and a joint whose motion is a millionth of the others'
+still slips. A run starts in the modes of `Scene.solve`, and no event repeats itself.
 """
 
 from __future__ import annotations
@@ -35,7 +35,8 @@ def humanoid(rng):
     return scene, *scene.project(pin.integrate(model, scene.q0, bent), np.zeros(model.nv))
 
 
-# Seeds with few freedoms: the response of two joints is near the rank tolerance (22), or one hardly moves (24).
+# Always: seeds with few freedoms, in which the response of two joints is near the rank tolerance (22), or one
+# joint hardly moves (24).
 @pytest.mark.parametrize("seed", seeds(range(100), always=[22, 24]))
 def test_legs_begin_to_slip_in_the_modes_of_solve(seed):
     scene, q, v = humanoid(np.random.default_rng(seed))
