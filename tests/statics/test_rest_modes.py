@@ -149,6 +149,10 @@ def test_what_gives_way_before_another_event_of_the_same_step(seed):
     assert check_stance(seed, 1.15, 1.0)
 
 
+def test_feet_that_the_others_hold_stick_as_slip_begins():
+    assert check_stance(812, 1.0, 1.0)
+
+
 @pytest.mark.stress
 @pytest.mark.parametrize("static_ratio", [1.0, 1.15])
 def test_many_stances(static_ratio):

@@ -8,7 +8,7 @@
 
 namespace pn {
 
-// Responses below this part of the largest count as zero. Its square root is below rank_tolerance_sticking.
+// Responses below this part of the largest count as zero. rank_tolerance_sticking is its square root.
 constexpr double response_rank_threshold = 1e-13;
 
 struct BoxLcpParameters {

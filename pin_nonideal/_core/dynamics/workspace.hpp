@@ -23,9 +23,9 @@ namespace pn {
 constexpr int max_projection_iterations = 12;
 
 // Rank tolerance of the rows while elements stick. A motion is free if sticking elements would hold it with less than
-// this part of their forces. A response is quadratic in the rows, and the value exceeds the square root of
-// response_rank_threshold (complementarity/box_lcp.hpp): rows are not independent where their responses count as zero.
-constexpr double rank_tolerance_sticking = 1e-6;
+// this part of their forces. The value is the square root of response_rank_threshold (complementarity/box_lcp.hpp), since
+// a response is quadratic in the rows.
+constexpr double rank_tolerance_sticking = 3e-7;
 
 struct Counters {
     long evaluations = 0, factorizations = 0, projections = 0, iterations = 0;

@@ -234,9 +234,9 @@ static std::vector<Event> select_modes(System& system, double t, VecX& y, VecX& 
     if (released && event && (event->kind == FoundEvent::Kind::lift || event->in_vain))
         *released = open_unloaded_contacts(system, t);
     if (!p.frictions.empty() || !p.gaps.empty()) {
-        set_direction_search(system, friction.mode_query.at_rest, event.has_value());
         const std::vector<int>& resting = friction.mode_query.at_rest;
         const bool are_held = stick_if_held(system, t, resting);
+        set_direction_search(system, resting, event.has_value());
         system.write(y);
         w.state.is_hyperstatic = are_held || shares_load(system, t, resting, friction.held);
     }

@@ -52,6 +52,11 @@ void Collocation::gather() {
         for (int k = 0; k < e.dim; ++k) start_n_[e.row + k] = system_.w.state.slip_direction[e.index][k];
 }
 
+bool Collocation::has_directions() {
+    gather();
+    return tangents_ > 0;
+}
+
 // Initialize the stages from the last trial of the step, which had another length.
 void Collocation::stretch() {
     const double ratio = step_.h / warm_start_size_;

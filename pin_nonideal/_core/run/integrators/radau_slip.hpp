@@ -36,6 +36,8 @@ public:
 
     Collocation(Step& step, System& system, ErrorNorm& norm);
 
+    // Check if any element slips in several directions.
+    bool has_directions();
     // Compute y1 from y0 and the rate at y0. The workspace then holds the directions of the step's end.
     void advance();
     // Check if the equations of the stages were solved.

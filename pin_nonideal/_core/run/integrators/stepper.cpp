@@ -36,12 +36,14 @@ void Stepper::take(double t, double size) {
     t0 = t;
     h = size;
     has_interpolant_ = false;
-    collocates_ = system_.w.state.solves_directions;
+    RunState& state = system_.w.state;
+    if (state.solves_directions) state.solves_directions = collocation_.has_directions();
+    collocates_ = state.solves_directions;
     active = system_.active();
     if (collocates_) {
         collocation_.advance();
         if (collocation_.is_solved() || method.adaptive()) return;
-        RunState& state = system_.w.state;  // a fixed step cannot be shortened
+        // A fixed step cannot be shortened.
         collocates_ = state.solves_directions = false;
         state.last_direction = state.slip_direction;
     }
