@@ -44,7 +44,7 @@ struct RowSystem : RowChoice {
     MatX Q;
     VecX tau, work;
     std::vector<int> columns;
-    long factorization = 1;  // number of the factorization of these rows, positive
+    long long factorization = 1;  // number of the factorization of these rows, positive
     LoadSharing sharing;
 
     int active_count() const { return static_cast<int>(std::count(active.begin(), active.end(), char(1))); }

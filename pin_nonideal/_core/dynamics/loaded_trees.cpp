@@ -163,9 +163,10 @@ struct LoadedTrees {
         bool is_solved = is_rounding(step(y), y);
         for (int it = 0; it < loaded_trees_parameters.max_gradients && !is_solved; ++it) {
             if (!y.head(u.n).allFinite() || !linearize()) return false;
+            if (!(loaded.sweep.least_relative_pivot(w.now.terms) > loaded_trees_parameters.min_pivot)) return false;
             is_solved = settle(y);
         }
-        if (!is_solved) return false;
+        if (!is_solved || !y.head(u.n).allFinite()) return false;
         const double determinant = loaded.sweep.relative_determinant(w.now.terms);
         if (!(determinant > loaded_trees_parameters.min_determinant)) return false;
         w.now.determinant = determinant;

@@ -144,7 +144,9 @@ static bool loads_are_of_trees(const Program& p) {
         const int dof = p.blocks[f.block].dof;
         if (f.load == Friction::Load::user || f.joint <= 0 || dof < 0 || p.mechanism.dof_joint[dof] != f.joint) return false;
     }
-    bool reads = false, pushes_bodies = false;
+    bool reads = false;
+    bool pushes_bodies = std::any_of(p.frictions.begin(), p.frictions.end(),
+                                     [&](const Friction& f) { return p.blocks[f.block].dof < 0; });
     each_law<UserLaw>(p.laws, [&](const UserLaw& law) { reads |= law.reaction == Reaction::total; });
     each_law<Drag>(p.laws, [&](const Drag&) { pushes_bodies = true; });
     each_law<Viscous>(p.laws, [&](const Viscous& law) { pushes_bodies |= law.block >= 0 && p.blocks[law.block].dof < 0; });

@@ -1,5 +1,6 @@
 #include "tree/oblique_sweep.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace pn {
@@ -82,6 +83,13 @@ double ObliqueSweep::relative_determinant(const BodyTerms& terms) const {
     for (Eigen::Index k = 0; k < inverse_.size(); ++k)
         if (!terms.locked[k]) product /= inverse_[k] * terms.D[k];
     return product;
+}
+
+double ObliqueSweep::least_relative_pivot(const BodyTerms& terms) const {
+    double most = 0.0;
+    for (Eigen::Index k = 0; k < inverse_.size(); ++k)
+        if (!terms.locked[k]) most = std::max(most, std::abs(inverse_[k] * terms.D[k]));
+    return most > 0.0 ? 1.0 / most : 1.0;
 }
 
 PN_WIDE void ObliqueSweep::solve(const Mechanism& m, const BodyTerms& terms, const Force* body, VecX& x) {

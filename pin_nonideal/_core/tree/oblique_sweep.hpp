@@ -28,6 +28,8 @@ public:
     bool factorize(const Mechanism& m, const BodyTerms& terms);
     // Product of the pivots relative to those of M in `terms`.
     double relative_determinant(const BodyTerms& terms) const;
+    // Least magnitude of a pivot relative to that of M.
+    double least_relative_pivot(const BodyTerms& terms) const;
     // x := accelerations for the forces x. Forces `body` on the bodies of deep trees are added to x if given.
     void solve(const Mechanism& m, const BodyTerms& terms, const Force* body, VecX& x);
 

@@ -155,22 +155,30 @@ double rest_rounding(const RestEquation& equation, const VecX& x) {
 enum class Holding { holds, slips, undecided };
 
 // Zero accelerations determine the forces unless elements are redundant. Newton's method finds these forces, and their
-// limits decide. On return from an undecided search x is unchanged.
+// limits decide. An excess over a limit that the condition of the equations may cause decides nothing. On return from an
+// undecided search x is unchanged.
 Holding hold_by_unique_forces(const RestEquation& equation, VecX& x) {
     const int n = equation.n;
     VecX there = x, residual, step;
     MatX J;
     LU lu;
+    double condition = 0.0;  // reciprocal
+    if (equation.evaluate_laws) return Holding::undecided;
     for (int it = 0; it < load_dependent_parameters.max_newton; ++it) {
         rest_residual(equation, there, residual, J);
         const double allowed = rest_rounding(equation, there);
         const bool accelerates = !(residual.head(n).cwiseAbs().maxCoeff() <= allowed);
         if (!accelerates && it > 0) {
+            const double excess = residual.tail(n).cwiseAbs().maxCoeff();
+            const double uncertain =
+                load_dependent_parameters.forces_rounding / condition * there.cwiseAbs().maxCoeff();
+            if (excess > allowed && !(excess > uncertain)) return Holding::undecided;
             x = there;
-            return residual.tail(n).cwiseAbs().maxCoeff() <= allowed ? Holding::holds : Holding::slips;
+            return excess <= allowed ? Holding::holds : Holding::slips;
         }
         lu.compute(J.topRows(n));
-        if (!(lu.reciprocal_condition() > response_rank_threshold)) return Holding::undecided;
+        condition = lu.reciprocal_condition();
+        if (!(condition > response_rank_threshold)) return Holding::undecided;
         lu.solve(residual.head(n), step);
         there -= step;
         if (!there.allFinite()) return Holding::undecided;

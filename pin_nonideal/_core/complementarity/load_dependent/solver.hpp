@@ -12,6 +12,7 @@ struct LoadDependentParameters {
     double max_alternation_ratio = 0.5;  // error ratio of the alternation, above which Newton's method takes over
     double limit_rounding = 1e-13;       // excess of a sticking force over its limit, relative to the largest force
     double min_residual_gain = 1e-3;     // required relative decrease of the residual by a step
+    double forces_rounding = 1e-15;      // rounding of forces, relative to the largest and for a condition of one
     int max_alternations = 40;           // maximum alternations of forces and limits
     int max_newton = 40;                 // maximum Newton steps
     int max_halvings = 12;               // maximum halvings of a Newton step that does not decrease the residual

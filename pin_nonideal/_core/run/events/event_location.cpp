@@ -128,6 +128,7 @@ void EventLocator::correct_instant(const Crossing& crossing, double full) {
     // cases cause this: the motion differs from the interpolant, or other contacts hold the gap, so that its rate is
     // only rounding.
     double size = stepper_.h, margin = margin_at_end(watch), low = 0.0, high = full;
+    int stalls = 0;  // passes in a row that hardly reduce the margin
     const double min_rate = of_gap ? rest_speed * (1.0 + system_.velocity(stepper_.y1).cwiseAbs().maxCoeff()) : 0.0;
     for (int it = 0; it < parameters.max_correction_passes; ++it) {
         if (of_gap) rate = gap_rate(p, w, watch.index);
@@ -141,8 +142,8 @@ void EventLocator::correct_instant(const Crossing& crossing, double full) {
         correct_end_to(next);
         size = next;
         margin = margin_at_end(watch);
-        const bool is_rounding = it > 0 && std::abs(margin) > parameters.margin_ratio * std::abs(before);
-        if (is_rounding && std::abs(change) < parameters.settled_part * size) return;
+        stalls = std::abs(margin) > parameters.margin_ratio * std::abs(before) ? stalls + 1 : 0;
+        if (stalls >= parameters.max_stalls && std::abs(change) < parameters.settled_part * size) return;
         if (const double secant = (margin - before) / change; secant < 0.0) rate = secant;
     }
 }

@@ -39,9 +39,10 @@ struct EventLocationParameters {
     // step. A move neglects a quarter of its square times the second difference of the rate in the step. A flight can be
     // a millionth of the tried step, and a move over all of it would neglect the fall.
     double moved_part = 1e-5;
-    // Ratio of margins of two passes from which the margin is rounding, if the instant moves by less than `settled_part` of
-    // the step. Newton's method reduces other margins faster.
+    // Passes that reduce the margin by less than this ratio, `max_stalls` in a row, find its rounding if the instant moves
+    // by less than `settled_part` of the step. Newton's method and secants reduce other margins faster.
     double margin_ratio = 0.25, settled_part = 1e-5;
+    int max_stalls = 2;  // one such pass occurs near a kink of the margin
 };
 
 class EventLocator {

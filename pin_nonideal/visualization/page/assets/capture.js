@@ -84,7 +84,9 @@ class Capture {
       };
       this.drawn = () => {
         this.canvas(into);
-        if ((player.time >= to || !player.playing) && recorder.state === "recording") recorder.stop();
+        if (player.time < to && player.playing) return;
+        this.drawn = null;
+        setTimeout(() => recorder.state === "recording" && recorder.stop(), 3000 / rate); // the stream takes the last image first
       };
       recorder.start();
       player.play();
