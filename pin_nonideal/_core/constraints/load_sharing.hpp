@@ -9,7 +9,7 @@
 namespace pn {
 
 struct LoadSharing {
-    long long factorization = 0;              // RowSystem::factorization for which the matrices hold
+    long long factorization = 0;         // RowSystem::factorization for which the matrices hold
     std::vector<char> active, required;  // rows for which they hold
 
     std::vector<int> dependent;  // required rows that depend on the active rows
