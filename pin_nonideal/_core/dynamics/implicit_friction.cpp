@@ -151,11 +151,15 @@ struct Implicit : Unknowns {
     }
 
     // Solve trees without rows in O(n). Return false, with the previous guess, if this does not converge.
-    bool solve_trees() {
+    bool solve_trees(bool is_warm) {
         if (!bearings || !are_limits_of_trees(*this)) return false;
         VecX &y = w.scratch.unknown, &before = w.scratch.before;
         before = y;
-        if (solve_loaded_trees(*this, y)) return true;
+        if (is_warm) {
+            if (solve_loaded_trees(*this, y, true)) return true;
+            y = before;
+        }
+        if (solve_loaded_trees(*this, y, false)) return true;
         y = before;
         return false;
     }
@@ -202,10 +206,11 @@ struct Implicit : Unknowns {
     void solve() {
         VecX &kept = w.state.unknown, &y = w.scratch.unknown;
         y.setZero();
-        if (w.state.warm)
+        const bool is_warm = w.state.warm;
+        if (is_warm)
             exchange([&](int k, int place, int count) { y.segment(k, count) = kept.segment(place, count); });
         w.state.warm = false;  // the state after a failure is no initial guess
-        const bool by_trees = solve_trees();
+        const bool by_trees = solve_trees(is_warm);
         if (!(by_trees || iterate()) || (bearings && is_due() && !contracts(y, by_trees))) {
             VecX& solution = w.scratch.solution;
             solution = y.head(n);

@@ -35,28 +35,31 @@ struct LoadedTrees {
         return g;
     }
 
-    // Describe the slipping elements, with their loads fixed at the limits y.
-    void describe(const VecX& y) {
+    // Describe the slipping elements: with the wrenches of the last solution, or with loads fixed at the limits y.
+    void describe(const VecX& y, bool has_wrenches) {
         loaded.known = (deep ? w.now.joint_F : w.now.F) + w.now.base_C;
         for (int e : w.now.slipping)
             if (p.frictions[e].reaction == Reaction::ideal) add_slip_force(p, w, e, loaded.known);
         if (shallow) sum_subtree_forces(p, w, w.now.reactions.body);
-        loaded.elements.clear();
+        loaded.elements.resize(u.n);
+        int k = 0;
         u.each([&](size_t e) {
             const Friction& f = p.frictions[e];
-            LoadedJoint element;
+            LoadedJoint& element = loaded.elements[k];
             element.friction = &f;
             element.joint = f.joint;
             element.dof = p.blocks[f.block].dof;
             element.factor = limit_under(p, w, static_cast<int>(e), 1.0);
             element.axis = bearing_axis(w.now.terms, f);
             element.along = force_direction(p, w, static_cast<int>(e));
-            element.rest = element.factor > 0.0 ? y[loaded.elements.size()] / element.factor - f.constant : 0.0;
+            if (has_wrenches) element.wrench = w.state.bearing_wrench[e];
+            else element.rest = element.factor > 0.0 ? y[k] / element.factor - f.constant : 0.0;
+            element.beyond = Force{};
             if (!p.mechanism.joints[f.joint].deep) {  // the bias and the forces on the subtree are generalized forces
                 element.beyond = w.now.terms.body[f.joint].f;
                 element.beyond -= w.now.reactions.body[f.joint];
             }
-            loaded.elements.push_back(element);
+            ++k;
         }, [](const UserLaw&) {});
     }
 
@@ -118,6 +121,7 @@ struct LoadedTrees {
 
     // Factorize without gradients: loads are constant.
     bool fix_loads() {
+        for (LoadedJoint& element : loaded.elements) element.gradient = Motion{};
         loaded.sweep.axis = w.now.terms.J;
         return loaded.sweep.factorize(p.mechanism, w.now.terms);
     }
@@ -149,6 +153,7 @@ struct LoadedTrees {
             const LoadedJoint& element = loaded.elements[k++];
             const double load = dot(element.gradient, loaded.sweep.reaction[element.joint]) + element.rest;
             w.now.load[e] = element.friction->constant + load;
+            w.state.bearing_wrench[e] = element.wrench;
         }, [](const UserLaw&) {});
         if (shallow) return u.motion();
         w.now.C = w.now.base_C;
@@ -157,10 +162,14 @@ struct LoadedTrees {
         w.now.a = loaded.x;
     }
 
-    bool solve(VecX& y) {
-        describe(y);
-        if (!fix_loads()) return false;
-        bool is_solved = is_rounding(step(y), y);
+    // Solve from the wrenches of the last solution, or from the limits y.
+    bool solve(VecX& y, bool has_wrenches) {
+        describe(y, has_wrenches);
+        bool is_solved = false;
+        if (!has_wrenches) {
+            if (!fix_loads()) return false;
+            is_solved = is_rounding(step(y), y);
+        }
         for (int it = 0; it < loaded_trees_parameters.max_gradients && !is_solved; ++it) {
             if (!y.head(u.n).allFinite() || !linearize()) return false;
             if (!(loaded.sweep.least_relative_pivot(w.now.terms) > loaded_trees_parameters.min_pivot)) return false;
@@ -179,6 +188,8 @@ struct LoadedTrees {
 
 void bound_loads_of_trees(Unknowns& unknowns, MatX& L) { LoadedTrees(unknowns).bound(L); }
 
-bool solve_loaded_trees(Unknowns& unknowns, VecX& y) { return LoadedTrees(unknowns).solve(y); }
+bool solve_loaded_trees(Unknowns& unknowns, VecX& y, bool has_wrenches) {
+    return LoadedTrees(unknowns).solve(y, has_wrenches);
+}
 
 }  // namespace pn

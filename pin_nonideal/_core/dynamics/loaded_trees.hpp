@@ -25,7 +25,8 @@ inline constexpr LoadedTreesParameters loaded_trees_parameters{};
 bool are_limits_of_trees(const Unknowns& unknowns);
 // Compute the largest |dg_i/dy_j| over all y after `solve_loaded_trees`, into L.
 void bound_loads_of_trees(Unknowns& unknowns, MatX& L);
-// Solve y = g(y) from the guess in y, and set the motion. Return false if this did not converge.
-bool solve_loaded_trees(Unknowns& unknowns, VecX& y);
+// Solve y = g(y) from the wrenches of the last solution or from the guess in y, and set the motion. Return false if this did
+// not converge.
+bool solve_loaded_trees(Unknowns& unknowns, VecX& y, bool has_wrenches);
 
 }  // namespace pn

@@ -18,6 +18,7 @@ static void size(const Program& p, RunState& state) {
     state.z = VecX::Zero(p.states);
     state.held_torque = VecX::Zero(p.mechanism.nv);
     state.unknown = VecX::Zero(p.unknowns());
+    if (p.loads_are_of_trees) state.bearing_wrench.resize(p.frictions.size());
     if (!p.gaps.empty() || !p.frictions.empty()) state.percussion = VecX::Zero(p.layout.rows);
     for (VecX& rate : state.last_rates.rate) rate = VecX::Zero(p.mechanism.nv);
     state.third_order_gap = VecX::Zero(p.layout.rows);

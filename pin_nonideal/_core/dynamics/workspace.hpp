@@ -58,7 +58,8 @@ struct RunState {
     VecX held_torque;             // torque of sampled control
     bool has_held = false;
     VecX unknown;                 // last solution of the implicit reaction equation, by element and law (warm start)
-    bool warm = false;             // true if `unknown` is an initial guess for the next solution
+    std::vector<Force> bearing_wrench;  // wrenches of joints in that solution, by element with a load in a tree
+    bool warm = false;             // true if both are initial guesses for the next solution
     VecX percussion;  // impulses of contacts and friction in the last time step, by row and divided by its length
     VelocityRates last_rates;
     VecX third_order_gap;         // third-order part of the gaps that a step closes, divided by its cubed length

@@ -30,7 +30,6 @@ Simulation::Simulation(const Program& program, Workspace& workspace, const Optio
       chatter(system, progress, run_options, stiffness, time_stepping, recording),
       modes(system, progress, run_options, torques, output, impacts, time_stepping, chatter, recording) {
     progress.y = progress.rate = progress.configured_y = VecX::Zero(system.ny);
-    guess = w.state.unknown;
     // Time stepping solves for velocities. Accelerations are only recorded, so the solution nearest to the last one
     // suffices.
     const bool in_time = options.method.scheme == Method::Scheme::moreau;
@@ -190,6 +189,7 @@ std::optional<double> Simulation::integrate(const Proposal& proposal) {
     watched = system.watches();
     if (watched) before_step = w.state;
     guess = w.state.unknown;
+    guessed_wrench = w.state.bearing_wrench;
     has_guess = w.state.warm;
     const int active = system.active();
     stepper.y0.head(system.ns) = progress.y.head(system.ns);
@@ -329,6 +329,7 @@ bool Simulation::recover(const Failure& failure) {
 // The loads of a stage that diverged are no guess for a shorter step.
 void Simulation::restore_guess() {
     w.state.unknown = guess;
+    w.state.bearing_wrench = guessed_wrench;
     w.state.warm = has_guess;
 }
 

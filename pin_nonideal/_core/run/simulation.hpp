@@ -121,6 +121,7 @@ protected:
     std::optional<FoundEvent> event;  // event in the step just taken
     RunState before_step;      // run state at the step's start, set if `watched`
     VecX guess;                // loads at the step's start, the initial guess of its first stage
+    std::vector<Force> guessed_wrench;  // wrenches of these loads
     bool has_guess = false;    // true if the loads at the step's start are known
     bool watched = false;      // a contact was closed or an element active at the step's start
     bool hand_over_ahead = false;  // the step ends before a hand-over

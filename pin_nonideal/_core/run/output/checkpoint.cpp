@@ -20,6 +20,11 @@ void fields(Archive& a, Modes& x) {
     for (Mode mode : x) a.require(slips(mode) || mode == sticking || mode == unloaded);
 }
 
+static void fields(Archive& a, Force& x) {
+    auto& [lin, ang] = x;
+    a(lin, ang);
+}
+
 static void fields(Archive& a, VelocityRates& x) {
     auto& [rate, count] = x;
     for (VecX& each : rate) a(each);
@@ -29,11 +34,11 @@ static void fields(Archive& a, VelocityRates& x) {
 
 static void fields(Archive& a, RunState& x) {
     auto& [mode, closed, slip_direction, last_direction, is_sticking_deferred, solves_directions, is_hyperstatic,
-           rank_tolerance, z, held_torque, has_held, unknown, warm, percussion, last_rates, third_order_gap,
-           has_ideal_row_choice, unique, spectral_bound, steps_since] = x;
+           rank_tolerance, z, held_torque, has_held, unknown, bearing_wrench, warm, percussion, last_rates,
+           third_order_gap, has_ideal_row_choice, unique, spectral_bound, steps_since] = x;
     a(mode, closed, slip_direction, last_direction, is_sticking_deferred, solves_directions, is_hyperstatic,
-      rank_tolerance, z, held_torque, has_held, unknown, warm, percussion, third_order_gap, has_ideal_row_choice, unique,
-      spectral_bound, steps_since);
+      rank_tolerance, z, held_torque, has_held, unknown, bearing_wrench, warm, percussion, third_order_gap,
+      has_ideal_row_choice, unique, spectral_bound, steps_since);
     fields(a, last_rates);
 }
 
