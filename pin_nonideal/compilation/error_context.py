@@ -264,7 +264,8 @@ def _paradox(names: Sequence[str], failure: core.CoreFailure) -> RunError:
         shown.several: ("several solutions", 'go on with the nearer one by several="continue", reduce mu,'),
         shown.none: ("no solution", "reduce mu,"),
     }.get(failure.solutions, ("no solution or several", "reduce mu,"))
-    limits = " and ".join(", ".join(f"{x:.4g}" for x in each) for each in failure.limits)
+    are_several = failure.solutions == shown.several
+    limits = " and ".join(", ".join(f"{x:.4g}" for x in each) for each in failure.limits if are_several)
     return FrictionParadoxError(
         f"friction of {_list_names(names)} has {solutions} at t = {t:.4g} s: "
         + (f"limits of {limits} (N m or N), " if limits else "")
@@ -272,8 +273,8 @@ def _paradox(names: Sequence[str], failure: core.CoreFailure) -> RunError:
         element=", ".join(names),
         determinant=failure.value,
         time=t,
-        solutions=failure.accelerations,
-        limits=failure.limits,
+        solutions=failure.accelerations if are_several else (),
+        limits=failure.limits if are_several else (),
     )
 
 

@@ -49,6 +49,13 @@ bool DenseSolver::eliminate(const Eigen::Ref<const MatX>& A) {
     return true;
 }
 
+bool DenseSolver::reverses() const {
+    const auto L = factors_.matrix(n_, n_);
+    bool negative = false;
+    for (int k = 0; k < n_; ++k) negative ^= (order_[k] != k) ^ (L(k, k) < 0.0);
+    return regular_ && negative;
+}
+
 void DenseSolver::factor_orthogonally(const Eigen::Ref<const MatX>& A, double tolerance) {
     regular_ = false;
     n_ = static_cast<int>(A.rows());

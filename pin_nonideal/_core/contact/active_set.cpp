@@ -175,6 +175,25 @@ const TouchingContacts& TouchingCache::at(const Program& p, Workspace& w, double
     return found_;
 }
 
+// Check if two motions are equal to rounding.
+static bool are_one(const VecX& a, const VecX& other) {
+    return (a - other).cwiseAbs().maxCoeff() <=
+           active_set_parameters.same_motion * std::max(a.cwiseAbs().maxCoeff(), other.cwiseAbs().maxCoeff());
+}
+
+// Add the current motion to a failure with another one.
+static Failure with_motion(Failure failure, const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+    VecX limits(failure.elements.size());
+    for (size_t i = 0; i < failure.elements.size(); ++i) {
+        const int e = failure.elements[i];
+        limits[i] = w.state.mode[e] == sticking ? static_limits(p, w, e, t, q, v).reach() : w.now.limit[e];
+    }
+    failure.solutions = Failure::Solutions::several;
+    failure.limits.push_back(limits);
+    failure.accelerations.push_back(w.now.a);
+    return failure;
+}
+
 // Contacts that share a load are decided together. Other contacts are decided one by one, which tests uniqueness, and
 // together if this does not converge.
 void select_active_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
@@ -226,8 +245,17 @@ void select_active_contacts(const Program& p, Workspace& w, double t, const VecX
     const bool undecided = unsolved->kind == Failure::Kind::not_converged;
     if (!undecided && !many) throw *unsolved;
     joint_motion = solve_jointly();
-    if (!joint_motion || !(undecided || joint_motion->shared)) throw *unsolved;
+    // Modes with a negative determinant are those of one motion of several. The joint motion is another one.
+    const bool one_of_several = unsolved->solutions == Failure::Solutions::unproven && !unsolved->accelerations.empty();
+    if (!joint_motion || !(undecided || one_of_several || joint_motion->shared)) throw *unsolved;
+    if (one_of_several) {
+        joint_motion->several = true;
+        joint_motion->several_element = unsolved->elements.front();
+    }
     close(joint_motion->closed, &*joint_motion);
+    if (!one_of_several) return;
+    if (are_one(w.now.a, unsolved->accelerations.front())) throw *unsolved;
+    if (!w.continues) throw with_motion(*unsolved, p, w, t, q, v);
 }
 
 }  // namespace pn

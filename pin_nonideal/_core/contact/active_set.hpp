@@ -25,6 +25,7 @@ struct ActiveSetParameters {
     // Minimum slip acceleration that defines a direction, relative to the scale of accelerations, and allowed deviation
     // of the direction (1 - cosine).
     double min_direction_acceleration = 1e-4, max_direction_deviation = 1e-6;
+    double same_motion = 1e-7;  // difference of accelerations below which two motions are one, relative to the largest
 };
 
 inline constexpr ActiveSetParameters active_set_parameters{};

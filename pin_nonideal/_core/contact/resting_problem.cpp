@@ -41,6 +41,7 @@ void OnsetMotion::to_modes(const Program& p, Workspace& w, ModeQuery& query) con
     }
     query.is_solved_jointly = true;
     query.several = several;
+    query.several_element = several_element;
 }
 
 RestingProblem::RestingProblem(const Program& program, Workspace& workspace, const VecX& velocity,
@@ -190,6 +191,7 @@ bool RestingProblem::solve_cones(bool warm, bool& shared) {
             }
         }
         if (!solved) return false;
+        if (!warm && solver.replace_reversed(f)) several = true;
         if (!release()) break;
     }
     shared = !solver.unique_shares();

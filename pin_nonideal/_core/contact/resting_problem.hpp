@@ -16,7 +16,8 @@ struct OnsetMotion {
     std::vector<Mode> modes;      // by element
     std::vector<Vec3> direction;  // slip direction at onset, by element
     std::vector<Vec3> friction;   // friction of each element, along its directions
-    bool several = false;         // rest is admissible, and a motion from rest as well
+    bool several = false;         // another motion is admissible as well
+    int several_element = -1;     // element whose friction differs there, or -1 if this is not known
     bool shared = false;          // contacts are hyperstatic
     bool is_initial_guess = false;  // true if this is only an initial guess for the search of the motion
 
@@ -53,7 +54,7 @@ public:
     using Parameters = RestingProblemParameters;
     static constexpr Parameters parameters{};
 
-    bool several = false;  // rest holds, though a motion was found too
+    bool several = false;  // another motion was found too: from rest that holds, or from a motion with several solutions
 
     // Set up the problem of the closed contacts `gaps` and of other friction elements at rest. The workspace must hold
     // the motion without their forces.

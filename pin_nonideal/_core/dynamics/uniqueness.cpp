@@ -19,10 +19,10 @@ Failure paradox(const Unknowns& u, double determinant, Solutions solutions = Sol
     return failure;
 }
 
-// Failure with the motions of two solutions.
-Failure two_motions(Unknowns& u, double determinant, const VecX& one, const VecX& other) {
-    Failure failure = paradox(u, determinant, Solutions::several);
-    for (const VecX& y : {one, other}) {
+// Failure with the motions of solutions.
+Failure with_motions(Unknowns& u, double determinant, const std::vector<VecX>& solutions) {
+    Failure failure = paradox(u, determinant, solutions.size() > 1 ? Solutions::several : Solutions::unproven);
+    for (const VecX& y : solutions) {
         u.set(y);
         u.motion();
         failure.limits.push_back(y.head(failure.elements.size()));
@@ -164,8 +164,8 @@ void decide(Unknowns& u, const ReactionEquation& equation, const VecX& start, Ve
     (found.back() - y).cwiseQuotient((found.back() + y).cwiseMax(min_scale)).cwiseAbs().maxCoeff(&widest);
     u.w.now.several_element = u.elements()[widest];
     if (u.w.continues && determinant_at(equation, y) > uniqueness_parameters.min_determinant) return;
-    if (found.size() == 1) throw paradox(u, std::min(min_root_determinant, edge));
-    throw two_motions(u, min_root_determinant, found[0], found[1]);
+    if (found.size() == 1) throw with_motions(u, std::min(min_root_determinant, edge), found);
+    throw with_motions(u, min_root_determinant, {found[0], found[1]});
 }
 
 void differentiate(Unknowns& u, const VecX& y, const VecX& g, double size, MatX& J) {
@@ -269,7 +269,7 @@ void search_other_solutions(Unknowns& u, VecX& y, const MatX& J, double size) {
         if (other_determinant == 0.0) throw paradox(u, other_determinant);
         VecX elsewhere = solution + solve(I - other, 2.0 * mirrored.cwiseProduct(c - solution));
         if (!leads_elsewhere(u, solution, elsewhere, size)) return;
-        if (!u.w.continues) throw two_motions(u, std::min(determinant_at_y, other_determinant), solution, elsewhere);
+        if (!u.w.continues) throw with_motions(u, std::min(determinant_at_y, other_determinant), {solution, elsewhere});
         state.unique = Uniqueness::several;
         if (!u.elements().empty()) u.w.now.several_element = u.elements().front();
         if (!regular) y = elsewhere;

@@ -13,6 +13,7 @@ struct ModeQuery {
     // Elements at rest that just reached their limit: they slip at the limit even with zero acceleration.
     std::vector<int> at_limit;
     bool several = false;            // another motion than that of `modes` is known
+    int several_element = -1;        // element whose friction differs there, or -1 if this is not known
     bool is_solved_jointly = false;  // `modes` belong to a motion solved with all contacts
     // Modes, slip directions and friction of all elements in a nearby motion, if known.
     std::vector<Mode> nearby_modes = {};

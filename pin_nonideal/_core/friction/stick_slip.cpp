@@ -193,7 +193,7 @@ struct Search {
         if (query.is_solved_jointly) {
             apply(query.modes, false);
             w.now.several = query.several;
-            w.now.several_element = list.front();
+            w.now.several_element = query.several_element < 0 ? list.front() : query.several_element;
             return;
         }
         if (keeps_nearby_modes()) return;

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.linalg import block_diag
 
 import pin_nonideal as pn
-from oracles.admissible_rest import may_rest
+from oracles.admissible_rest import directions, may_rest, wrenches
 from tests.support import wedged
 from tests.support.seeds import seeds
 
@@ -16,22 +17,15 @@ DURATION = 0.05  # [s]
 SAME = 1e-7  # part of the accelerations by which equal motions may differ
 ROUNDING = 1e-8  # part of the weight: least squares of nearly dependent rows
 
-# The search for modes ends without a motion, although the cones allow one (docs/reference/limits.md).
-# Rounding, which differs between processors, decides in which of these piles. Time stepping has no modes to
-# search.
-NO_MOTION = {(wedged.pile_of_balls, seed) for seed in (132, 689, 794)}
-# A stance at rest begins to move in one order of its contacts, also by rounding.
-MOVES_IN_AN_ORDER = {("test_axes_units_order_and_copies_change_nothing", wedged.uneven_stance, 217)}
+SEVERAL = 132  # pile of balls with three motions, of which time stepping takes one
 
 
 @pytest.fixture(autouse=True)
-def _known(request):
+def _several(request):
     arguments = request.node.callspec.params if hasattr(request.node, "callspec") else {}
     case = (arguments.get("family"), arguments.get("seed"))
-    if case in NO_MOTION and arguments.get("method") != "moreau":
-        request.applymarker(pytest.mark.xfail(raises=pn.FrictionParadoxError, strict=False))
-    if (request.node.originalname, *case) in MOVES_IN_AN_ORDER:
-        request.applymarker(pytest.mark.xfail(raises=AssertionError, strict=False))
+    if case == (wedged.pile_of_balls, SEVERAL) and arguments.get("method") != "moreau":
+        request.applymarker(pytest.mark.xfail(raises=pn.FrictionParadoxError, strict=True))
 
 
 families = pytest.mark.parametrize("family", wedged.FAMILIES, ids=lambda family: family.__name__)
@@ -44,6 +38,41 @@ def test_solve(family, seed):
     admissible = may_rest(case.touches, case.centers, case.loads)
     a = case.scene.solve(*case.scene.initial_state()).a
     assert admissible is None or admissible == (np.abs(a).max() <= STILL)
+
+
+def motions_from_random_starts(case, count):
+    """Return accelerations of the bodies in world axes, one array for each different motion."""
+    vectors = [(touch, axis) for touch in case.touches for axis in (touch.normal, *directions(touch.normal))]
+    columns = wrenches(case.touches, case.centers, vectors)
+    inertias = list(case.scene.model.inertias)[1:]
+    yields = block_diag(*[part for x in inertias for part in (np.eye(3) / x.mass, np.linalg.inv(x.inertia))])
+    mu = [touch.mu for touch in case.touches]
+    rng, found = np.random.default_rng(0), []
+    for _ in range(count):
+        w0 = columns.T @ yields @ case.loads
+        start = rng.normal(size=len(w0)) * np.abs(w0).max() * rng.choice([0.1, 1.0, 10.0])
+        solution = pn.cone_complementarity(columns.T @ yields @ columns, w0, mu, start=start)
+        a = yields @ (columns @ solution.f + case.loads)
+        if not any(np.abs(a - other).max() <= SAME * np.abs(a).max() for other in found):
+            found.append(a)
+    return found
+
+
+def test_two_of_several_motions_are_told():
+    case = wedged.pile_of_balls(SEVERAL)
+    q, v = case.scene.initial_state()
+    expected = motions_from_random_starts(case, 30)
+    assert len(expected) == 3
+    with pytest.raises(pn.FrictionParadoxError, match="several solutions") as caught:
+        case.scene.solve(q, v)
+    assert len(caught.value.solutions) == 2
+    one, other = (min(range(3), key=lambda k: np.abs(expected[k] - a).max()) for a in caught.value.solutions)
+    assert one != other
+    for k, a in zip((one, other), caught.value.solutions, strict=True):
+        assert np.abs(expected[k] - a).max() <= SAME * np.abs(a).max()
+    run = pn.simulate(case.scene, 1e-3, several="continue", progress=False)
+    assert [event.kind for event in run.events if event.time == 0.0] == ["several"]
+    assert np.abs(run.v[-1] / run.t[-1] - caught.value.solutions[1]).max() < 0.1
 
 
 def test_friction_that_is_short_by_little_holds_nothing():

@@ -153,6 +153,14 @@ bool ConeNewton::update_modes(const ConeProblem& p, const Eigen::Ref<const VecX>
     return changes;
 }
 
+bool ConeNewton::reverses(const ConeProblem& p, const Eigen::Ref<const VecX>& f) {
+    evaluate(p, f);
+    differentiate(p, f);
+    solver_.factor(J_.matrix(p.n, p.n));
+    mode_.clear();
+    return solver_.reverses();
+}
+
 double ConeNewton::solve(const ConeProblem& p, Eigen::Ref<VecX> f, int max_steps) {
     auto best = best_.vector(p.n), step = step_.vector(p.n), F = F_.vector(p.n);
     auto J = J_.matrix(p.n, p.n);

@@ -18,7 +18,7 @@ ConeStatus ConeComplementarity::solve(const Eigen::Ref<const MatX>& W, const Eig
     bool is_solved = search(x);
     if (!is_solved && brief_) return ConeStatus::failed;
     const ConeStatus status = is_solved ? ConeStatus::solved : find_certificate(problem_, certificate_);
-    if (status == ConeStatus::failed) is_solved = random_restarts(x);
+    if (status == ConeStatus::failed) is_solved = random_restarts(x, [] { return true; });
     if (is_solved && uniform_compliance_) compliance_continuation(x);
     unique_shares_ = newton_.regular();
     const bool as_it_was = warm && may_keep_shares && newton_.steps() == steps;
@@ -35,6 +35,17 @@ ConeStatus ConeComplementarity::solve(const Eigen::Ref<const MatX>& W, const Eig
     if (is_solved) return ConeStatus::solved;
     if (certificate_.size() > 0) certificate_ = problem_.scale().cwiseProduct(certificate_).eval();
     return status;
+}
+
+bool ConeComplementarity::replace_reversed(Eigen::Ref<VecX> f) {
+    auto x = even_.vector(problem_.n);
+    x = f.cwiseQuotient(problem_.scale()) / problem_.force_unit();
+    if (!unique_shares_ || !newton_.reverses(problem_, x)) return false;
+    const bool found = random_restarts(x, [&] { return !newton_.reverses(problem_, x); });
+    if (!found) return false;
+    tidy(x);
+    f = problem_.force_unit() * problem_.scale().cwiseProduct(x);
+    return true;
 }
 
 bool ConeComplementarity::hold(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const VecX>& w0,
@@ -177,15 +188,16 @@ bool ConeComplementarity::proximal_point(Eigen::Ref<VecX> f) {
 }
 
 // Random starts with a fixed seed. Each one gives slip speeds, and the path for fixed slip speeds the next start.
-bool ConeComplementarity::random_restarts(Eigen::Ref<VecX> f) {
+template <class Accept>
+bool ConeComplementarity::random_restarts(Eigen::Ref<VecX> f, const Accept& accept) {
     std::minstd_rand lot(1);
     for (int start = 0; start < parameters.max_random_starts; ++start) {
         for (int i = 0; i < problem_.n; ++i) f[i] = 4.0 * (lot() / double(std::minstd_rand::max()) - 0.5);
         for (int e = 0; e < problem_.size(); ++e)
             if (problem_.elements[e].is(ConeKind::contact)) f[problem_.at[e]] = 2.0 * std::abs(f[problem_.at[e]]);
-        if (polish(f, parameters.more_steps)) return true;
+        if (polish(f, parameters.more_steps) && accept()) return true;
         interior_point_.follow(problem_, f, ConeInteriorPoint::Slip::stands);
-        if (f.allFinite() && polish(f, parameters.more_steps)) return true;
+        if (f.allFinite() && polish(f, parameters.more_steps) && accept()) return true;
     }
     return false;
 }

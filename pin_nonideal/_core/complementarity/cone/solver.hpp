@@ -48,6 +48,11 @@ public:
     bool hold(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const VecX>& w0,
               const std::vector<ConeElement>& elements, Eigen::Ref<VecX> f);
 
+    // Check if f, the unique forces of a solution just found, is one of several solutions, and set f to another one. The
+    // determinants of the equations have signs that sum up to one over all solutions. A solution with a negative
+    // determinant is therefore one of at least three, and the others are sought from random starts.
+    bool replace_reversed(Eigen::Ref<VecX> f);
+
     // Accept a relative residual up to `max_residual` if no forces meet the laws to rounding. The caller then reports the
     // residual. By default no residual is accepted.
     void accept_residual(double max_residual) { max_residual_ = max_residual; }
@@ -72,7 +77,8 @@ private:
     bool stands_still(const Eigen::Ref<const VecX>& f);
     bool proximal_point(Eigen::Ref<VecX> f);
     bool compliance_continuation(Eigen::Ref<VecX> f);
-    bool random_restarts(Eigen::Ref<VecX> f);
+    template <class Accept>
+    bool random_restarts(Eigen::Ref<VecX> f, const Accept& accept);
     void tidy(Eigen::Ref<VecX> f) const;
 
     ConeProblem problem_, grown_;
