@@ -20,7 +20,7 @@ MIN_SPACINGS = 100.0
 NO_LIMIT = 2**62  # steps of a run without limit
 MAX_SAMPLES = 1e8  # some gigabytes for a small robot
 MIN_ATOL = 1e-100  # smallest absolute tolerance: the square of error / atol must not overflow
-DEFAULT_RTOL = 1e-8  # relative tolerance of a run without one
+DEFAULT_RTOL = 1e-8  # relative tolerance if `rtol` is None
 
 
 def check_method(method: str, rtol: float | None, atol: ArrayLike | None, dt: float | None) -> None:

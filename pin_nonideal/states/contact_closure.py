@@ -94,7 +94,7 @@ class UnilateralClosure(Search):
         return solve_ldp(iterate.B, iterate.phi, *self._gaps(iterate), move)
 
     def _step_out(self, iterate: Iterate) -> Iterate:
-        """Take steps to the nearest configuration without penetration, with a line search on the merit."""
+        """Step to the nearest configuration without penetration, with a line search on a merit function."""
         weight = 0.0
         for _ in range(STEPS):
             step = self._least(iterate, iterate.move)

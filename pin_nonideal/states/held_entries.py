@@ -179,7 +179,7 @@ def require_rounding(
 def coordinate_notes(
     model: Model, before: Array, after: Array, held: NDArray[np.bool_], unit: Array
 ) -> list[str]:
-    """Return notes on coordinates that follow held coordinates, and on held coordinates that moved.
+    """Return notes on changes of held coordinates, and of other coordinates.
 
     Args:
         model: pinocchio.Model.

@@ -111,7 +111,7 @@ class Search:
 
     Args:
         model: pinocchio.Model.
-        rows: q -> (A, phi) of the holonomic rows over their scales, (m, nv) and (m,).
+        rows: q -> (A, phi) of the holonomic rows, divided by their scales, (m, nv) and (m,).
         mass: q -> M(q), (nv, nv).
         metric: positive definite metric of the distance, (nv, nv).
         unit: unit displacement of each coordinate, (nv,).

@@ -298,7 +298,7 @@ def _values(model: Model, j: int, level: int, value: object, now: Array, what: s
         j: index of the joint.
         level: see above.
         value: the given number, values, table or SE3.
-        now: current values, which missing pieces keep.
+        now: current values, kept for coordinates that a table omits.
         what: words for messages.
     """
     kind = model.joints[j].shortname()

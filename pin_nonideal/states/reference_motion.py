@@ -80,8 +80,8 @@ class ReferenceMotion:
 def break_times(model: Model, times: Array, with_rates: bool) -> Array:
     """Return times at which the velocity or acceleration of a reference may jump [s], ascending, (n,).
 
-    These are the ends of the samples. The velocity jumps at an end within one floating-point spacing, between
-    two of the times. Inner samples are times of the result unless the acceleration is continuous.
+    These are the ends of the samples. Two times, one floating-point spacing apart, enclose the jump of the
+    velocity at each end. Inner samples are times of the result unless the acceleration is continuous.
 
     Args:
         model: pinocchio.Model.

@@ -88,7 +88,7 @@ def holding_torques(
 def _friction_joints(at_rest: AtRest, q: Array) -> dict[str, int]:
     """Return the degree of freedom of each joint with one freedom that a law of dry friction acts on.
 
-    Friction of contacts and rolling bodies counts in the bands, but names no joint.
+    Friction of contacts and rolling bodies widens the bands, but belongs to no joint.
     """
     program, model = at_rest.program, at_rest.compiled.model
     if not len(program.element_sizes):

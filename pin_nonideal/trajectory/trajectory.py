@@ -68,7 +68,7 @@ class Trajectory(RunFields):
             axes, then in world axes; record "reactions". See `reaction`.
         contact_forces: force of each contact by name, on the body of the contact's frame, normal and
             friction, in world axes [N], (nt, 3); record "forces". The force of a pair of shapes with several
-            points is the resultant on the later joint of the model; `contact` returns both bodies.
+            points is the resultant on the body of the later joint. `contact` returns both bodies.
         contact_torques: moment of these forces about the center of pressure by name of the contact, in world
             axes [N m], (nt, 3); record "forces". This moment does not include torsional and rolling
             resistance.

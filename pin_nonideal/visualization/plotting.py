@@ -127,7 +127,7 @@ Drawn = tuple[str, list[Any]]
 
 
 def _requested_plots(runs: Sequence[Trajectory], what: Any) -> list[Drawn]:
-    """Return each plot as its kind and its data of each run."""
+    """Return the kind of each plot, with its data by run."""
     items = parse_plots("plot: what", what)
     if not items:
         raise InputError("plot: what must name at least one plot; got none")

@@ -13,7 +13,7 @@ constexpr double response_rank_threshold = 1e-13;
 
 struct BoxLcpParameters {
     double zero_acceleration = 1e-9;  // part of the acceleration scale that counts as zero
-    double limit_rounding = 1e-12;    // relative distance to the limit at which a force is at it
+    double limit_rounding = 1e-12;    // relative distance within which a force is at its limit
     double rounding = 1e-13;          // rounding, relative to a limit or to the acceleration scale
     double noise_of_others = 1e-14;   // rounding of other elements, relative to the largest acceleration
     // Smallest root of a pivot of W, scaled to a unit diagonal, for which the Cholesky factor is as good as an

@@ -22,8 +22,8 @@ struct SocpParameters {
 inline constexpr SocpParameters socp_parameters{};
 
 VecX ball_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& s);
-// Solve the same program, as a box program if every element has one direction. Only a box program uses `initial`: forces
-// of a similar program.
+// Solve the ball program, or a box program if every element has one direction. Only the box program uses `initial`, the
+// forces of a similar program.
 VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const VecX& s,
                       const VecX* initial = nullptr);
 VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const FrictionLimits& limits,

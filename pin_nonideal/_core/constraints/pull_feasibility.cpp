@@ -11,8 +11,8 @@ namespace pn {
 namespace {
 
 // Return a basis of the multipliers of all described rows that together exert no force. The rows of Z follow the
-// described rows, and its columns are orthonormal. The other rows depend on the first described row of each row in use:
-// A_others = C A_first. Then y_first = -C^T z and y_others = z.
+// described rows, and its columns are orthonormal. A_first has one described row for each row in use. The other described
+// rows are A_others = C A_first. Then y_first = -C^T z and y_others = z.
 MatX free_described(const std::vector<Block>& blocks, const std::vector<double>& B,
                     const DescribedRows& all, RowSystem& s) {
     const std::vector<int> dependent = dependent_rows(s);

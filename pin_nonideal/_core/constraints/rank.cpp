@@ -15,7 +15,7 @@ static bool is_lasting(const Block& block) {
     return role(block.kind) == Role::constraint && pressing_row(block.kind) < 0;
 }
 
-// Check if the rows of a block hold a position by coordinates. Such rows keep their greatest length at any pose so far.
+// Check if a block is a holonomic constraint without frames. Such rows keep their greatest length at any pose so far.
 static bool keeps_length(const Block& block, const RowValues& values) {
     return !values.geometric && !block.holonomic.empty() && block.holonomic.front();
 }

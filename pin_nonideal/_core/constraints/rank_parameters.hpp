@@ -17,8 +17,8 @@ struct RankParameters {
     // Relative difference of squared lengths below which two columns tie. The earlier column then goes first, so that
     // rounding does not choose among equal rows.
     double tie = 1e-12;
-    // Part of the length of a force that moves all mass, below which the length of a row may be rounding. For example,
-    // a force through the only pin of a body moves nothing at any position of the pin.
+    // Row length that may be rounding, relative to the row of a force that moves the whole mass. For example, a force
+    // through the only pin of a body moves nothing at any position of the pin.
     double min_length_part = 1e-4;
     // Lower bound on the length of a row of a user's function, as a part of the longest row. Rounding of a direction
     // without freedom is far shorter, and rows in other units are longer.

@@ -43,9 +43,9 @@ VecX newton(const ContactRows& rows, double t, VecX w0) {
     return percussions(rows, t, rows.W, w0, rows.cones);
 }
 
-// Poisson's law of restitution. After the impulses that stop the approach, each contact gives e times its own impulse.
-// A contact gives more only to prevent penetration. Friction of the restitution impulse has a known limit: a box along the
-// directions of the cone for the additional impulse.
+// Poisson's law of restitution. After the impulses that stop the approach, each contact exerts e times its own impulse. A
+// contact exerts a larger impulse only to prevent penetration. Friction of the restitution impulse has a known limit: a box
+// along the directions of the cone for the additional impulse.
 VecX poisson(const ContactRows& rows, double t, const VecX& velocity) {
     VecX P = percussions(rows, t, rows.W, velocity, rows.cones);
     std::vector<ConeElement> elements = rows.cones;

@@ -2,8 +2,8 @@
 // are u+ = u- + W P. W is the Delassus matrix under loops and prescribed motions.
 //
 // Newton's law of restitution: 0 <= P_n, u_n+ + e u_n- >= 0 complementary, and P_t in Coulomb's cone against u_t+.
-// Poisson's law: the first phase stops the approach (e = 0, impulses C). In the second phase every contact gives e C_n,
-// or more to prevent penetration, with friction in the corresponding cone.
+// Poisson's law: the first phase stops the approach (e = 0, impulses C). In the second phase every contact exerts e C_n, or
+// more to prevent penetration, with friction in the corresponding cone.
 #pragma once
 
 #include "dynamics/workspace.hpp"
@@ -29,8 +29,8 @@ struct Impact {
 double rest_rate(const VecX& v);
 
 // Compute the impact of contacts `touching` (by gap) at (t, q, v). v becomes the velocity after it. Joint friction has
-// a finite limit and gives no impulse. The contacts end closed, their modes undecided. Without `bounces` restitution is
-// ignored, for rebounds that cannot be distinguished from rest.
+// a finite limit and gives no impulse. The contacts are closed afterwards, without modes of friction. Without `bounces`
+// restitution is ignored, for rebounds that cannot be distinguished from rest.
 Impact resolve_impact(const Program& p, Workspace& w, double t, const VecX& q, VecX& v, const std::vector<char>& touching,
               bool bounces = true);
 

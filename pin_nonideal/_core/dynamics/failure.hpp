@@ -19,7 +19,7 @@ struct Failure : std::exception {
     };
     Kind kind;
     double time = 0.0;
-    std::vector<int> elements;  // dofs, blocks or frictions, depending on the kind
+    std::vector<int> elements;  // dofs, blocks or friction elements, by kind
     double value = 0.0;         // residual, gap, determinant, rate or number of steps
     // Solutions of a paradox. Two of several solutions are stored: limits of the elements, and accelerations.
     enum class Solutions { unproven, none, several } solutions = Solutions::unproven;

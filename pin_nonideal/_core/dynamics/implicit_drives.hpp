@@ -2,8 +2,8 @@
 // damping D:
 //     M + theta h D + theta^2 h^2 K   in place of M,
 //     F + D (v - v0) - (2 theta - 1) h K v0   in place of F at the velocity v.
-// The force is thus taken at the part theta of the step. With theta = 1/2 the step is second order and keeps the energy of
-// springs. A larger theta damps vibrations and fast decay that the step does not resolve.
+// The force is thus evaluated at the fraction theta of the step. With theta = 1/2 the step is second order and keeps the
+// energy of springs. A larger theta damps vibrations and fast decay that the step does not resolve.
 #pragma once
 
 #include "tree/terms.hpp"

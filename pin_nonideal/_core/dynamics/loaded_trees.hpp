@@ -2,8 +2,8 @@
 //
 // At a slipping joint the friction force is -s phi (c + L(r)) for the load L of the joint's wrench r. L is homogeneous, so
 // that its linearization L(r) + g^T (r' - r) = g^T r' is a force linear in the reaction, which the oblique sweep
-// (tree/oblique_sweep.hpp) solves without iteration. Newton's method repeats this with new gradients g. Steps with the last
-// gradients and the remaining difference of L are cheaper, and suffice near the solution.
+// (tree/oblique_sweep.hpp) solves without iteration. Newton's method repeats the sweep with new gradients g. Steps with the
+// last gradients and the remaining difference of L are cheaper, and suffice near the solution.
 #pragma once
 
 #include "dynamics/unknowns.hpp"

@@ -109,8 +109,8 @@ static std::vector<int> acting_dofs(const Program& p, const Block& block) {
     return acting;
 }
 
-// Find the dofs that constraints tie to a constraint that depends on time, and the friction elements along such dofs. Rows
-// that can never act tie none.
+// Find the dofs that constraints tie to a constraint that depends on time, and the friction elements along such dofs.
+// Blocks without rows tie no dofs.
 static void find_tied_to_drives(Program& p) {
     std::vector<int> parent(p.mechanism.nv);
     std::iota(parent.begin(), parent.end(), 0);

@@ -73,7 +73,7 @@ struct Program {
     }
     bool needs_reactions = false;        // some law reads them
     bool loads_are_of_trees = false;     // all friction that reads its own reaction acts in the tree joint that it loads
-    bool has_contact_friction_only = false;      // the only laws are frictions of unilateral contacts
+    bool has_contact_friction_only = false;      // the only law is friction of unilateral contacts
     bool driven = false;           // forces or actuation
     bool has_body_forces = false;  // given forces that act on bodies
     bool moves_in_time = false;    // some constraint depends on time

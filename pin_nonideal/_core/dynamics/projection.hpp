@@ -19,8 +19,8 @@ struct ProjectionParameters {
     // The third-order part of a step's move is used if its square is below this fraction of the second-order part's
     // square.
     double falling_square = 0.01;
-    // Change of the residual of a user's row by a displacement of unit length, below which the row is in other units than
-    // meters and radians. A change above the inverse counts alike.
+    // Smallest change of the residual of a user's row by a displacement of unit length. The inverse is the largest change.
+    // Rows beyond these bounds have other units than meters and radians.
     double small_row = 1e-2;
     // Below this speed [rad/s or m/s] rows change only by rounding over a step of time stepping.
     double slow_speed = 1e-5;

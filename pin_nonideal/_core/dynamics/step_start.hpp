@@ -13,8 +13,8 @@ struct StepStartParameters {
     double consistency_tolerance = 1e-6, background = 1e-3;
     // Factor by which biases of a dependent row's basis rows may enter its own bias.
     double dependence_growth = 10.0;
-    // A change of modes may take at most this fraction of the kinetic energy. If new rows would take more, rows with at
-    // most the part `max_unheld_part` of their own count as dependent. `unheld_growth` is the step of that search.
+    // A change of modes may take at most this fraction of the kinetic energy. If new rows would take more, the rank
+    // tolerance grows by factors `unheld_growth`, up to `max_unheld_part`.
     double max_removed_energy_part = 1e-9, max_unheld_part = 1e-3, unheld_growth = 3.0;
 };
 

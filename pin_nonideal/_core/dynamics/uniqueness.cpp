@@ -192,7 +192,7 @@ std::vector<std::pair<int, int>> groups(const Unknowns& u) {
     return list;
 }
 
-// Limits of the frictions without any load.
+// Limits of the friction elements without any load.
 VecX constants(const Unknowns& u) {
     VecX c = VecX::Zero(u.n);
     int k = 0;

@@ -17,9 +17,9 @@ struct UniquenessParameters {
 
 inline constexpr UniquenessParameters uniqueness_parameters{};
 
-// Decide uniqueness for bearings: g contracts, or all solutions are found. y is Newton's solution if `solved`. `start`
-// is the motion before, where the search began. If there are several solutions, y becomes the nearest to `start`, or
-// the failure shows two.
+// Decide uniqueness for loads of bearings: g is proven to contract, or all solutions are computed. y is Newton's solution
+// if `solved`. `start` is the motion before, where the search began. If there are several solutions, y becomes the nearest
+// to `start`, or the failure shows two.
 void decide(Unknowns& unknowns, const ReactionEquation& equation, const VecX& start, VecX& y, bool solved);
 
 // Solve with all zero-load sets after one set had no solution. y becomes the solution nearest to `start` in any set. If no

@@ -1,5 +1,5 @@
-// Unknowns y of the implicit reaction equation y = g(y): limits of slipping frictions and forces of user laws. The
-// current factors give the motion for y. The motion gives the loads, and the loads give an image g(y).
+// Unknowns y of the implicit reaction equation y = g(y): limits of slipping elements and forces of user laws. The current
+// factors give the motion for y. The motion gives the loads, and the loads give an image g(y).
 #pragma once
 
 #include "dynamics/law_forces.hpp"

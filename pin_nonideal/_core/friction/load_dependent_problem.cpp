@@ -101,7 +101,7 @@ void RestProblem::collect_loads() {
         for (int k = 0; k < equation.elements[i].dim; ++k) {
             const int column = equation.elements[i].row + k;
             const double most = problem_.response.col(column).cwiseAbs().maxCoeff();
-            const double unit = most > 0.0 ? size / most : 1.0;  // unit motion as large as the motion without friction
+            const double unit = most > 0.0 ? size / most : 1.0;  // its motion is as large as that without friction
             move(unit * VecX::Unit(equation.n, column));
             equation.loads.col(column) = (collect() - equation.still) / unit;
         }

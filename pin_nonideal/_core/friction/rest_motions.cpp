@@ -19,8 +19,8 @@ bool sticks_more(const std::vector<bool>& one, const std::vector<bool>& other) {
 
 }  // namespace
 
-// Solve for the forces of all elements for the current factors of their limits and one zero-load set. A few elements:
-// select among all motions. More elements: the motion in which all stick, else any motion.
+// Solve for the forces of all elements for the current factors of their limits and one zero-load set. For a few elements,
+// select among all motions. For more elements, return the motion in which all stick, else any motion.
 bool RestMotions::find_in_zero_load_set(RestProblem& problem, VecX& x) {
     const RestEquation& equation = problem.equation;
     const AllMotions all = all_motions(equation);

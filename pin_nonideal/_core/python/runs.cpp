@@ -58,7 +58,7 @@ void set_hint(Options& o, const Hint& hint) {
     };
 }
 
-// Sample inside the steps of a run with record "dense", from the states there and the data stored with each step.
+// Compute samples inside the steps of a run with record "dense" from interpolated states and the data of each step.
 Outcome samples_inside(const Program& p, const Options& options, const Array& t, const Array2& y, const Array2& modes,
                       const Array2& directions, const Array2& sought, const Array2& torque, const Array& moved) {
     InsideStates inside;

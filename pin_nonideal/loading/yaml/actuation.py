@@ -37,7 +37,7 @@ def actuation_of(model: Model, entry: object, motors: Sequence[str], where: str)
 
 
 def _drive(model: Model, entry: object, motors: Sequence[str], where: str, listed: bool) -> object:
-    """One drive; those of a list keep their values by joint name."""
+    """Return one drive; a drive in a list keeps its values by joint name."""
     kind, values = one_entry(entry, where)
     if kind == "torques":
         if not isinstance(values, dict):

@@ -261,7 +261,7 @@ def rounding_of(
     """Return the size of rounding for each unit.
 
     Args:
-        pairs: units and values in them.
+        pairs: units, each with an array of values.
         scales: least sizes by unit, such as the weight of all bodies for forces.
 
     Returns:

@@ -128,7 +128,7 @@ def friction_joints(run: Trajectory) -> dict[str, int]:
 
 
 def _frictions(run: Trajectory, name: str, over_load: bool) -> list[Relation]:
-    """Return friction of laws in joints over the slip velocity, or over the load of the bearing."""
+    """Return the curves of joint friction over slip velocity, or over bearing load."""
     kind, known = "load" if over_load else "friction", friction_joints(run)
     if name and name not in known:
         raise UnknownNameError(

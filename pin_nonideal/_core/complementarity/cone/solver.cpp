@@ -149,7 +149,7 @@ void ConeComplementarity::tidy(Eigen::Ref<VecX> f) const {
 }
 
 // Proximal point algorithm (Rockafellar, SIAM J. Control Optim. 14, 1976). Each element yields in proportion to the
-// change of its force. Every problem on the way is then regular, however many elements share a load. Forces that no
+// change of its force. Every intermediate problem is then regular, however many elements share a load. Forces that no
 // longer change cause no compliance.
 bool ConeComplementarity::proximal_point(Eigen::Ref<VecX> f) {
     grown_ = problem_;

@@ -110,7 +110,7 @@ double largest_force_scale(const RestEquation& equation, const VecX& x, const Fr
     return size;
 }
 
-// Compute the residual of rest: accelerations that are left, as forces, and forces beyond a limit. J is its derivative.
+// Compute the residual of rest: accelerations, scaled to forces, and excess of forces over limits. J is its derivative.
 void rest_residual(const RestEquation& equation, const VecX& x, VecX& residual, MatX& J) {
     VecX alpha;
     FrictionLimits limits;

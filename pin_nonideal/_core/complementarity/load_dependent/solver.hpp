@@ -27,8 +27,8 @@ bool solve_rest(const RestEquation& equation, VecX& x);
 // Refine x near a solution by Newton's method alone.
 bool refine_rest(const RestEquation& equation, VecX& x);
 
-// Find forces x that keep all elements at rest, from a first guess: zero accelerations, and no force beyond its limit.
-// Return false if none were found. x is then the nearest point found.
+// Compute forces x within all limits that keep all elements at rest, from a first guess. Return false if none were found. x
+// is then the nearest point found.
 bool hold_at_rest(const RestEquation& equation, VecX& x);
 
 // Return slip accelerations slightly beyond the load of a solution x, with the limits at x.

@@ -13,7 +13,7 @@ namespace pn {
 struct SegmentSearchParameters {
     // Slope of the distance along the segment that counts as zero, due to rounding.
     double level = 1e-15;
-    // Curvature of the distance times half the segment, below which all points of the segment are equally near.
+    // Largest curvature of the distance, times half the segment, at which all points count as equally near.
     double straight = 1e-12;
     // Slope at the nearest point beyond which this point is a kink of the distance, inside the solid.
     double kink = 1e-9;

@@ -8,7 +8,7 @@
 
 namespace pn {
 
-// Travel data that lasts from step to step. Travel of a body is in meters, of any of its contact points. Travel of a
+// Travel data that lasts from step to step. Travel of a body bounds the path length [m] of its contact points. Travel of a
 // joint is in the joint's unit, and rotation in radians.
 struct TravelState {
     std::vector<double> body, joint, turn;  // by joint: travel of its body, of the joint, rotation of its body
@@ -61,7 +61,7 @@ public:
     struct Pair {
         int first = 0, second = 0, joint = 0;
         double reach = 0.0;  // extent of the first body's geometry from its frame [m]
-        bool plane_rotates = false;  // the second body has a plane that may rotate: its speed grows with the distance
+        bool plane_rotates = false;  // the plane of the second body may rotate: speeds on it grow with distance
         bool is_unknown = false;  // user function
     };
     const Pair& pair(int gap) const { return pairs_[gap]; }

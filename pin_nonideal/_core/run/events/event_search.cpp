@@ -66,8 +66,8 @@ double EventSearch::interpolated_share(int e, double part) const {
 }
 
 // Return the error bound of the interpolated force / limit ratio of a sticking element. The bound comes from the further
-// stages of the interpolant, which are as accurate as the interpolant. Without further stages it comes from the other stages
-// and from a fraction of the ratio's change.
+// stages of the interpolant, which are as accurate as the interpolant. Without further stages, the other stages and a
+// fraction of the ratio's change give the bound.
 double EventSearch::share_error(int e) const {
     const Method& method = stepper_.method;
     const bool further = method.further_stages > 0;

@@ -19,7 +19,7 @@ struct Crossing {
 };
 
 struct EventSearchParameters {
-    int grid = 24;                // grid intervals of a step at which a margin is sampled first
+    int grid = 24;                // number of intervals of a step for the first samples of a margin
     double spacing = 1.0 / grid;  // length of a grid interval, relative to the step
     // A parabola through three points falls below the middle one by at most 1/8 of its second difference. Dips up to
     // twice that depth are searched.

@@ -99,8 +99,8 @@ void set_direction_search(System& system, const std::vector<int>& resting, bool 
             ((seeks && sought && has_turning_slip(system)) || std::any_of(resting.begin(), resting.end(), begins));
 }
 
-// Defer the sticking of an element that came to rest but must slip on. The deferral ends when its mode changes or it
-// moves.
+// Defer the sticking of an element that came to rest but must slip on. The deferral ends when the element changes its mode
+// or moves.
 void linger(RunState& state, const std::vector<Mode>& before, const FoundEvent& event) {
     for (size_t e = 0; e < before.size(); ++e)
         if (before[e] != state.mode[e]) state.is_sticking_deferred[e] = 0;
@@ -136,7 +136,7 @@ struct FrictionSwitch {
     void find(const OnsetMotion* joint_motion) {
         const Program& p = system.p;
         Workspace& w = system.w;
-        const bool strikes = event && event->kind == FoundEvent::Kind::touch;  // sticking elements may move
+        const bool strikes = event && event->kind == FoundEvent::Kind::touch;  // a touch may start sticking elements
         if (p.frictions.empty()) {
             begin_step(p, w, t, system.q, system.v);
             if (!strikes) restore_motion(p, w, t, system.v);

@@ -22,7 +22,7 @@ struct GapSearchParameters {
     double plane_parts[5] = {0.11, 0.29, 0.5, 0.73, 0.93};
     // Safety factor on the travel of bodies, for the moves of projections.
     double travel_factor = 2.0;
-    double rate_rounding = 1e-12;  // rounding of the change of a constant rate, relative to the rates
+    double rate_rounding = 1e-12;  // change of a constant rate by rounding, relative to the rates
 };
 
 class GapSearch {

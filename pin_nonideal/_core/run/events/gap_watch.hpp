@@ -78,9 +78,9 @@ public:
     // bodies may close by the step's end are monitored from then on. Return those to sample at the step's start.
     const std::vector<int>& follow(const VecX& speed, double h);
 
-    // Return the monitored gaps for the sample of time stepping, taken once per step at its middle. `path_length`: travel
-    // of each dof since the last sample, or since the state at which these steps began. Wide gaps leave the monitored
-    // set by `skip_wide`.
+    // Return the monitored gaps. Time stepping samples them once per step, at its middle. `path_length`: travel of each dof
+    // since the last sample, or since the state at which these steps began. Wide gaps leave the monitored set by
+    // `skip_wide`.
     const std::vector<int>& advance(const VecX& path_length);
     void skip_wide();
     // Check if a monitored gap was wider at its sample than its bodies can close by the end of this step of time stepping.

@@ -17,7 +17,7 @@ struct HandOverParameters {
     double steady_time = 1e-12;
     // Time [s, or relative to the time above 1 s] in which features pass each other by more than rounding.
     double passing_time = 1e-13;
-    // Part of the time to a hand-over that is left to the next step, since the acceleration changes on the way.
+    // Part of the time to a hand-over that is left to the next step, since the acceleration changes meanwhile.
     double left_before = 1e-3;
     // Width [s, or relative to the time above 1 s] of the interval that contains a hand-over. The width is below the spacing
     // of times, so the state after the interval lies at the feature up to rounding.
@@ -35,8 +35,8 @@ public:
         double time;  // from the current state
         int gap;
     };
-    // Return the first hand-over of a closed contact within `size`, on a motion with the current acceleration. The state
-    // after its time is the first one with the next feature.
+    // Return the first hand-over of a closed contact within the time `size` [s] at constant acceleration. The state after
+    // its time is the first one with the next feature.
     std::optional<Found> first(double size);
     // Check if the bodies of a gap have no load in the current state, so that their contacts need no hand-over.
     bool is_unloaded(int gap);

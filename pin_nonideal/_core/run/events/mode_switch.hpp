@@ -48,8 +48,8 @@ public:
     static bool is_of_closed_contacts(const Failure& failure);
     // Check if rows of closed contacts alone contradict each other. Such rows are nearly dependent.
     bool is_of_contradicting_contacts(const Failure& failure) const;
-    // Let elements that stick slip where prescribed motions start to move them: by their accelerations, or else after time
-    // steps in which they gain speed. `contradicts_drive` checks if sticking elements contradict these motions.
+    // Let sticking elements slip at the start of prescribed motions. Accelerations select the elements, or else speeds
+    // after short time steps. `contradicts_drive` checks if sticking elements contradict these motions.
     bool contradicts_drive(const Failure& failure) const;
     bool follow_drive();
     // Bridge an accumulation of events, and select modes at the new state.

@@ -1,7 +1,7 @@
 // End of bouncing. Flights too low to be separated from rounding are not searched for touches. Gaps follow parabolas
 // under the current acceleration and strike again. The bouncing ends if no gap approaches or leaves, or if a higher gap
-// lands. The number of flights is finite: the last ones vanish in rounding. The instants add up to the limit of the
-// accumulation. Flights with restitution 1 also end, because their energy is only rounding.
+// lands. The number of flights is finite: the last ones vanish in rounding. The times of the flights add up to the end of
+// the accumulation. Flights with restitution 1 also end, because their energy is only rounding.
 #pragma once
 
 #include "run/events/events.hpp"

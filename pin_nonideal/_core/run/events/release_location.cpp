@@ -134,8 +134,8 @@ std::optional<double> ReleaseLocator::release_rate_inside(const std::vector<Mode
 }
 
 // Locate the release of redundant sticking elements. The multiplier of a single element decides nothing: the elements
-// hold as long as some forces within all limits do. Elements that slip without moving are included. The step is
-// repeated up to the release on its interpolant. The repeated step is extended slightly if its end does not show the
+// hold as long as some forces within all limits do. Elements in a slip mode with zero slip velocity are included. The step
+// is repeated up to the release on its interpolant. The repeated step is extended slightly if its end does not show the
 // release.
 std::optional<FoundEvent> ReleaseLocator::release_together() {
     if (!w.state.is_hyperstatic) return std::nullopt;

@@ -79,7 +79,7 @@ double ErrorNorm::operator()(const VecX& dy, const VecX& y) {
     }
     for (int e : system_.w.now.loaded_elements) {
         if (system_.w.state.mode[e] != sticking) continue;
-        // The load of a contact can jump at an edge. Steps too short to resolve the jump skip it.
+        // The load of a contact can jump at an edge. Steps too short to resolve the jump omit this load.
         if (system_.p.frictions[e].gap >= 0 && !resolves_shares_) continue;
         const double limit = std::max(system_.w.now.load[e].reach(), min_scale);
         const double x = system_.share(dy, e) / std::max(share_tolerance_, share_rounding_ / limit);

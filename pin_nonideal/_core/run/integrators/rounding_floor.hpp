@@ -9,7 +9,7 @@ namespace pn {
 struct RoundingFloorParameters {
     // Number of steps from which rounding is measured, and steps between two measurements (seven evaluations each).
     // Noise that requires ever shorter steps causes runs of so many steps. In most shorter runs rounding is far below
-    // the tolerances, so they do without the measurement.
+    // the tolerances, so they omit the measurement.
     long min_measured_steps = 20000, steps_between_measurements = 64;
     // Safety factor on a measurement, which is only a sample. Part of the previous value that bounds the next one from
     // below.

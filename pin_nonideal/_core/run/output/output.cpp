@@ -9,7 +9,7 @@
 
 namespace pn {
 
-// Maximum number of samples for which memory is reserved. Longer runs may stop before they need more.
+// Maximum number of samples for which memory is reserved. Longer runs reserve more memory as needed.
 constexpr double max_reserved_samples = 1e5;
 
 Output::Output(System& system, Stepper& stepper, Progress& progress, const Options& options, Recording& out)

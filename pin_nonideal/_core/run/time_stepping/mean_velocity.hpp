@@ -10,8 +10,8 @@ namespace pn {
 struct MeanVelocityParameters {
     // Change of the configuration in a step that counts as rounding [rad, or radius of the tree].
     double configuration_rounding = 1e-13;
-    // Change by a further sweep below which no sweep follows. Rounding decides if a change is just above or just below
-    // it. The velocity at the step's end then differs by a small part of tolerance / h. Sweeps of contacts cost more.
+    // Change by a further sweep below which no sweep follows. Rounding decides if changes near this tolerance exceed it.
+    // The velocity at the step's end then differs by a small part of tolerance / h. Sweeps of contacts cost more.
     double configuration_tolerance = 1e-12, contact_tolerance = 1e-9;
     int max_sweeps = 6;  // maximum number of sweeps of a step
     // Slip of an element that constraints hold which counts as rounding, relative to the velocities of the step.
@@ -50,8 +50,8 @@ public:
     void keep_rate(VelocityRates& last) const;
     // Compute the velocity at the step's end for the acceleration a.
     void end(const VecX& a, VecX& v1);
-    // Move the mean to that of the step's start and end for another sweep. Return false if no further sweep is needed.
-    // `touches`: contacts take part.
+    // Set the mean to the average of the velocities at the step's start and end. Return false if no further sweep is
+    // needed. `touches`: contacts take part.
     bool move(bool touches);
 
     bool is_first() const { return moves_ == 0; }  // no sweep has ended

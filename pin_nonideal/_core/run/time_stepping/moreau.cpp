@@ -206,7 +206,7 @@ double Moreau::update_limits(double t) {
     return change;
 }
 
-// Replace the limits by the next iterate after the limits for which the force was found.
+// Compute the next iterate of the limits from two limits: one gave the force, the other follows from it.
 void Moreau::accelerate_limits() {
     const Eigen::Index ne = system_.ne, rows = problem_.rows;
     VecX from(ne + rows), to(ne + rows);

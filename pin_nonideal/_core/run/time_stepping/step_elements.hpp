@@ -16,8 +16,8 @@ namespace pn {
 
 struct StepElementsParameters {
     double load_tolerance = 1e-12;  // change of limits that counts as rounding, relative to the largest limit
-    // Maximum ratio of two changes of limits from passes that converge. Slower limits follow force components that the
-    // cones leave open, such as the direction of slow slip.
+    // Maximum ratio of successive changes of limits in convergent passes. Larger ratios occur if the cones do not determine
+    // a force component, such as the direction of slow slip.
     double max_load_contraction = 0.5;
     // Part of the limits that elements at rest use if their limits do not converge.
     double kept_limit = 0.9;
@@ -82,7 +82,7 @@ public:
     bool limits_hold(const Program& p, Workspace& w, double t, const MeanVelocity& mean, const VecX& f);
     // Write the middles of the limits into f. Boxes of the cone problem are centered at zero force.
     void middles(VecX& f) const;
-    // Friction elements of no unilateral contact.
+    // Friction elements that belong to no unilateral contact.
     const std::vector<int>& outside_contacts() const { return outside_contacts_; }
 
 private:

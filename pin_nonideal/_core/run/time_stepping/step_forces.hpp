@@ -13,7 +13,7 @@
 namespace pn {
 
 struct StepForcesParameters {
-    // Error of the forces found tree by tree, relative to them, up to which the search with all responses is brief.
+    // Largest relative error of the forces of separate trees with which the search with all responses is brief.
     double max_brief_error = 1e-2;
     // Largest number of rows of separate trees that are solved with all responses if the search tree by tree fails. The
     // cost grows by the cube of the number, to a tenth of a second here.
@@ -26,8 +26,8 @@ struct StepForcesParameters {
     double rest_rounding = 1e-9;
     // Rounding of the rows without forces, relative to the largest acceleration. Smaller rows show no residual.
     double row_rounding = 1e-12;
-    // Accepted residual relative to the velocities. A step of a turning body can have no exact solution if corners
-    // share its load. Also the accepted error of a limit, relative to the forces. The statistics report both.
+    // Accepted residual relative to the velocities, and accepted error of a limit relative to the forces. A step of a
+    // turning body can have no exact solution if corners share its load. The statistics report both.
     double max_residual = 1e-7;
 };
 
