@@ -110,7 +110,7 @@ def quadruped(rivals: Collection[str], quick: bool, say: Callable[[str], None]) 
 
 
 def impacts(quick: bool, say: Callable[[str], None]) -> list[dict[str, Any]]:
-    """Measure the cost of an impact by number of contacts: a run past it minus a run that ends before."""
+    """Measure the cost of an impact by number of contacts: a run past it minus a shorter run."""
     rows = []
     for count in FALLS:
         model = one_body(coal.Box(*EDGES))

@@ -53,7 +53,7 @@ def one(modules: str) -> tuple[float, float]:
 
 
 def measure(quick: bool, say: Callable[[str], None] = print) -> list[dict[str, Any]]:
-    """Measure all installed modules in alternating rounds; the minimum has all files in the disk cache."""
+    """Measure all installed modules in alternating rounds; minima are without reads from the disk."""
     here = {
         name: modules
         for name, modules in MODULES.items()

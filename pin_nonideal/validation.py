@@ -35,7 +35,7 @@ def label(description: object) -> str:
 
 
 def by_name(value: Any) -> dict[Any, Any] | None:
-    """Entries by name of a mapping, a pandas Series or DataFrame, or a structured array; None of others.
+    """Entries by name of a mapping, a pandas Series or DataFrame, or a structured array; None otherwise.
 
     Args:
         value: any object.

@@ -64,7 +64,7 @@ class RunArrays:
         return q, v
 
     def among(self, n: int, runs: NDArray[np.intp], errors: Mapping[int, PinNonidealError]) -> RunArrays:
-        """Return these runs among n runs, of which the others failed before their first sample.
+        """Return n runs: these runs, and failed runs without samples.
 
         Args:
             n: number of all runs.

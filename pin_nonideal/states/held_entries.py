@@ -92,7 +92,7 @@ def polish_free(
     rows: NDArray[np.bool_],
     t: float,
 ) -> Array:
-    """Bring free coordinates near the constraints onto them, to rounding, by Newton's method.
+    """Move free coordinates onto nearby constraints, to rounding, by Newton's method.
 
     Args:
         model: pinocchio.Model.

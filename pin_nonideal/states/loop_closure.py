@@ -329,8 +329,8 @@ class Search:
     def _slide(self, iterate: Iterate, limit: float) -> tuple[Iterate, bool]:
         """Apply Newton's method for the Lagrangian in the open directions; return if it ends in a minimum.
 
-        A descent may stall at a singular configuration: the slope stays, and the steps become short. It ends
-        if all remaining steps at the decrease of the last step do not reach the limit.
+        A descent may stall at a singular configuration: the slope stays, and the steps become short. The
+        descent ends if all remaining steps with the decrease of the last step cannot reach the limit.
         """
         is_minimum = False
         last_distance, last_slope = np.inf, 0.0
@@ -400,7 +400,7 @@ class Search:
         return float(np.linalg.norm(iterate.move - Vt.T @ (Vt @ iterate.move)))
 
     def _curvature(self, iterate: Iterate, lam: Array, open_directions: Array) -> tuple[Array, Array]:
-        """Return ascending second derivatives of the Lagrangian in the open directions, and directions."""
+        """Return ascending curvatures of the Lagrangian, and their directions among the open ones."""
         n = open_directions.shape[1]
         if n == 0 or n > MANY_FREEDOMS:
             return np.ones(n), open_directions

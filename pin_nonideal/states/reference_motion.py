@@ -97,7 +97,7 @@ def break_times(model: Model, times: Array, with_rates: bool) -> Array:
 
 
 def _is_curved(model: Model) -> bool:
-    """Check if the configurations of a joint are no vectors and turn about more than one axis."""
+    """Check if a joint has configurations that are no vectors, with more than one axis of rotation."""
     return any(place.nq != place.nv and place.nv > 1 for place in joint_places(model))
 
 

@@ -27,7 +27,7 @@ MIN_INDEPENDENT_VELOCITY = 1e-6
 MAX_MOVE = 0.1  # move of a given coordinate between two closures, in rad or relative to the scene's length
 LOG_ROUNDING = 1e-3  # largest move of a given coordinate, in rad or relative to the scene's length
 # Largest change of a given velocity over the largest given velocity. Differences of logged positions stay
-# below it.
+# below this bound.
 RATE_ROUNDING = 0.1
 CLOSURE_TOL = 1e-9  # residual of a reference on the constraints, relative to the scene's length or 1 m
 

@@ -159,8 +159,8 @@ class ConeProgram:
         """Return the missing forces of a load that limits of any size cannot balance, of least sum.
 
         Returns:
-            Pull by unknown that must press. If no unknown must pull, friction by element beyond MAX_FACTOR
-            times the limit.
+            Pulling force of each unknown that must press. If no unknown must pull, friction by element beyond
+            MAX_FACTOR times the limit.
         """
         cones = self._balance(len(self.pressing), pressing=False)
         added = list(range(self.count, cones.count))

@@ -22,7 +22,7 @@ from .holding import HoldingTorque, holding_torques
 from .limit_cones import LimitCones
 from .residual import AtRest
 
-MAX_NAMED = 4  # names in a reason
+MAX_NAMED = 4  # maximum number of names in a reason
 
 
 @dataclass(frozen=True, eq=False)

@@ -66,7 +66,7 @@ class Cones:
 
         Args:
             constant: constant part of the bound.
-            bound: unknowns and coefficients of the other part.
+            bound: unknowns and coefficients of the linear part of the bound.
             unknowns: unknowns whose norm is bounded.
         """
         from clarabel import SecondOrderConeT

@@ -140,7 +140,7 @@ def _of_laws(compiled: CompiledScene, outcome: core.Outcome) -> Table:
 
 
 def _sum_of_laws(supports: Sequence[list[int]], forces: Array) -> tuple[list[int], Array]:
-    """Return the degrees of freedom on which some laws act, and the sum of their forces on them, (nt, n).
+    """Return the degrees of freedom on which the laws act, and the total force on each, (nt, n).
 
     Args:
         supports: degrees of freedom of each law.

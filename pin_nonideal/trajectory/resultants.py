@@ -88,7 +88,7 @@ def _wrench(
 ) -> Array:
     """Return the wrench of a pair of shapes on its first body, about the origin of its joint, (nt, 12).
 
-    Its own axes are those of the joint of the other body.
+    The joint of the second body gives the own axes.
     """
     model, nt, columns = compiled.model, len(outcome.t), points.of(name)
     if not columns:

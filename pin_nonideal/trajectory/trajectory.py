@@ -215,8 +215,8 @@ class Trajectory(RunFields):
         The wrench of a joint acts on the body that the joint moves, about the joint's origin, and includes
         the drive and the friction of the joint. The wrench of an anchor or contact acts on the body of
         frame1, about the origin of frame1, and includes the friction of its laws. The wrench of a pair of
-        shapes with several points acts on the later joint of the model, about the origin of this joint; its
-        own axes are those of the other joint.
+        shapes with several points acts on the body of the later joint, about the origin of this joint; "own"
+        selects the axes of the other joint.
 
         The wrench through a fixed joint, or through a link, is exerted on the part beyond it, about its
         origin: the rate of momentum of that part minus its weight and minus all other forces on it. The load

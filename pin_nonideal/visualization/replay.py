@@ -34,7 +34,7 @@ from pin_nonideal.visualization.progress import stages
 if TYPE_CHECKING:
     from pin_nonideal.trajectory.trajectory import Trajectory
 
-# Scripts that unpack the others; they are stored uncompressed.
+# Scripts that unpack the other scripts, stored uncompressed.
 BOOT = ("payload.js", "main.js")
 SCRIPTS = (
     "numbers.js",

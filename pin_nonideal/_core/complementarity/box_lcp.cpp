@@ -53,8 +53,8 @@ bool BoxProgram::solve_regular(int n) {
     return true;
 }
 
-// Compute the minimum-norm x of W_FF x = r_F on the free elements F. x is zero on the others, and on elements without
-// response.
+// Compute the minimum-norm x of W_FF x = r_F on the free elements F. Other elements, and elements without response, have x
+// = 0.
 void BoxProgram::solve_free(const MatX& W) {
     list_.clear();
     for (int i = 0; i < r_.size(); ++i)

@@ -17,7 +17,7 @@ struct LeastNormParameters {
     double rank_tolerance = 1e-10;   // smallest eigenvalue of the scaled response, relative to the largest
     double limit_tolerance = 1e-12;  // error of a force at its limit, relative to the limit
     double force_rounding = 4e-15;   // the same, relative to the largest force
-    // Part of the diagonal that is added to the Hessian. It is singular if more limits hold than loads are free.
+    // Part of the diagonal that is added to the Hessian, which is singular if more limits hold than loads are free.
     double regularization = 1e-9;
     double value_rounding = 1e-15;  // decrease of the dual function that counts as rounding, relative to it
     int max_iterations = 60;  // maximum number of Newton steps

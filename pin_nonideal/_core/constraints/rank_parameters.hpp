@@ -4,7 +4,7 @@
 namespace pn {
 
 struct RankParameters {
-    // Part of a largest squared length, or of a largest pivot, below which a new choice of rows is due.
+    // Minimum of a squared length, or of the smallest pivot, relative to its largest value, without a new choice of rows.
     double faded_part = 0.1;
     // Smallest trusted pivot of the Cholesky factor of the unit-diagonal B B^T. The relative error of the factor stays
     // below the machine precision divided by this value. Below it the orthogonal factorization of B^T is used.

@@ -55,8 +55,8 @@ struct GapKind {
 // Base of gaps between a shape on body 1 and the plane of frame 2.
 struct PlaneGap : GapKind {};
 
-// Base of gaps between a shape on each body. Shape 1 is a point, segment or disk, or a solid of revolution. Its radius and
-// the radius of shape 2 are part of the gap.
+// Base of gaps between a shape on each body. Shape 1 is a point, segment or disk, or a solid of revolution. The radii of
+// both shapes are part of the gap.
 struct ShapeGap : GapKind {};
 
 // Base of friction directions between two frames. The rates of these rows are slip velocities, and the rows hold no

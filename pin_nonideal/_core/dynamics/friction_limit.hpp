@@ -31,8 +31,7 @@ void update_limit(const Program& p, Workspace& w, int element, double t, const V
 // Limits of the force of an element that sticks in the current motion.
 SlipLimits static_limits(const Program& p, Workspace& w, int element, double t, const VecX& q, const VecX& v);
 
-// Clear the slip directions of the step's start: states between the ends of a step, which contain no reversal, set
-// their own.
+// Clear the slip directions of the step's start. States inside a step contain no reversal and set new directions.
 void reset_slip_directions(Workspace& w);
 // Friction force of an element in the last evaluation: the multiplier if it sticks, else the force of its law.
 Vec3 friction_force(const Program& p, Workspace& w, int element);

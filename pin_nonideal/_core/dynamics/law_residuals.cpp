@@ -124,7 +124,7 @@ struct Laws {
         return rate;
     }
 
-    // Power of the friction force f against a slip u, and of the largest force that opposes u: f.u + limit |u|.
+    // Power f.u + limit |u|: friction force f at slip u, minus the power of the largest force against u.
     static double missing_power(const Friction& element, const SlipLimits& limit, const Vec3& f, const Vec3& u) {
         if (element.dim > 1) return f.dot(u) + limit.reach() * u.norm();
         return f[0] * u[0] + (u[0] > 0.0 ? limit.forward * u[0] : -limit.backward * u[0]);
@@ -187,8 +187,7 @@ struct Laws {
     }
 };
 
-// Find the sticking elements whose shares of the load are determined: multipliers that exert no force leave them as they
-// are.
+// Find the sticking elements with unique shares of the load: multipliers without force do not change these shares.
 void find_determined(const Program& p, Workspace& w, std::vector<char>& is_determined) {
     if (!w.now.rows.redundant) return;
     const FreeMultipliers free = free_multipliers(p.blocks, w.now.B, p.described, w.now.rows);

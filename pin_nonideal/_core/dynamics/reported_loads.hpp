@@ -6,7 +6,7 @@
 namespace pn {
 
 struct ReportedLoadsParameters {
-    // Part of a unit vector of multipliers that exert no force below which a row takes no part in it.
+    // Smallest entry of a row that counts in a unit vector of multipliers that exert no force.
     double min_part = 1e-9;
     // Rows of separate trees beyond which equally compliant contacts take the place of the shortest multipliers, whose
     // cost grows by the cube of the number, to 20 ms here.

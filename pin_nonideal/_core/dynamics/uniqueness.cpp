@@ -69,7 +69,7 @@ bool holds(Unknowns& u, const VecX& y) {
     return true;
 }
 
-// Check if all unknowns are limits of unilateral contacts. In compression these have only one branch.
+// Check if all unknowns are limits of unilateral contacts. Such limits have only one branch in compression.
 bool only_opening(const Unknowns& u) {
     const std::vector<int> list = u.elements();
     return std::all_of(list.begin(), list.end(), [&](int e) { return u.p.frictions[e].gap >= 0; });

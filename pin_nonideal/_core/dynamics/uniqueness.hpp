@@ -22,13 +22,13 @@ inline constexpr UniquenessParameters uniqueness_parameters{};
 // to `start`, or the failure shows two.
 void decide(Unknowns& unknowns, const ReactionEquation& equation, const VecX& start, VecX& y, bool solved);
 
-// Solve with all zero-load sets after one set had no solution. y becomes the solution nearest to `start` in any set. If no
+// Solve for all zero-load sets after one set had no solution. y becomes the solution nearest to `start` in any set. If no
 // set has a solution, throw `failure`.
 void decide_over_zero_load_sets(Unknowns& unknowns, const VecX& start, VecX& y, const Failure& failure);
 
 // Search for other solutions with user functions among the unknowns. J is dg/dy at y. Throw a failure if the
-// determinant indicates other solutions and Newton's method finds one. Finding none proves nothing. If the run
-// continues, y becomes the solution that is least sensitive to changes of the loads.
+// determinant indicates other solutions and Newton's method finds one. If no solution is found, nothing is proven. If the
+// run continues, y becomes the solution that is least sensitive to changes of the loads.
 void search_other_solutions(Unknowns& unknowns, VecX& y, const MatX& J, double size);
 // Smallest det(I - dg/dy) over the combinations of branches of the laws.
 double min_determinant(const Unknowns& unknowns, const MatX& J);

@@ -22,9 +22,9 @@ namespace pn {
 // converges well.
 constexpr int max_projection_iterations = 12;
 
-// Rank tolerance of the rows while elements stick. A motion is free if sticking elements would hold it with less than
-// this part of their forces. The value is the square root of response_rank_threshold (complementarity/box_lcp.hpp), since
-// a response is quadratic in the rows.
+// Rank tolerance of the rows while elements stick. Sticking elements do not resist motions along which they act with less
+// than this part of their forces. The value is the square root of response_rank_threshold (complementarity/box_lcp.hpp),
+// since a response is quadratic in the rows.
 constexpr double rank_tolerance_sticking = 3e-7;
 
 struct Counters {

@@ -9,7 +9,7 @@
 namespace pn {
 
 // Vectors whose lengths add up to the load-dependent part of a limit. Vectors that a bearing type does not use are zero.
-// The second is linear in the moment of the wrench, the others in its force.
+// The second vector is linear in the moment of the wrench, the first and third in its force.
 using LoadVectors = std::array<Vec3, 3>;
 
 struct BearingLoad {

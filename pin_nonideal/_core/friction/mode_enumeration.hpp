@@ -7,10 +7,10 @@
 
 namespace pn {
 
-// Select the only modes whose motion satisfies their own conditions. Among several select the modes in which every
-// element sticks that sticks in any other. Return false if no tried modes satisfy them but other choices may have a
-// motion. Throw a paradox if no motion exists, or if no motion has all the sticking elements of the others. On return
-// the workspace holds the selected motion.
+// Select the modes whose conditions hold in their own motion. Of several choices, select the one that contains the sticking
+// elements of every choice. Return false if no tried choice has a motion, but untried choices may have one. Throw a paradox
+// if no motion exists, or if no choice contains all these sticking elements. On return the workspace holds the selected
+// motion.
 bool enumerate_modes(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, const ModeQuery& query);
 
 }  // namespace pn

@@ -12,16 +12,16 @@ struct ModeQuery {
     std::vector<int> at_rest;
     // Elements at rest that just reached their limit: they slip at the limit even with zero acceleration.
     std::vector<int> at_limit;
-    bool several = false;            // another motion than that of `modes` is known
-    int several_element = -1;        // element whose friction differs there, or -1 if this is not known
+    bool several = false;            // a motion with other modes than `modes` is known
+    int several_element = -1;        // element whose friction differs in that motion, or -1 if this is not known
     bool is_solved_jointly = false;  // `modes` belong to a motion solved with all contacts
     // Modes, slip directions and friction of all elements in a nearby motion, if known.
     std::vector<Mode> nearby_modes = {};
     std::vector<Vec3> nearby_directions = {}, nearby_friction = {};
 };
 
-// Set up the query from the slip velocities of the rows last evaluated. Elements at rest stick or have come to rest
-// (`also` among them). Moving elements slip along their velocities.
+// Set up the query from the slip velocities of the rows last evaluated. Elements at rest are sticking elements, elements
+// that came to rest, and `also`. Moving elements slip along their velocities.
 ModeQuery make_mode_query(const Program& p, Workspace& w, const VecX& v, int also = -1);
 // Set up the query at a start, where no mode is known, from the velocity of every element. Updates the kinematics.
 ModeQuery make_first_mode_query(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);

@@ -23,8 +23,7 @@ struct FrictionProblem {
     VecX unit, force, lam, none;  // work arrays
     bool scaled = false;         // the response is a_s = R^T a
 
-    // Set up the problem for the factors in the workspace, in which these elements do not stick. The caller sets
-    // alpha0.
+    // Set up the problem for the factors in the workspace. These elements do not stick there. The caller sets alpha0.
     FrictionProblem(const Program& p, Workspace& w, std::vector<int> elements);
     // Allocate a problem that changes with every step.
     FrictionProblem(const Program& p, const std::vector<int>& elements);

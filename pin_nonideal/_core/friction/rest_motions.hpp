@@ -14,8 +14,7 @@ public:
         : p(program), w(workspace), t_(t), list_(resting) {}
 
     // Solve for one zero-load set after the other until the motion is consistent with its own set. Return false if no
-    // motion was found. Throw a paradox if all motions are known, and no motion has all the sticking elements of the
-    // others.
+    // motion was found. Throw a paradox if all motions are known, and no motion has the sticking elements of every motion.
     bool find(RestProblem& problem, VecX& x);
     // Refine by Newton's method alone, near a solution.
     bool refine(RestProblem& problem, VecX& x);

@@ -163,7 +163,7 @@ struct Search {
         return size <= noise || along >= (1.0 - stick_slip_parameters.max_direction_deviation) * size;
     }
 
-    // Try the modes of a nearby motion. They are right if their motion satisfies all laws. Few elements are searched for
+    // Try the modes of a nearby motion, which are right if their motion satisfies all laws. Few elements are searched for
     // other motions instead.
     bool keeps_nearby_modes() {
         if (static_cast<int>(list.size()) <= max_searched_forces || query.nearby_modes.empty()) return false;

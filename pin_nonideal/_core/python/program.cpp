@@ -35,7 +35,7 @@ void bind_program(nb::module_& m) {
         .def_prop_ro("first_gap", [](const Program& p) { return p.first_gap; })
         .def_prop_ro("law_names", [](const Program& p) { return p.law_names; })
         .def_prop_ro("power_names", &power_names)
-        // Degrees of freedom on which each law acts, one law after the other, and the end of each law's among them.
+        // Degrees of freedom of all laws in sequence, and the end index of each law in this list.
         .def("law_supports", [](const Program& p) {
             std::vector<double> dofs, ends;
             for (const std::vector<int>& support : law_supports(p)) {

@@ -49,7 +49,7 @@ class FileCache:
         """Return the cached data of a content; copy it before changing it.
 
         Args:
-            content: key of the files' content and of all options of the reading.
+            content: key of the content of the files and of all options.
             read: function that reads the files if the key is not cached.
         """
         with self._lock:

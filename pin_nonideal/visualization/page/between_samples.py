@@ -151,7 +151,7 @@ class Cubics:
 def _closest(program: core.Program, q: Array, v: Array, t: Array, max_residual: float) -> tuple[Array, Array]:
     """Return configurations with closed loops, (n, nq), and their largest residuals or NaN, (n,).
 
-    Newton's method starts from residuals up to `max_residual`; others are returned as they are.
+    Configurations with residuals above `max_residual` are returned unchanged.
     """
     if not any(block.moves_in_time for block in program.constraints):
         no_values: Any = np.zeros((len(q), 0))

@@ -64,7 +64,7 @@ class Motion:
     def of(self, values: Array) -> Array:
         """Return samples of the run at the frames, by linear interpolation; (nt, ...) gives (n, ...)."""
         if values.ndim == 2 and values.shape[1] > MIN_WIDTH and not (used := values.any(axis=0)).all():
-            # By columns, so that columns of zeros take no memory.
+            # Column-major order, in which columns of zeros take no memory.
             out = np.zeros((len(self.before), values.shape[1]), np.result_type(values, self.part), order="F")
             out[:, used] = self.of(values[:, used])
             return out
@@ -206,7 +206,7 @@ class _Frames:
             wrong = (gap > POSITION_TOLERANCE * self.link) | (np.diff(times)[where] > longest)
             new = np.flatnonzero(wrong)
             new = np.sort(new[np.argsort(-gap[new], kind="stable")[:room]])
-            # Accurate intervals stay accurate; each new frame opens the two adjacent intervals.
+            # Accurate intervals leave the search; both halves of divided intervals remain in it.
             open_ones[where[~wrong]] = False
             open_ones = np.insert(open_ones, where[new], True)
             at = where[new] + 1

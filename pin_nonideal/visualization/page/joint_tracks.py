@@ -84,7 +84,7 @@ class Tracks:
         return coordinates
 
     def near(self, coordinates: Array, others: Array) -> Array:
-        """Shift coordinates by full turns and signs of quaternions to the nearest equivalent of others."""
+        """Shift angles by full turns and flip quaternions to the values nearest to given coordinates."""
         result = coordinates.copy()
         for number, track in self.moving():
             c = track.columns
@@ -143,7 +143,7 @@ class Tracks:
         return lengths
 
     def distance(self, one: Array, other: Array, reach: Array) -> Array:
-        """Return an upper bound of the distance between equal points under two sets of coordinates [m], (n,).
+        """Return an upper bound on the displacement of points between two sets of coordinates [m], (n,).
 
         Args:
             one: coordinates, (n, width).

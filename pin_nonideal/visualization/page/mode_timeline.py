@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 # Maximum number of samples at which gaps are computed.
 MAX_GAP_SAMPLES = 5000
-# Maximum number of gaps at all samples, about a quarter of a second of work. Scenes of many contacts have
-# fewer samples, but at least `MIN_GAP_SAMPLES`.
+# Maximum number of gap values of all samples, about a quarter of a second of work. Scenes of many contacts
+# have fewer samples, but at least `MIN_GAP_SAMPLES`.
 MAX_GAP_VALUES = 1e6
 MIN_GAP_SAMPLES = 20
 

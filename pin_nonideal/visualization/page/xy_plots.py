@@ -159,7 +159,7 @@ def _frictions(run: Trajectory, name: str, over_load: bool) -> list[Relation]:
 
 
 def _opposed(x: Array, limit: Array, mode: NDArray[np.int8] | None) -> tuple[Array, Array]:
-    """Return the largest friction of slipping samples against their motion, and of the others both ways."""
+    """Return the friction limits: opposite to the motion of slipping samples, in both directions at rest."""
     slips = np.zeros(len(x), dtype=int) if mode is None else np.sign(np.asarray(mode, dtype=int))
     forth, back = slips >= 0, slips <= 0
     return np.concatenate([x[forth], x[back]]), np.concatenate([-limit[forth], limit[back]])

@@ -39,14 +39,14 @@ public:
 
     // Set up the stiffness rho of all elements.
     void pose(const BlockProblem& p);
-    // bold: least proximal term first, which few refused steps enlarge, then full steps. It is fast from a good guess.
-    // patient: a proximal term as large as the error, and steps that may increase the error for a while.
+    // bold: least proximal term first, which few refused steps enlarge, then full steps. This search is fast from a good
+    // guess. patient: a proximal term as large as the error, and steps that may increase the error for a while.
     enum class Search { bold, patient };
 
     // Begin an island: errors of elements without force are relative to its largest free velocity, w under no forces.
     void begin(const BlockProblem& p, const Island& island, const VecX& free_w);
     // Solve the laws of an island from the forces f with their motion x, w = J x + offset. Return the error of the best
-    // forces found. They are left in f, with their motion. All elements yield by the part `compliance` of their own
+    // forces found, and store these forces and their motion. All elements yield by the part `compliance` of their own
     // response. `factor` keeps the order of elimination of the island.
     double solve(const BlockProblem& p, const Island& island, BlockFactor& factor, Search search, double compliance,
                  VecX& f, VecX& x, VecX& w);

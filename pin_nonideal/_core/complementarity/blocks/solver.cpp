@@ -126,7 +126,7 @@ double BlockSolver::sweep(int island, VecX& f) {
 }
 
 // Solve an island by Newton's method from the guess, else from the end of a central path, else after sweeps. Return the
-// error. A contact that loses its load may do so in one of several solutions: the one with shared loads is preferred.
+// error. If a contact loses its load in one of several solutions, the solution with shared loads is preferred.
 double BlockSolver::solve(int island, VecX& f) {
     const Island& on = islands_[island];
     const bool many = static_cast<int>(on.elements.size()) >= parameters.min_sharing, alone = many && on.nodes.size() == 1;

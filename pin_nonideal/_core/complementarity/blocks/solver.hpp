@@ -18,8 +18,8 @@ struct BlockSolverParameters {
     int last_sweeps = 400;          // number of these sweeps
     double rest_speed = 1e-9;       // speed of an island at rest, relative to that without forces
     double path_rest_speed = 1e-3;  // the same at the end of the central path
-    // Steps in an island, times its elements, after which no other search begins: about 100 ms. It is a count and no time,
-    // so that runs stay the same.
+    // Steps in an island, times its elements, after which no other search begins: about 100 ms. The bound is a count
+    // instead of a time, so that runs stay the same.
     int max_work = 100000;
 };
 

@@ -24,7 +24,7 @@ enum class ConeStatus {
     // exists if there is no such y (Klarbring, Pang, SIAM J. Optim. 8, 1998). With such a y a solution may be missing,
     // and none was found.
     jammed,
-    // No solution was found. One may still exist.
+    // No solution was found, but a solution may exist.
     failed,
 };
 

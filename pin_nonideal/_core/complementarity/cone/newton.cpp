@@ -111,7 +111,7 @@ void ConeNewton::differentiate(const ConeProblem& p, const Eigen::Ref<const VecX
     }
 }
 
-// Take the longest step that reduces the error. Return false if no step reduces the error and no blind steps are left.
+// Take the longest step that reduces the error. Return false if no step does, after `max_blind_steps` without decrease.
 bool ConeNewton::advance(const ConeProblem& p, Eigen::Ref<VecX> f, double& merit) {
     auto step = step_.vector(p.n), ahead = ahead_.vector(p.n);
     double length = 1.0;

@@ -28,7 +28,7 @@ struct ConeElement {
 using ConeKind = ConeElement::Kind;
 
 struct ConeProblemParameters {
-    // Part of the largest response below which an element has no response of its own.
+    // Smallest response of an element that counts, relative to the largest response.
     double min_element_response = 1e-14;
     // Part of large forces that counts as their rounding: 1e12 times the machine precision.
     double squeeze = 1e-4;

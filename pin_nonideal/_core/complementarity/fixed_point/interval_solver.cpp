@@ -71,8 +71,7 @@ Search::Search(const ReactionEquation& given) : eq_(given), n_(given.size()) {
     divide();
 }
 
-// Choose the unknowns to bisect: as few as leave a contraction. Each choice is the unknown without which the rest
-// contracts best.
+// Choose few unknowns to bisect, so that the others contract. Each choice leaves others with the smallest spectral bound.
 void Search::divide() {
     for (int i = 0; i < n_; ++i) following_.push_back(i);
     while (!following_.empty() && spectral_bound(among(L_, following_, following_)) > parameters.max_followed_growth) {
@@ -208,7 +207,7 @@ void Search::split(const Part& part) {
     }
 }
 
-// Check if a part holds no solution, or if its only solution is stored (Krawczyk's test).
+// Check if a part of the box holds no solution, or if its only solution is stored (Krawczyk's test).
 bool Search::is_settled(const Part& part) {
     VecX z = VecX::Zero(n_), g(n_), r;
     for (int i = 0; i < halved(); ++i) z[halved_[i]] = part.center[i];

@@ -19,7 +19,7 @@ struct IntervalSolverParameters {
     double min_determinant = 1e-8;      // smaller determinants count as zero
     double infinite_solution_scale = 1e-9;  // s below which a solution counts as infinite
     double far_newton_start = 100.0;  // start of Newton's method beyond the bends of g
-    int max_follow_passes = 1000;     // maximum passes for the unknowns that follow: 350 contract by 0.9 to rounding
+    int max_follow_passes = 1000;     // maximum passes for the other unknowns: 350 passes with a factor 0.9 reach rounding
 };
 
 struct ReactionRoots {

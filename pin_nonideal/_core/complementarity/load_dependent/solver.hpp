@@ -22,7 +22,7 @@ struct LoadDependentParameters {
 
 inline constexpr LoadDependentParameters load_dependent_parameters{};
 
-// Solve for the forces x from the guess in x. Return false if no solution was found. One may still exist.
+// Solve for the forces x from the guess in x. Return false if no solution was found, but a solution may exist.
 bool solve_rest(const RestEquation& equation, VecX& x);
 // Refine x near a solution by Newton's method alone.
 bool refine_rest(const RestEquation& equation, VecX& x);

@@ -1,4 +1,4 @@
-// Floor of the step control. Accelerations have rounding, and no step is short enough to meet a tolerance below it.
+// Lower bound on the tolerances of the step control, since no step has an error below the rounding of accelerations.
 #pragma once
 
 #include "run/output/checkpoint.hpp"

@@ -14,8 +14,8 @@ struct StiffnessGuardParameters {
     // Steps near the limit of stability until stiffness is checked. `quiet_steps` steps in a row away from the limit
     // reset the count. [Hairer, Wanner, Solving ODEs II, IV.2, checks after 15]
     long suspicious_steps = 1000, quiet_steps = 6;
-    // Fraction of the stability limit beyond which a step counts. On average, error control keeps the steps of a stiff
-    // run at this fraction.
+    // Fraction of the stability limit beyond which a step counts as stiff. On average, error control keeps the steps of a
+    // stiff run at this fraction.
     double near_border = 0.5;
     // Stability limit of Euler's rule, which time stepping applies to decaying motions.
     double euler_border = 2.0;
@@ -42,9 +42,9 @@ public:
     // A stiff run may take as many steps as the options allow, or a default number.
     StiffnessGuard(System& system, Stepper& stepper, Progress& progress, const Options& options);
 
-    // Check stiffness after a step that the error control accepts. The workspace is evaluated at the step's end before
-    // and after. Throw a Failure with the stiff dof and its rate [1/s]. Call the hint of the options if a fast motion
-    // makes the run slow, but not endless.
+    // Check stiffness after a step that the error control accepts. The workspace stays evaluated at the step's end. Throw a
+    // Failure with the stiff dof and its rate [1/s]. Call the hint of the options if a fast motion makes the run slow, but
+    // not endless.
     void check_step();
     // Restart the step count for a new run.
     void reset();
@@ -61,7 +61,7 @@ private:
 
     void check_stability_limit();
     void estimate_remaining_time();
-    // Return the fastest mode at the step's end. The workspace is evaluated at the step's end before and after.
+    // Return the fastest mode at the step's end. The workspace stays evaluated there.
     FastestMode mode_here();
     double stage_rate() const;
     VecX difference(double relative, const VecX& direction, VecX& force);

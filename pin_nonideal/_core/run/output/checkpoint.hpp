@@ -32,7 +32,7 @@ struct Progress {
     double forced_switch_time = -HUGE_VAL;  // time of the last forced mode switch
     double impact_energy = 0.0;         // total work of impacts [J]
     bool several_motions = false;  // several motions are possible, which was recorded
-    long stiff_steps = 0, quiet_steps = 0;  // steps near the stability limit, steps away from it since
+    long stiff_steps = 0, quiet_steps = 0;  // steps near the stability limit, later steps away from it
     VecX rounding;          // last measured rounding of the rates, scaled to the tolerances that it requires
     long next_rounding_check = 0;     // step number of the next measurement of rounding
     // Decades of the largest speed: time, value and number of steps when it was reached.

@@ -137,7 +137,7 @@ bool ContactProjection::is_open(const Program& p, const Workspace& w) const {
                        [&](int i) { return !is_bare(p, i) && std::abs(gap_width(p, w, i)) > allowed; });
 }
 
-// Open closed contacts whose gap other contacts keep open. Return true if a contact opens.
+// Open the closed contacts that other contacts hold apart. Return true if a contact opens.
 bool ContactProjection::open_blocked_contacts(const Program& p, Workspace& w) {
     const double allowed = max_projected_gap * scene_size(p, w);
     const auto is_apart = [&](int i) { return !is_bare(p, i) && gap_width(p, w, i) > allowed; };

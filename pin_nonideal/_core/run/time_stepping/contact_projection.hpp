@@ -27,10 +27,10 @@ public:
     explicit ContactProjection(const Program& p);
 
     // After a step of length h, project q and v onto the closed contacts and sticking elements of the workspace: gaps
-    // close, and v satisfies their rows. Contacts open if other contacts hold their bodies apart. Open contacts of the
-    // list `near` penetrate by the move at most as far as the travel of the step or the largest gap that closes. A tree
-    // that the rows hold, with a velocity of rounding, comes to rest. Return false, with q and v unchanged, if the trees
-    // cannot be projected one by one.
+    // close, and v satisfies their rows. Contacts open if other contacts hold their bodies apart. The move penetrates open
+    // contacts of the list `near` by at most the travel of the step or the largest gap that closes. A tree that the rows
+    // hold, with a velocity of rounding, comes to rest. Return false, with q and v unchanged, if the trees cannot be
+    // projected one by one.
     bool project(const Program& p, Workspace& w, double t, double h, const std::vector<int>& near, VecX& q, VecX& v);
     double numerical_energy() const { return moved_energy_; }  // energy that the last projection added, if `energy`
 

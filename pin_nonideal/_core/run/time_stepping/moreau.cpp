@@ -131,7 +131,7 @@ void Moreau::drop_prevented_slip() {
     SharedFriction::drop_prevented_slip(problem_.W, rows, problem_.alpha0);
 }
 
-// Leave the loads of elements that constraints alone hold to the constraints. The rounding of their slip has no sign.
+// Remove friction from elements that the constraints alone hold. The rounding of their slip has no sign.
 void Moreau::unload_held() {
     if (problem_.W.diagonal().all()) return;
     const double rounding = mean_.held_slip(p, a_free_);

@@ -1,7 +1,7 @@
 // Contacts of a pair of convex shapes that would push against each other in a time step.
 //
-// All contacts of two convex shapes push apart in about one direction. An edge that meets the other shape from inside pushes
-// the other way, and so does a corner at the far side of a shape of equal width.
+// All contacts of two convex shapes push apart in about one direction. An edge that meets a shape from inside pushes in the
+// opposite direction, like a corner at the far side of a shape of equal width.
 #pragma once
 
 #include <vector>
@@ -22,8 +22,8 @@ public:
 
     explicit OpposedContacts(const Program& p);
 
-    // Remove contacts that push against others of their pair from the ascending list `touching`. A face is right, else a
-    // contact that was closed before, else the one that approaches faster. The contacts must be evaluated.
+    // If contacts of one pair oppose each other, keep one direction in the ascending list `touching`. A face has priority,
+    // then a contact that was closed before, then the fastest approach. The contacts must be evaluated.
     void drop(const Program& p, const Workspace& w, const std::vector<char>& was_closed, std::vector<int>& touching);
 
 private:

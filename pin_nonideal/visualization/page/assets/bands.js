@@ -1,4 +1,4 @@
-// Band for each frictional element, colored by its mode; intervals shorter than a pixel are drawn by their shares.
+// Band for each friction element, colored by its mode; pixels with several modes show their shares.
 
 const OPEN = 2; // mode of an open contact
 const BAND = 13; // height of a band with its gap [pixels]

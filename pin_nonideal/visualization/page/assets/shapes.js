@@ -58,7 +58,7 @@ function shapeGeometry(THREE, shape, size) {
   }
 }
 
-/** Mesh with separate colors of its parts; `color` is the color of the others. */
+/** Mesh with separate colors of its parts; `color` is the default. */
 function paintedMesh(THREE, geometry, shape, color) {
   const painted = new THREE.BufferGeometry(), colors = new Float32Array(geometry.attributes.position.array.length);
   let start = 0;
