@@ -188,7 +188,7 @@ def balls_in_box(count: int) -> ContactScene:
 
 
 def wall(rows: int, columns: int) -> ContactScene:
-    """Return a wall of bricks, each on two others; those at the open side of a row tip over."""
+    """Return a wall of bricks, each on two others; bricks at the open side of a row tip over."""
     size = (0.4, 0.2, 0.2)
     at: list[tuple[float, int]] = []
     bodies = []

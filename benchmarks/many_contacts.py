@@ -37,7 +37,7 @@ QUICK = 4  # number of scenes of a quick run
 
 
 def measure(given: ContactScene, rounds: int, with_mujoco: bool) -> dict[str, Any]:
-    """Return the times of one scene, and what its motion shows.
+    """Return the times of one scene, and measures of its motion.
 
     The time of a run includes its start. This time is processor time, the minimum of some interleaved runs.
     """

@@ -161,7 +161,7 @@ def delayed_torque(
 
 
 class _IdentifiedFunction:
-    """A function of torques that is equal to those of the same drive only, see `parameter_overrides`.
+    """A function of torques that equals functions of the same drive only, see `parameter_overrides`.
 
     Args:
         function: (t, q, v) -> tau.

@@ -60,9 +60,9 @@ class CompiledScene:
         contacts: contacts of the user, as groups of `point_names`; each stop is one contact.
         multipliers: rows of `lam`, as groups of the rows of the core.
         element_names: names of the friction elements of the core.
-        elements: friction elements of the user, as groups of those of the core.
-        laws: laws of the user and of contacts with friction, as groups of those of the core.
-        works: columns of powers and works, as groups of those of the core.
+        elements: friction elements of the user, as groups of elements of the core.
+        laws: laws of the user and of contacts with friction, as groups of laws of the core.
+        works: columns of powers and works, as groups of columns of the core.
         rows: (first row in `lam`, end, whether it is a contact) of each constraint and contact, by name.
         opening_names: names of the unilateral contacts.
         block_names: names of all constraints and contacts, by block of the core.

@@ -43,7 +43,7 @@ def _is_drive(entry: object) -> bool:
 
 
 def drives_of(actuation: Any) -> tuple[Any, ...]:
-    """Return the drives of an actuation: none, one, or those of a list.
+    """Return the drives of an actuation: none, one, or all drives of a list.
 
     Args:
         actuation: the actuation of a scene, as returned by `given_actuation`.

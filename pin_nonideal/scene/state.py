@@ -1,4 +1,4 @@
-"""States of a scene: its initial one, those that users give, and the nearest that meet the constraints."""
+"""States of a scene: the initial state, given states, and the nearest states on the constraints."""
 
 from __future__ import annotations
 

@@ -402,7 +402,7 @@ def closure_nearby(
         runner: a workspace of the program.
         q: configuration, (nq,).
         enough: residual up to which no search is needed [m or rad].
-        is_nearest: whether a search goes on from the first closure to the nearest.
+        is_nearest: whether a search continues from the first closure to the nearest.
 
     Returns:
         The configuration, (nq,), and its largest residual [m or rad].

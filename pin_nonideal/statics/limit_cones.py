@@ -96,8 +96,8 @@ class LimitCones:
     def _limits(self, at_rest: AtRest, q: Array) -> tuple[list[tuple[int, float]], Array]:
         """Return the rows that load friction, with signed coefficients, and all other static limits.
 
-        Load-dependent limits of joints are those of the sticking scene. The normal force of a rolling body or
-        a bilateral contact keeps the sign that it has in the sticking scene.
+        Load-dependent limits of joints follow the loads of the sticking scene. The normal force of a rolling
+        body or a bilateral contact keeps the sign that it has in the sticking scene.
 
         Returns:
             Row and coefficient of each element, row -1 without such a row, and constant limits [N or N m],

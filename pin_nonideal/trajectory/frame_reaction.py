@@ -260,7 +260,7 @@ def _load_beyond(scene: Scene, load: Load, index: int, who: str) -> bool:
 def _shape_beyond(
     model: Model, shapes: GeometryModel | None, joint: int, names: Sequence[str], index: int
 ) -> bool | None:
-    """Check if a contact that names only the moving joint, as those of collision shapes, lies beyond a frame.
+    """Check if a contact that names only the moving joint, such as a pair of shapes, lies beyond a frame.
 
     Each shape of a `GeometryContact` belongs to a link. Another contact lies on the link of the joint itself,
     unless shapes on that body lie beyond the frame.

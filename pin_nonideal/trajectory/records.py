@@ -181,7 +181,7 @@ class ContactPoints:
 
     Attributes:
         name: name of the contact.
-        points: names of the k points; those of a pair of shapes are numbered.
+        points: names of the k points; points of a pair of shapes are numbered.
         closed: whether each point is closed, (nt, k).
         gaps: gap of each point [m], (nt, k).
         places: position of each point in the world [m], (nt, k, 3).

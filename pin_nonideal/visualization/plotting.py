@@ -99,7 +99,7 @@ def plot(
 
 
 def default_plots(runs: Sequence[Trajectory]) -> list[str]:
-    """Return the default plots of runs: those that all of them have, and the modes of any.
+    """Return the default plots of runs: plots that all runs have, and modes if any run has modes.
 
     Args:
         runs: the runs.

@@ -29,12 +29,12 @@ struct DescribedRows {
     };
     std::vector<Row> rows;     // constraints and contacts in their order, then directions of friction
     VecX weight;               // by kept row: sum of the squared factors of the rows that it represents
-    std::vector<char> yields;  // by kept row: it belongs to friction that carries only what constraints cannot carry
+    std::vector<char> yields;  // by kept row: belongs to friction that carries only loads that constraints cannot
     bool copied = false;       // some kept row represents several rows
 
     // Compute parts and weights once all rows are known.
     void finish(int kept);
-    // Let the rows of a joint's friction carry only what constraints cannot carry.
+    // Let the rows of a joint's friction carry only loads that constraints cannot carry.
     void yield(const Block& friction);
     // Return the multiplier of one described row from the multipliers of the kept rows.
     double share(int row, const VecX& lam) const {

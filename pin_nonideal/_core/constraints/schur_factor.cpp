@@ -29,8 +29,8 @@ static void multiply_tile(const double* X, int r1, const double* Y, int r2, cons
     }
 }
 
-// Multiply the rows of two blocks, one tile at a time. The rows of a block are adjacent in the layout, and those of the
-// first block do not precede those of the second.
+// Multiply the rows of two blocks, one tile at a time. The rows of a block are adjacent in the layout, and rows of the
+// first block never precede rows of the second.
 static PN_INLINE void multiply_blocks(const Block& b1, const Block& b2, const CommonDofs& common,
                                       const std::vector<double>& B, RowSystem& s) {
     const int r1 = static_cast<int>(b1.kept.size()), r2 = static_cast<int>(b2.kept.size());

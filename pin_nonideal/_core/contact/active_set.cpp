@@ -226,7 +226,7 @@ void select_active_contacts(const Program& p, Workspace& w, double t, const VecX
         if (joint_motion && joint_motion->closed == query.rest && !joint_motion->slides())
             return close(joint_motion->closed, &*joint_motion);
         if (joint_motion && joint_motion->shared) {
-            // Load shares of slipping contacts follow friction, unlike those of the cone problem.
+            // Load shares of slipping contacts follow friction, unlike shares of the cone problem.
             joint_motion->is_initial_guess = joint_motion->slides();
             return close(joint_motion->closed, &*joint_motion);
         }

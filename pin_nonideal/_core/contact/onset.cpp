@@ -11,7 +11,7 @@ namespace pn {
 
 namespace {
 
-constexpr int many = 8;  // contacts whose rest is first sought without the matrix of their responses
+constexpr int many = 8;  // minimum number of contacts for a first search without the matrix of responses
 
 // Check if the cone problem applies. All friction must be sliding of contacts that grows from zero with the load, or have
 // a constant limit. No user law may depend on reactions.

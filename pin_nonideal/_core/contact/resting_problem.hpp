@@ -22,7 +22,7 @@ struct OnsetMotion {
     bool is_initial_guess = false;  // true if this is only an initial guess for the search of the motion
 
     bool slides() const;  // some contact slips or begins to slip
-    // Set the modes of elements at rest and their slip directions at onset. An initial guess is only nearby.
+    // Set modes and slip directions of elements at rest, or the nearby motion of the query for an initial guess.
     void to_modes(const Program& p, Workspace& w, ModeQuery& query) const;
 };
 
@@ -34,7 +34,7 @@ struct OnsetQuery {
     bool prescribed = false;    // the caller sets the modes
     bool after_impact = false;  // after an impact the velocity decides if a sticking element slips
 };
-// Check if an element rests under the query, with the run state before it.
+// Check if the query treats an element as resting. `before`: run state before the query.
 bool is_at_rest(const Program& p, const Workspace& w, const VecX& v, const OnsetQuery& query,
                 const RunState& before, int element);
 
@@ -71,7 +71,7 @@ public:
 private:
     MatX chosen(const MatX& of_all) const;
     double limit(int element) const;
-    // Rows of a cone that belong to a normal, and those of its friction.
+    // Numbers of normal rows and of friction rows of a cone.
     int head(size_t i) const { return cones[i].is(ConeElement::Kind::contact); }
     int tail(size_t i) const { return cones[i].dim - head(i); }
     auto tail_of(const VecX& x, size_t i) const { return x.segment(first[i] + head(i), tail(i)); }

@@ -46,7 +46,7 @@ SlipLimits load_limits(const Program& p, Workspace& w, const Friction& f, double
     if (f.load == Friction::Load::user) return f.user_limit(p, t, q, v, w);
     double limit = f.constant;
     if (f.load == Friction::Load::none) return limit;
-    // Stages past the opening of a contact have a tensile normal force. Friction changes sign with it.
+    // Stages past the opening of a contact have a tensile normal force. Friction changes sign with this force.
     if (f.gap >= 0) return limit + f.mu * p.described.share(f.row, reactions(p, w).lam);
     for (const Vec3& vector : vectors_of_load(p, w, f)) limit += vector.norm();
     return limit;

@@ -15,8 +15,7 @@ Vec3 slip_acceleration(const Program& p, Workspace& w, const Friction& f);
 // Slip speed along the direction of the element's mode, and its rate in the current motion.
 double slip_along_mode(const Program& p, const Workspace& w, int element);
 double slip_rate_along_mode(const Program& p, Workspace& w, int element);
-// Slip speed and its rate, as above. If slip of several directions turns sideways, return its magnitude and the rate of
-// that.
+// Slip speed along the mode and its rate, or the total slip speed and its rate if slip has turned by more than 45 degrees.
 std::pair<double, double> slip_toward_rest(const Program& p, Workspace& w, int element);
 // Friction limit under a load at the current slip speed. A sticking element has slip speed zero.
 double limit_under(const Program& p, const Workspace& w, int element, double load);

@@ -45,7 +45,7 @@ struct Program {
     ImpactLaw impact_law = ImpactLaw::newton;
     std::vector<int> all_contacts;  // blocks of all contacts, in the order of their descriptions
     std::vector<int> contacts;  // blocks of kept contacts and of wheels, which need a compressive normal force
-    std::vector<int> pressing;  // rows of these forces, among those of all descriptions
+    std::vector<int> pressing;  // described rows of these forces
     int user_rows = 0;          // rows of all constraint descriptions
     struct Copy { int row, first; double factor; };
     std::vector<Copy> copies;   // described rows that are multiples of other rows and not kept

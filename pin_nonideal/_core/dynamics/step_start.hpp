@@ -26,7 +26,7 @@ void begin_step(const Program& p, Workspace& w, double t, const VecX& q, const V
 void continue_step(const Program& p, Workspace& w, double t, const VecX& v, bool chosen = false);
 // Configure and choose the independent rows, at most `max_rank`, without forces. Return true if it chose rows.
 bool begin_rows(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, int max_rank = INT_MAX);
-// Configure inside a step, which leaves the constraints. Off the constraints dependent rows seem independent, so the rank
+// Configure at a state inside a step, off the constraints. Off the constraints dependent rows seem independent, so the rank
 // is determined at the step's start (t0, q0), unless all rows were independent at an earlier start.
 void begin_rows_inside(const Program& p, Workspace& w, double t0, const VecX& q0, double t, const VecX& q, const VecX& v);
 // Choose the independent rows in a configured workspace, at most `max_rank`. Return true if it chose rows.

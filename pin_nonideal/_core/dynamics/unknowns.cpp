@@ -75,7 +75,7 @@ void Unknowns::equation(const VecX& y, ReactionEquation& found) {
     image(y, g);
     double size = std::max(y.head(n).cwiseAbs().maxCoeff(), g.head(n).cwiseAbs().maxCoeff());
     if (!(size > 0.0)) size = 1.0;
-    // Load vectors of the current motion: at y (column -1), or differences to those at y divided by the step.
+    // Load vectors of the current motion: at y (column -1), or their differences to the vectors at y, divided by the step.
     const auto read = [&](int column, double step) {
         int i = 0;
         each([&](size_t e) {

@@ -133,7 +133,7 @@ void select_rows(const Program& p, Workspace& w) {
             w.now.slipping.push_back(static_cast<int>(e));
             continue;
         }
-        // Prescribed motions carry the loads of dofs that they hold, so sticking elements have rows beside theirs.
+        // Prescribed motions carry the loads of dofs that they hold. Sticking elements along these dofs have rows too.
         if (block.dof >= 0 && !p.tied_to_drives[block.dof])
             for (int k = 0; k < block.total; ++k) w.now.terms.locked[block.dof + k] = 1;
         else

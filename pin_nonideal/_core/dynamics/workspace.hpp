@@ -157,7 +157,7 @@ struct LoadedJoint {
 struct LoadedJoints {
     std::vector<LoadedJoint> elements;
     ObliqueSweep sweep;
-    VecX known, x;  // generalized forces that read no reaction to themselves, and forces or accelerations of the sweep
+    VecX known, x;  // generalized forces independent of reactions, and forces or accelerations of the sweep
 };
 
 struct Scratch {

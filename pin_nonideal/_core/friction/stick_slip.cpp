@@ -182,7 +182,7 @@ struct Search {
         return false;
     }
 
-    // Check if the forces of the current motion hold what sticks and oppose what begins to slip.
+    // Check if the forces of the current motion hold the sticking elements and oppose slip onsets.
     bool satisfies_laws() {
         const double noise = relative_acceleration_rounding * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
         return shares_hold(p, w, list, t, q, v) &&

@@ -32,7 +32,7 @@ class Element:
 
     Attributes:
         name: name of the element in the run.
-        band: index among the modes of the run, followed by those of the points of pairs of shapes.
+        band: index among the modes of the run, followed by the modes of points of pairs of shapes.
         joint: index of the joint that carries the element's position, 0 for the world.
         point: position in that joint's frame [m], (3,), or at each frame, (n, 3), if it moves.
         axis: axis of the joint or normal of the contact, in the frame of `axis_joint`, (3,) or (n, 3).

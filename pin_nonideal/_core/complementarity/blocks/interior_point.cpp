@@ -8,7 +8,7 @@ namespace pn {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// Return the part of a point's element of a force, or of its change, in its cone. The head of a box is given.
+// Return a force of a point's element, or its change, as a vector of its cone. The head of a box is given.
 Cone BlockInteriorPoint::force(const Point& point, const VecX& f, double head) const {
     Cone out{head, Vector3d::Zero()};
     if (point.heads) out.head = point.root * f[point.row] / point.unit[0];

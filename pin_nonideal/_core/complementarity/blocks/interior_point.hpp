@@ -12,7 +12,7 @@ namespace pn {
 // Numbers are in the problem's units, in which the largest free velocity and the responses are about 1.
 struct BlockInteriorPointParameters {
     int max_steps = 40;              // maximum steps along the path
-    double gap_tolerance = 1e-9;     // mean z . u of the elements at the end, from which Newton's method goes on
+    double gap_tolerance = 1e-9;     // mean z . u of the elements at the end, from which Newton's method continues
     double residual_tolerance = 1e-6;  // largest residual at the end
     double min_step = 1e-5;          // part of a step below which rounding allows no further progress
     double smooth_speed = 1e-12;     // slip speed below which the direction is undefined
@@ -58,7 +58,7 @@ private:
     std::vector<Point> points_;
     std::vector<double> G_;
     VecX z_, df_, dx_, dw_, before_;
-    double speed_ = 1.0;  // unit of the roots of energies
+    double speed_ = 1.0;  // unit of square roots of energies
     int steps_ = 0;
 };
 

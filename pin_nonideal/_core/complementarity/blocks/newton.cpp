@@ -246,8 +246,7 @@ void BlockNewton::try_step(const BlockProblem& p, const Island& island, const Ve
     move(p, island, f_full_, x_full_, w_full_);
 }
 
-// Find the longest of some steps that reduces the squared error enough, with its error and their squared length. Return
-// false if none does.
+// Find the longest of some steps that reduces the merit, the sum of squared errors, enough. Return false if none does.
 bool BlockNewton::shorten(const BlockProblem& p, const Island& island, const VecX& f, const VecX& w, double bound,
                           int most_halvings, double& length, double& error, double& merit) {
     length = 1.0;

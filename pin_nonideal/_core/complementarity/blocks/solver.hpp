@@ -8,7 +8,7 @@ namespace pn {
 
 struct BlockSolverParameters {
     double tolerance = 1e-9;  // error of a solution. Newton stops at rounding, far below in most problems
-    double near_tolerance = 1e-8;     // error that is not worth a search from no forces, of some twenty factors
+    double near_tolerance = 1e-8;     // error up to which no search starts from no forces, which costs twenty factors
     double shared_tolerance = 1e-6;   // error of a solution with the compliance that decides shares
     double shared_compliance = 1e-4;  // compliance that decides shares of a load, relative to an element's own response
     int min_sharing = 4;              // least number of elements on a single node whose shares are decided

@@ -21,7 +21,7 @@ Vector3d ConeInteriorPoint::tail(const ConeProblem& p, int e, const Eigen::Ref<c
     return out;
 }
 
-// Return the part of element e of a force, or of its change, as a point of the cone. The head of a box is given.
+// Return the force of element e, or its change, as a vector of its cone. The head of a box is given.
 Cone ConeInteriorPoint::force(const ConeProblem& p, int e, const Eigen::Ref<const VecX>& f, double head) const {
     const double root = root_of(p.elements[e]);
     if (p.elements[e].is(ConeKind::contact)) head = root * f[p.at[e]];

@@ -8,7 +8,7 @@
 namespace pn {
 
 struct ConeNewtonParameters {
-    // Errors that end the iteration. The second one ends it if steps make no progress.
+    // Error that ends the iteration, and error that ends the iteration if steps make no progress.
     double tolerance = 1e-15, stall_tolerance = 1e-11;
     double decrease = 1e-4;     // required part of the predicted decrease
     int max_halvings = 7;       // maximum halvings of a step that does not decrease the squared error

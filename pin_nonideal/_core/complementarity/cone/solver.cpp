@@ -111,7 +111,7 @@ bool ConeComplementarity::search(Eigen::Ref<VecX> f) {
     return !brief_ && proximal_point(f);
 }
 
-// Solve with compliance to the whole forces that decreases to its limit. f is kept if this gives no solution.
+// Solve with a compliance of all forces, which decreases to its minimum. Keep f if no solution is found.
 bool ConeComplementarity::compliance_continuation(Eigen::Ref<VecX> f) {
     grown_ = problem_;
     auto there = x_.vector(problem_.n);

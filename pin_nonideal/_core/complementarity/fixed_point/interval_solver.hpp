@@ -9,7 +9,7 @@ namespace pn {
 
 struct IntervalSolverParameters {
     int max_bisected = 3;               // bisected unknowns
-    double max_work = 20000.0;          // parts of the box, weighted by the size of the matrices
+    double max_work = 20000.0;          // maximum number of parts of the box, weighted by the size of the matrices
     double max_followed_growth = 0.9;   // largest growth of the unknowns that follow
     double min_box_part = 1e-7;         // smallest part of the box (its square is rounding, where two solutions merge)
     double alone = 0.9;                 // size to which Newton's interval form must shrink a part, relative to it

@@ -1,5 +1,5 @@
 // One solution of the rest equation, from a first guess. The methods are an alternation of limits and forces, then
-// Newton's method, then a path from fixed limits to those of the loads.
+// Newton's method, then a path from fixed limits to the limits of the loads.
 #pragma once
 
 #include "complementarity/load_dependent/equation.hpp"

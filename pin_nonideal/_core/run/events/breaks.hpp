@@ -16,8 +16,8 @@ struct BreaksParameters {
     // Thresholds that start the search for a jump. `unexplained`: change of the rate beyond the integral of the
     // accelerations, relative to the rate. `uneven`: change of the acceleration, relative to the acceleration.
     double unexplained = 1e-4, uneven = 0.2;
-    // A jump keeps at least this fraction of the initial defect in one half of each bisected interval. A smooth
-    // function keeps less.
+    // A jump keeps at least this fraction of the initial defect in one half of each bisected interval. A smooth function
+    // keeps a smaller fraction.
     double kept_part = 0.3;
     // Maximum jump of a value [m or rad]. Larger jumps raise a Failure.
     double value_jump = 1e-9;

@@ -5,7 +5,7 @@
 // - load of a closed unilateral contact,
 // - gap of an open contact.
 //
-// Speeds, forces and limits at the stages show the candidates. Bounds on the motion show the gaps.
+// Speeds, forces and limits at the stages select the candidates, and bounds on the motion select the gaps.
 #pragma once
 
 #include <vector>

@@ -22,8 +22,8 @@ inline constexpr EventHandlingParameters event_handling_parameters{};
 // element gets its mode from its velocity. On return the workspace is evaluated at (t, y), and dy holds the rate.
 // Return the changes, empty without an event.
 //
-// The contacts of two bodies open if none of them has a load at a lift, or at a touch in vain. `released` receives their
-// gaps.
+// The contacts of two bodies open if none has a load at a lift, or at the touch of an opened contact. `released` receives
+// their gaps.
 std::vector<Event> switch_modes(System& system, double t, VecX& y, VecX& dy, const std::optional<FoundEvent>& event,
                                 std::vector<int>* released = nullptr);
 

@@ -75,7 +75,7 @@ public:
     void sample_monitored(double t);
 
     // Follow a step just taken, of length h with the largest |v| of each dof. Skipped gaps that the travel of their
-    // bodies may close by the step's end are monitored from then on. Return those to sample at the step's start.
+    // bodies may close by the step's end are monitored from then on. Return the gaps to sample at the step's start.
     const std::vector<int>& follow(const VecX& speed, double h);
 
     // Return the monitored gaps. Time stepping samples them once per step, at its middle. `path_length`: travel of each dof

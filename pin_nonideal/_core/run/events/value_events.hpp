@@ -1,4 +1,4 @@
-// Events at sign changes of values: user functions, and the effort left in drives.
+// Events at sign changes of values: user functions, and the remaining effort of drives.
 //
 // A step is sampled on the method's own interpolant, at its end and at places inside. The inner samples detect values
 // that cross zero and return. The step is repeated up to the first crossing, and its end is corrected until the value

@@ -62,7 +62,7 @@ public:
 private:
     // Convert dy at y to tangent coordinates.
     void to_tangent(const VecX& dy, const VecX& y);
-    // Raise the magnitudes to the sizes of tangent coordinates, velocities and law states at y.
+    // Raise the magnitudes to at least the absolute values of tangent coordinates, velocities and law states at y.
     void magnitude(const VecX& y);
 
     System& system_;

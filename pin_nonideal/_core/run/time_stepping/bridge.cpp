@@ -205,7 +205,7 @@ void TimeStepping::step(double size, double stop, double t_end) {
     if (watched || system_.watches())
         for (const Event& change : changes_since(system_, t, closed_before_, before_)) out_.events.push_back(change);
     warnings_.check_tension(std::nullopt);
-    // What a run records must not change the events of its bridged stretches.
+    // The records of a run must not change the events of bridged stretches.
     const bool is_evaluated = progress_.has_forces && options_.method.scheme == Method::Scheme::moreau;
     if (is_evaluated || system_.ng == 0) warnings_.check_uniqueness(false);
     output_.keep_time_step(from, y_from);

@@ -54,7 +54,7 @@ private:
     const bool is_autonomous_;  // a state that a step leaves unchanged stays unchanged
     bool misses_laws_ = false;  // the last step violated the laws of contact
     double rounding_ = 0.0;  // difference of two times that are one end of a step
-    const bool samples_every_step_;  // every step's end is a sample, or is read like one
+    const bool samples_every_step_;  // every step's end is a sample, or user code reads it
     // Something reads accelerations and forces. If nothing does, steps of separate trees evaluate none.
     const bool reads_forces_;
     VecX y_from_;

@@ -65,7 +65,7 @@ private:
         int gap;
         double width;  // before the projection, at most 0
     };
-    std::vector<Open> open_, penetrating_;  // open contacts, and those that the moves let penetrate
+    std::vector<Open> open_, penetrating_;  // open contacts, and contacts that the moves let penetrate
     std::vector<double> width_;             // by row: width that its gap gets
     double moved_energy_ = 0.0, weight_ = 0.0;
 };

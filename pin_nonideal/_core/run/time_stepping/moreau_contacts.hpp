@@ -29,7 +29,7 @@ public:
 
     MoreauContacts(System& system, GapWatch& watch);
 
-    // Forget the gaps and the rest of earlier steps.
+    // Discard the gaps and forces of earlier steps.
     void reset() {
         q_sampled_.resize(0);
         forces_.reset();

@@ -28,9 +28,9 @@ public:
     static bool are_dependent(const Responses& W, const std::vector<int>& rows);
     // Replace the forces of elements that stick by the forces of least norm with the same motion.
     void share(const Responses& W, const std::vector<Element>& sticking, VecX& force);
-    // Remove the slip of the rows that constraints prevent. Each row must respond to its force. The slip is left of the
-    // rows at the step's middle, at which the velocity of the start does not satisfy the constraints, and no force can
-    // change it. Friction may grow against it without end.
+    // Remove the slip of the rows that constraints prevent. Each row must respond to its force. This slip arises because
+    // the velocity of the start does not satisfy the constraints at the step's middle. No force changes this slip, and
+    // friction may grow against it without end.
     static void drop_prevented_slip(const Responses& W, const std::vector<int>& rows, VecX& slips);
 
 private:
