@@ -43,9 +43,9 @@ class TrackTrajectory(SceneDrive):
     last sample, the reference rests at the end of the samples: v_r = a_r = 0. Steps end at the first and the
     last sample. Steps end at all samples if v is given, or if the configurations of a joint are no vectors.
 
-    The drive commands the joints of `joints`. If `joints` is None, it commands the joints that q names. If q
-    is an array, it commands the joints that kp or kd name, a number acts on joints with one degree of
-    freedom, and an array commands the joints with a gain. Other joints have no torque.
+    The drive commands the joints of `joints`. If `joints` is None, the drive commands the joints that q
+    names. If q is an array, the drive commands the joints that kp or kd name. A number acts on joints with
+    one degree of freedom, and an array on joints with a gain. Other joints have no torque.
 
     The feedforward is one of
 

@@ -1,8 +1,8 @@
 """Wrench through a fixed joint or frame: the load that the part beyond it receives.
 
-Pinocchio merges the links of fixed joints into the body of a moving joint, but keeps the inertia of each such
-link in the frame of its fixed joint, and the order of frames from parent to child. The part beyond a frame
-consists of the frames that descend from it on its body, and of the moving joints that they carry.
+Pinocchio merges the links of fixed joints into the body of a moving joint. The frame of a fixed joint keeps
+the inertia of its link. Frames are in order from parent to child. The part beyond a frame consists of the
+frames that descend from it on its body, and of the moving joints that they carry.
 """
 
 from __future__ import annotations
@@ -66,8 +66,8 @@ def carrier_of(model: Model, name: str) -> int:
 def frame_reaction(run: RunFields, name: str, index: int) -> Array:
     """Compute the wrench through a frame at all samples, in its own axes and in world axes, (nt, 12).
 
-    The wrench is Y a + v x* Y v of the part of the body beyond the frame, with a relative to free fall, plus
-    the reactions of the joints on that part, minus the loads on it.
+    The wrench is Y a + v x* Y v of the part of the body beyond the frame, plus reactions of the joints on
+    this part, minus loads on it. The acceleration a is relative to free fall.
 
     Args:
         run: the Trajectory, with reactions and accelerations.

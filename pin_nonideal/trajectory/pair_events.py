@@ -14,7 +14,7 @@ from pin_nonideal.types import Array
 
 from .records import Event
 
-# Kinds of events by the change that they need in the contact.
+# Kinds of events, by the required change of the contact.
 OPENS_OR_CLOSES = {"touch_down": True, "lift_off": False}
 SLIPS = {"slip": True, "reverse": True, "stick": False}
 

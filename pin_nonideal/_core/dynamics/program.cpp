@@ -100,7 +100,7 @@ VecX Program::user_multipliers(const VecX& lam) const {
     return all;
 }
 
-// Return the dofs along which rows of a block may act: those between its bodies, or its coordinates.
+// Return the dofs along which rows of a block may act: the dofs between its bodies, or of its coordinates.
 static std::vector<int> acting_dofs(const Program& p, const Block& block) {
     if (block.kept.empty()) return {};
     if (!frames(block.kind).first) return dofs(block.kind, p.mechanism);

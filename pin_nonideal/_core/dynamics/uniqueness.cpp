@@ -182,7 +182,7 @@ void differentiate(Unknowns& u, const VecX& y, const VecX& g, double size, MatX&
 
 namespace {
 
-// Unknowns of each law, [first, last): a friction's limit or a user law's force.
+// Unknowns of each law, [first, last): the limit of an element or the force of a user law.
 std::vector<std::pair<int, int>> groups(const Unknowns& u) {
     std::vector<std::pair<int, int>> list;
     const int nv = u.p.mechanism.nv;

@@ -50,7 +50,7 @@ public:
     // response. `factor` keeps the order of elimination of the island.
     double solve(const BlockProblem& p, const Island& island, BlockFactor& factor, Search search, double compliance,
                  VecX& f, VecX& x, VecX& w);
-    // Solve the laws without compliance from the forces of the last solution, which had a small one, with its factor.
+    // Solve the laws without compliance, from the forces and the factor of a solution with small compliance.
     double solve_without_compliance(const BlockProblem& p, const Island& island, BlockFactor& factor, VecX& f, VecX& x,
                                     VecX& w);
     // Return the error of the forces f with the rows w of their motion.

@@ -1,8 +1,8 @@
 // Solver of contacts with Coulomb friction, for accelerations, impacts and time stepping. The solver finds f of the problem
 // of cone/problem.hpp for any square W (of any rank, symmetric or not). Newton's method on the modes starts from a warm
-// start, or else from zero. If it fails, the fallbacks are Newton's method from the end of the central path, proximal points
-// with decreasing compliance, and random starts unless a certificate shows that a solution may not exist. Buffers grow to
-// the largest problem. A call allocates no memory after that.
+// start, or else from zero. The fallbacks are Newton's method from the end of the central path, then proximal points with
+// decreasing compliance, then random starts. A certificate that a solution may not exist prevents random starts. Buffers
+// grow to the largest problem. A call allocates no memory after that.
 #pragma once
 
 #include "complementarity/cone/certificate.hpp"

@@ -90,7 +90,7 @@ void Search::divide() {
     spread_ = pn::inverse(MatX::Identity(m, m) - among(L_, following_, following_));
 }
 
-// Compute the following unknowns for the bisected ones in z, starting at z. Return false if the iteration does not end.
+// Compute the other unknowns from the bisected unknowns in z, starting at z. Return false without convergence.
 bool Search::follow(VecX& z, double s) const {
     const int m = static_cast<int>(following_.size());
     if (m == 0) return true;

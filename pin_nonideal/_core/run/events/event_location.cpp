@@ -44,8 +44,8 @@ double EventLocator::margin_at_end(const Watch& watch) {
     return search_.margin(watch, stepper_.t0 + stepper_.h, stepper_.y1);
 }
 
-// Check if slip in several directions has come to rest at the end of a fixed step, or at the end of an adaptive step
-// that begins with slip whose direction neither rounding nor the tolerances resolve. No such step locates the rest.
+// Check if slip in several directions has come to rest at the end of a step that does not locate the rest: a fixed step, or
+// an adaptive step that begins with slip below the tolerances and without a defined direction.
 bool EventLocator::has_arrived(int e) const {
     if (p.frictions[e].dim == 1 || stepper_.method.outside()) return false;
     const double scale = 1.0 + system_.velocity(stepper_.y1).cwiseAbs().maxCoeff();

@@ -20,9 +20,9 @@ struct MeanVelocityParameters {
     double max_unpredicted = 0.1;
 };
 
-// The mean of the velocities at the start and at the end of a step depends on the forces. Sweeps find it. The first one
-// takes the forces at a prediction by the rates of the last steps: constant, linear or none, as would have predicted the
-// last step best.
+// Sweeps compute the mean of the velocities at the start and at the end of a step, which depends on the forces. The first
+// sweep takes the forces at a prediction from the rates of the last steps. The prediction is constant, linear or none, by
+// its error in the last step.
 //
 // The linear velocity v of a free flyer is given in axes that turn with it. Inside a step it is given in the axes at the
 // middle of the step, so that the velocity u = v + w x c of its center of mass c keeps its direction in space. Its rate

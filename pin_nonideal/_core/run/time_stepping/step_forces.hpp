@@ -52,7 +52,7 @@ public:
     bool are_dependent() const { return are_dependent_; }
     // Replace the forces of such friction that sticks by the forces of least norm with the same motion.
     void share_loads(double h, const VecX& v0);
-    // Remove the slip of such friction that constraints prevent, of elements that no prescribed motion moves.
+    // Remove slip of this friction that constraints prevent, except for elements that prescribed motions move.
     void drop_prevented_slip();
     // Compute the rows at the step's end under the forces.
     void measure_end();

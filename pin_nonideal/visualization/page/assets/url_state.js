@@ -1,6 +1,6 @@
-// State of the page in its address: #t=1.5&view=x,y,z&speed=0.1&span=0,2. A view that frames the motion has the
-// direction from which it is seen, so that other windows frame it too; a view moved by hand or a camera that follows
-// has cam=azimuth,elevation,distance,x,y,z.
+// State of the page in its address: #t=1.5&view=x,y,z&speed=0.1&span=0,2. A view that frames the motion
+// stores its direction only, so that other windows frame the motion too. A view moved by hand or a following
+// camera stores cam=azimuth,elevation,distance,x,y,z.
 
 class UrlState {
   constructor(player) {
