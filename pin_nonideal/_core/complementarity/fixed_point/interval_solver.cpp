@@ -34,7 +34,7 @@ private:
     void newton_from(VecX z);
 
     int halved() const { return static_cast<int>(halved_.size()); }
-    // Return the unknown that s replaces in a part of this kind, or -1.
+    // Return the bisected unknown that is fixed at one in a part, or -1 if s is fixed.
     int column(const Part& part) const { return part.fixed == halved() ? -1 : halved_[part.fixed]; }
 
     ReactionEquation eq_;

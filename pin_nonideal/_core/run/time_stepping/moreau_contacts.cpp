@@ -279,7 +279,7 @@ bool MoreauContacts::rest_within_limits(double t) {
            elements_.limits_hold(p, w, t, mean_, forces_.f);
 }
 
-// Find the forces of the step under limits that follow the loads. As Moreau::solve_friction.
+// Find the forces of the step under limits that follow the loads. The iteration is the one of Moreau::solve_friction.
 void MoreauContacts::solve_forces(double t) {
     if (find_forces(t)) return;
     if (!forces_.are_dependent()) throw Failure(Failure::Kind::not_converged, t);

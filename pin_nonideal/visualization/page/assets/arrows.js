@@ -56,7 +56,7 @@ class Arrows {
     }
   }
 
-  /** Draws all arrows: `reach` [m] is the length of the largest, `thick` [m] the thickness of the shafts. */
+  /** Draws all arrows: `reach` [m]: length of the largest arrow, `thick` [m]: thickness of the shafts. */
   update(reach, thick) {
     for (const arrow of this.items) {
       if (!arrow.drawn) {

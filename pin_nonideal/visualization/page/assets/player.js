@@ -286,7 +286,7 @@ class Player {
     const taken = (card, side, room) => (card[side] ? card[side] + room : 0);
     // The panel begins below the heading, and ends above the buttons if they lie under it.
     const heading = element("heading"), beside = narrow || box.hidden ? 0 : box.offsetWidth;
-    const room = `${Math.max(width - beside - 36, 200)}px`;  // on a low stage its lines are few only if they are long
+    const room = `${Math.max(width - beside - 36, 200)}px`;  // a low stage has space for few, long lines only
     heading.style.maxWidth = beside ? (height < 330 ? room : `min(60%, ${room})`) : "";
     const tools = element("tools"), panel = element("panel"), under = tools.offsetLeft < panel.offsetLeft + panel.offsetWidth;
     panel.style.top = `${height < 330 && element("runs").hidden ? 8 : heading.offsetTop + heading.offsetHeight + 8}px`;
