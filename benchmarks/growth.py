@@ -257,7 +257,7 @@ def slipping(sizes: tuple[int, ...]) -> Iterator[Row]:
 
 
 def short(sizes: tuple[int, ...]) -> Iterator[Row]:
-    """One step of the Panda by `simulate`, by `rollout` of many states, and by `scene.step`."""
+    """One step of the Panda: by simulate, by rollout of very many, by scene.step."""
     scene = pn.load("panda_friction")
     scene = pn.Scene(scene.model, q0=scene.q0)
     q, v = scene.initial_state()

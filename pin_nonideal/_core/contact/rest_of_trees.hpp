@@ -11,7 +11,7 @@ namespace pn {
 struct RestOfTreesParameters {
     // Error of the forces that counts as rounding.
     double tolerance = 1e-10;
-    // Largest force, relative to the load of all trees. Larger forces only squeeze, and their rounding holds the load.
+    // Largest force, relative to the load of all trees. Rounding of larger, squeezing forces is as large as the load.
     double max_force_ratio = 1e4;
 };
 

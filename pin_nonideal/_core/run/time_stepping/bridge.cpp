@@ -38,7 +38,7 @@ TimeStepping::TimeStepping(System& system, Progress& progress, GapWatch& watch, 
       reads_forces_(options.record.evaluates() || reads_forces_always(system.p, options)) {}
 
 // End of a step of this size: at a stop, a jump of the actuation or a due sample before it. Times that differ only by
-// rounding are one end, the latest of them.
+// rounding count as one end, the latest time.
 double TimeStepping::end_of_step(double size, double stop, double t_end) const {
     double end = progress_.t + size;
     bool met = false;

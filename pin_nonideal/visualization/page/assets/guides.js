@@ -25,7 +25,7 @@ class Guides {
     for (const trail of run.trails.slice(0, 12)) this.addTrail(trail.joint, trail.point);
   }
 
-  /** Adds the path of a point on a joint, bold for the past and faint for the future; no path if all frames are too few. */
+  /** Adds the path of a point on a joint, bold for the past and faint for the future; no path if frames are too sparse. */
   addTrail(joint, point) {
     const { places, times } = [3000, 20000].map((most) => this.kinematics.path(joint, point, most)).find((path) => !ragged(path.places)) || {};
     if (!places) return;
