@@ -27,7 +27,7 @@ from .options import RunOptions, run_options
 from .results import finish
 from .rollout_arrays import RunArrays, run_arrays
 
-MAX_JOBS = 100_000  # of negative numbers: -n leaves n - 1 processors free
+MAX_JOBS = 100_000  # also for negative numbers: -n leaves n - 1 processors free
 
 
 def rollout(

@@ -75,7 +75,7 @@ class LimitCones:
         left = acting - reached.T @ (reached @ acting)
         self.holds = bool(np.linalg.norm(left) <= BALANCE_TOL * self.unit)
         self.unheld = np.linalg.solve(root.T, left)
-        place = np.cumsum(acts) - 1  # of each unknown among those that act
+        place = np.cumsum(acts) - 1  # index of each unknown among the acting unknowns
         parts = [self.parts[e] for e in self._elements]
         self.program = ConeProgram(
             reached @ scaled[acts].T,

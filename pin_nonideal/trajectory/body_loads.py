@@ -44,7 +44,7 @@ class Load(NamedTuple):
 
 
 def loads_on_bodies(run: RunFields) -> Iterator[Load]:
-    """Yield the wrenches on all bodies: of constraints and contacts, of applied forces and of drags.
+    """Yield the wrenches on all bodies by constraints, contacts, applied forces and drags.
 
     Args:
         run: fields of the run, with reactions.

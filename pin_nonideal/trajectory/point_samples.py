@@ -19,7 +19,7 @@ from .records import ContactPoints
 
 @dataclass(frozen=True, eq=False)
 class PointSamples:
-    """Samples of contact points: of the points of pairs of shapes that touch, or of all contact points.
+    """Samples of the touching points of pairs of shapes, or of all contact points.
 
     Attributes:
         names: names of the n points.

@@ -6,7 +6,7 @@ import io
 
 from matplotlib.figure import Figure
 
-RESOLUTION = 110  # of the picture in a notebook [dots per inch]
+RESOLUTION = 110  # resolution of pictures in a notebook [dots per inch]
 
 
 class NotebookFigure(Figure):

@@ -73,7 +73,7 @@ void LeastNormFriction::respond(const Element& element, VecX& change) const {
     change -= weight_.cwiseProduct(range_ * y);
 }
 
-// Find Newton's step. Multipliers that it would move from zero below zero stay.
+// Find Newton's step. Multipliers remain zero if the step would make them negative.
 void LeastNormFriction::find_step() {
     changed_.clear();
     for (size_t e = 0; e < elements_.size(); ++e)

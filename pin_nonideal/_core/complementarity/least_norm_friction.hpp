@@ -55,10 +55,10 @@ private:
     MatX range_;          // V
     VecX motion_;         // V^T g
     VecX weight_, offset_, g_, change_;
-    double value_ = 0.0;         // of the dual function
+    double value_ = 0.0;         // value of the dual function
     std::vector<int> changed_;   // elements whose multipliers change
-    VecX step_;                  // of these multipliers
-    Eigen::LLT<MatX> factor_;    // of V^T V / (1 + nu)
+    VecX step_;                  // step of these multipliers
+    Eigen::LLT<MatX> factor_;    // factor of V^T V / (1 + nu)
 };
 
 }  // namespace pn

@@ -25,7 +25,7 @@ struct RowChoice {
 };
 
 struct RowSystem : RowChoice {
-    Envelope envelope;              // of the blocks in use
+    Envelope envelope;              // envelope of the blocks in use
     std::vector<double> G, factor;  // B B^T and its Cholesky factor, in the envelope
     VecX scale;                     // 1 / length of each row of B
     std::vector<char> required;     // rows that must hold (constraints, sticking elements)

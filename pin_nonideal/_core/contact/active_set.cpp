@@ -205,7 +205,7 @@ void select_active_contacts(const Program& p, Workspace& w, double t, const VecX
         w.state = before;
         return onset_motion(p, w, t, q, v, query);
     };
-    std::optional<Failure> failure;  // of the first active set without a motion
+    std::optional<Failure> failure;  // failure of the first active set without a motion
     const auto seek = [&](const Choice& start, const OnsetMotion* joint_motion, bool needs_opposed_friction) {
         Choice first = start;
         if (query.opening_gap >= 0) first[query.opening_gap] = 0;

@@ -21,7 +21,7 @@ struct ContactRows {
     Workspace& w;
     const std::vector<int>& gaps;
     std::vector<int> others;         // friction elements that belong to no contact
-    std::vector<ConeElement> cones;  // of the contacts, then of the other elements
+    std::vector<ConeElement> cones;  // cones of the contacts, then of the other elements
     std::vector<int> first;          // first row of each
     MatX W, response;        // velocities of the rows, and v, for a unit of each force or impulse
     VecX velocity;           // velocities of the rows

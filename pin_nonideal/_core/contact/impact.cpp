@@ -23,7 +23,7 @@ namespace {
     throw Failure(Failure::Kind::inconsistent, t, blocks);
 }
 
-// Solve for the impulses of contacts, and of dry-friction boxes after them, for the velocities w0.
+// Solve for the impulses of contacts and of boxes of dry friction, for the velocities w0.
 VecX percussions(const ContactRows& rows, double t, const MatX& W, const VecX& w0,
                  const std::vector<ConeElement>& elements) {
     VecX P = VecX::Zero(w0.size());

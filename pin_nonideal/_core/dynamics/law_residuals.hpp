@@ -46,7 +46,7 @@ struct LawResiduals {
     LargestResidual signorini;    // min(N, gap acceleration) = 0 of touching contacts with gap rate zero, by block
     LargestResidual coulomb;      // |f| <= limit, by friction element
     LargestResidual dissipation;  // f opposite to the slip velocity, or to the slip acceleration at rest, by element
-    double friction_tolerance = law_residual_parameters.tolerance;  // of the last two
+    double friction_tolerance = law_residual_parameters.tolerance;  // tolerance of the last two residuals
 
     // Return the law with the largest residual, relative to its tolerance.
     std::pair<MotionLaw, LargestResidual> largest() const;

@@ -85,7 +85,7 @@ struct Runner {
 
 private:
     ReusedRun run_;  // kept run, which records only states
-    MotionState state_;  // of the motion whose modes were chosen last
+    MotionState state_;  // state of the motion with the last selected modes
     std::vector<Vec3> directions_;  // given slip directions of the elements
 
     // Set the state and the torques. Throw std::invalid_argument if they do not fit the model, which Python explains.

@@ -112,7 +112,7 @@ def contact_surfaces(
 
 def _round_bodies(compiled: CompiledScene) -> list[Visual]:
     """Return the spheres and capsules in contact with each other, for a scene without shapes."""
-    sides: dict[tuple[Any, ...], None] = {}  # of many contacts each, in their order
+    sides: dict[tuple[Any, ...], None] = {}  # ordered set, since many contacts share a shape
     for item in point_contacts(compiled.spec.contacts):
         if isinstance(item, SphereContact):
             sides[item.frame1, CENTER, item.radius1] = sides[item.frame2, CENTER, item.radius2] = None

@@ -49,7 +49,7 @@ private:
     bool eliminate_symmetric();
     bool eliminate_general();
 
-    std::vector<char> connected_;  // of two nodes of the island
+    std::vector<char> connected_;  // pairs of connected nodes of the island
     std::vector<int> links_, last_links_;  // nodes, and the two nodes of each element
     std::vector<int> pattern_, last_pattern_, place_, entries_, exchanges_;
     std::vector<Position> positions_;

@@ -39,9 +39,9 @@ private:
         int row = 0, dim = 0, heads = 0, tails = 0;  // rows: first one, number, of the normal, tangential
         bool in_path = true;
         double mu = 0.0, root = 1.0;
-        double unit[3] = {1.0, 1.0, 1.0};                 // of forces, and inverse of that of velocities
+        double unit[3] = {1.0, 1.0, 1.0};                 // unit of forces, inverse unit of velocities
         Eigen::Matrix3d inverse = Eigen::Matrix3d::Zero();  // S^-1
-        Eigen::Vector3d residual = Eigen::Vector3d::Zero();  // of u = w + (mu |w_t|, 0)
+        Eigen::Vector3d residual = Eigen::Vector3d::Zero();  // residual of u = w + (mu |w_t|, 0)
     };
 
     void start(const BlockProblem& p, const BlockNewton& newton, const Island& island, VecX& f);

@@ -103,7 +103,7 @@ private:
     std::vector<Projection> there_;  // at the last evaluation
     VecX y_, e_, z_, df_, dx_, dw_, f_best_;
     VecX f_full_, x_full_, w_full_;  // forces and motion of the full step
-    VecX f_part_, w_part_;           // of a shorter one
+    VecX f_part_, w_part_;           // the same for a shorter step
     double compliance_ = 0.0;
     double yielding_ = 0.0;      // compliance and proximal weight of the last factor, 0 if the last solution needed none
     bool keeps_factor_ = false;  // the next step uses the last factor

@@ -15,12 +15,12 @@ struct ConeResiduals {
 
 struct ConeEnergyParameters {
     double factor = 2.0;     // accepted excess of the energy that the forces convey
-    double rounding = 1e-9;  // of the same energy if no force acted on other elements than its own
+    double rounding = 1e-9;  // accepted excess, relative to the same energy for a diagonal W
 };
 
 // Check if forces add energy. Forces that solve the laws satisfy f . w <= 0, that is, f^T W f <= -f . w0. `conveyed` is
-// f^T W f, `free` is -f . w0, and `uncoupled` the first if W were diagonal. Errors relative to the forces do not show this
-// where the forces themselves are far too large.
+// f^T W f, `free` is -f . w0, and `uncoupled` is `conveyed` for a diagonal W. Errors relative to the forces do not show
+// this if the forces are far too large.
 bool add_energy(double conveyed, double free, double uncoupled);
 // Check if the forces f of a problem add energy.
 bool add_energy(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const VecX>& w0, const Eigen::Ref<const VecX>& f);

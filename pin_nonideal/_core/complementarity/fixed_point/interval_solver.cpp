@@ -71,7 +71,8 @@ Search::Search(const ReactionEquation& given) : eq_(given), n_(given.size()) {
     divide();
 }
 
-// Choose few unknowns to bisect, so that the others contract. Each choice leaves unknowns with the smallest spectral bound.
+// Choose few unknowns to bisect, so that the others contract. Each choice minimizes the spectral bound of the remaining
+// unknowns.
 void Search::divide() {
     for (int i = 0; i < n_; ++i) following_.push_back(i);
     while (!following_.empty() && spectral_bound(among(L_, following_, following_)) > parameters.max_followed_growth) {

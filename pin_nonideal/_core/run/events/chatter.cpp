@@ -61,7 +61,7 @@ void ChatterDetector::bridge_stretch(int element, double t_end) {
     w.state.solves_directions = false;
     while (progress_.t < stop) time_stepping_.step(dt, stop, t_end);
     progress_.bridged_end = progress_.t;
-    w.now.no_motion = false;  // of the last step only
+    w.now.no_motion = false;  // concerns the last step only
 }
 
 }  // namespace pn

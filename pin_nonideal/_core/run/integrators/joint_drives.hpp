@@ -55,8 +55,8 @@ public:
 private:
     bool any_ = false;
     bool controls_position_ = false;  // some gain of the position control is not zero
-    VecX stiffness_, damping_;  // of all drives
-    VecX kp_, kd_;              // of the position control
+    VecX stiffness_, damping_;  // sums over all drives
+    VecX kp_, kd_;              // gains of the position control
     std::vector<LuGre> bristles_;
     std::vector<Sigmoid> sigmoids_;
 };

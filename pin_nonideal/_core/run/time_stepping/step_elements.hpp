@@ -92,7 +92,7 @@ private:
 
     std::vector<int> outside_contacts_;
     std::vector<int> rubbing_;  // friction elements that take part, except the sliding of contacts
-    double last_change_ = 0.0;       // of the limits between two passes
+    double last_change_ = 0.0;       // change of the limits between two passes
     std::vector<double> from_, to_;  // sizes and middles of the limits before and after the update
     AndersonAcceleration loads_;
 };

@@ -50,7 +50,7 @@ public:
     bool solve(double h, const VecX& q0, const VecX& v0);
     // Check if some forces of dry friction outside of cones do not move the bodies.
     bool are_dependent() const { return are_dependent_; }
-    // Replace the forces of such friction that sticks by the forces of least norm with the same motion.
+    // Replace sticking forces of this friction by the forces of least norm with the same motion.
     void share_loads(double h, const VecX& v0);
     // Remove slip of this friction that constraints prevent, except for elements that prescribed motions move.
     void drop_prevented_slip();
@@ -96,7 +96,7 @@ private:
     const StepElements& elements_;
     SeparateTrees trees_;
     bool separate_ = false;
-    double error_ = 0.0;     // of the last solution, relative to the rows without forces
+    double error_ = 0.0;     // error of the last solution, relative to the rows without forces
     bool has_load_ = false;  // the rows without forces are more than rounding
     StepResponses responses_;
     SharedFriction shared_;
