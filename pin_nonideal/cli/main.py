@@ -43,7 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line.
 
     Args:
-        arguments: words after the name of the command; None selects those of the process.
+        arguments: words after the name of the command; None selects the words of the process.
 
     Returns:
         Exit code.

@@ -50,9 +50,9 @@ def rollout(
     failures: str = "raise",
     as_arrays: bool = False,
 ) -> Any:
-    """Simulate many initial states in native threads; each result is bitwise that of its own `simulate`.
+    """Simulate many initial states in native threads; each result equals `simulate` bit by bit.
 
-    With `parameters`, numbers differ between runs. Each run is bitwise that of a scene with its numbers:
+    With `parameters`, numbers differ between runs. A scene with these numbers has the same run, bit by bit:
 
         pn.rollout(scene, None, None, 1.0, parameters={
             "elbow": {"mu": [0.1, 0.2, 0.3]},              # fields of the law, contact or force of that name

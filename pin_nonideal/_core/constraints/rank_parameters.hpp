@@ -9,10 +9,10 @@ struct RankParameters {
     // Smallest trusted pivot of the Cholesky factor of the unit-diagonal B B^T. The relative error of the factor stays
     // below the machine precision divided by this value. Below it the orthogonal factorization of B^T is used.
     double min_schur_pivot = 1e-5;
-    // Sine of the angle to other rows above which a row of a permanent constraint is independent for certain. Such rows
-    // are chosen before rows of contacts and friction.
+    // Smallest sine of the angle to other rows with which a row of a permanent constraint is certainly independent. Such
+    // rows are chosen before rows of contacts and friction.
     double clear_pivot = 1e-2;
-    // Part of the squared length of the longest row of a block below which a row is rounding.
+    // Largest squared length of a row that is rounding, relative to the longest row of its block.
     double vanishing_square = 1e-28;
     // Relative difference of squared lengths below which two columns tie. The earlier column then goes first, so that
     // rounding does not choose among equal rows.

@@ -208,7 +208,7 @@ void set_contacts(const Program& p, Workspace& w, const std::vector<char>& close
 inline bool any_closed(const RunState& state) {
     return !state.closed.empty() && std::memchr(state.closed.data(), 1, state.closed.size());
 }
-// Check if a sticking element of single dofs locks them. Else its rows hold them.
+// Check if a sticking element of single dofs locks these dofs, without rows.
 inline bool is_locked(const Workspace& w, const Block& friction) {
     return friction.dof >= 0 && w.now.terms.locked[friction.dof];
 }

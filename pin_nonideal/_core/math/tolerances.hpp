@@ -10,19 +10,19 @@ namespace pn {
 // Rank tolerance on the pivots of B^T, with each row divided by its greatest length. On the manifold, rounding and
 // constraint drift reach about 1e-12. True directions of light mechanisms lie above 1e-7.
 constexpr double rank_tolerance = 1e-10;
-// Pivot of the rows' unit-diagonal factor below which a position is near a singular one. The pivot is the squared sine
-// of the angle between the nearest row and the other rows: 3 degrees.
+// Smallest pivot of the rows' unit-diagonal factor at a position that is not near a singular position. The pivot is the
+// squared sine of the angle between the nearest row and the other rows: 3 degrees.
 constexpr double near_singular_pivot = 2.5e-3;
-// Entry of a unit null-space vector of multipliers below which a row shares no load.
+// Smallest entry of a row that shares a load in a unit null-space vector of multipliers.
 constexpr double min_null_space_entry = 1e-9;
 
 // --- Projection onto the constraints
 // Residual that is rounding, relative to the scene's size: a few hundred operations of unit roundoff.
 constexpr double projection_floor = 2e-14;
-// Gap after a projection above which the projection has failed, relative to the scene's size. Projection closes gaps to
-// rounding after every step, in singular positions too.
+// Largest gap after a successful projection, relative to the scene's size. Projection closes gaps to rounding after every
+// step, in singular positions too.
 constexpr double max_projected_gap = 1e-9;
-// Velocity [rad/s or m/s] of a scene without freedom below which it is rounding of the last event.
+// Largest velocity [rad/s or m/s] of a scene without freedom that counts as rounding of the last event.
 constexpr double immobile_speed = 1e-8;
 
 // --- Slip. Speeds are relative to 1 + the largest speed of the scene [rad/s or m/s].

@@ -9,7 +9,7 @@
 
 namespace pn {
 
-// Sine of the angle between a disk and the plane below which the whole rim is lowest. The center then represents the rim.
+// Largest sine of the angle between disk and plane at which the whole rim is lowest. The center then represents the rim.
 constexpr double flat_disk = 1e-14;
 
 template <class Sides>

@@ -13,7 +13,7 @@ namespace pn {
 template <class Sides>
 struct NearestOnHull;
 
-// Cosine of the angle between two faces below which they count as faces of different directions.
+// Largest cosine of the angle between two faces that count as faces of different directions.
 constexpr double other_direction = 0.7;
 
 // Convex solid with flat faces: its corners, the planes of its faces, and its edges, each between two faces.

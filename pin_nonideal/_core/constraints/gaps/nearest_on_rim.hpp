@@ -15,7 +15,7 @@ namespace pn {
 struct RimSearchParameters {
     // Slope of the distance around a rim that counts as zero, due to rounding.
     double level = 1e-15;
-    // Curvature of the distance times the radius, below which all points of a rim are equally near.
+    // Largest curvature of the distance, times the radius, at which all points of a rim count as equally near.
     double straight = 1e-12;
     // Slope at the nearest point beyond which this point is a kink of the distance, inside the solid.
     double kink = 1e-9;

@@ -8,7 +8,7 @@
 
 namespace pn {
 
-// Squared sine of the angle between two segments below which they count as parallel.
+// Largest squared sine of the angle between segments that count as parallel.
 constexpr double parallel_segments = 1e-12;
 
 // Segments x + s e, |s| <= half, of frames 1 and 2 along their z axes.

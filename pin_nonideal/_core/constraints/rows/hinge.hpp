@@ -10,7 +10,7 @@
 
 namespace pn {
 
-// Sine of the angle between the axes below which sine and angle are equal to rounding.
+// Largest sine of the angle between the axes that equals the angle to rounding.
 constexpr double small_sine = 1e-9;
 
 struct HingeRows : ConstraintKind {

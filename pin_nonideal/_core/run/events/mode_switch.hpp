@@ -44,7 +44,7 @@ public:
     // Bridge by time stepping if no motion or no short enough step was found. Applies to an accumulation of events, to
     // creeping slip, to unilateral contacts without a solution, and beside a hand-over. Return false if it does not apply.
     bool bridge_with_time_stepping(const Failure& failure, bool of_hand_over = false);
-    // Check if a step failed because closed contacts contradict each other or the accuracy.
+    // Check if a step may have failed because closed contacts contradict each other or prevent the accuracy.
     static bool is_of_closed_contacts(const Failure& failure);
     // Check if rows of closed contacts alone contradict each other. Such rows are nearly dependent.
     bool is_of_contradicting_contacts(const Failure& failure) const;

@@ -11,8 +11,8 @@
 namespace pn {
 
 struct OpposedContactsParameters {
-    double opposed = -0.7;  // cosine below which the normals of two contacts of one pair are opposite
-    double alike = 0.4;     // cosine to one normal above which no two normals are opposite
+    double opposed = -0.7;  // largest cosine between opposite normals of two contacts of one pair
+    double alike = 0.4;     // smallest cosine to one normal that excludes opposite normals
 };
 
 class OpposedContacts {
