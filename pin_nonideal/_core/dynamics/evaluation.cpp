@@ -140,7 +140,6 @@ static bool is_balanced(const Program& p, Workspace& w) {
 static void reset_laws(Workspace& w) {
     std::fill_n(w.now.C.data(), w.now.C.size(), 0.0);
     std::fill_n(w.now.C_smooth.data(), w.now.C_smooth.size(), 0.0);
-    w.now.determinant = 1.0;
     w.state.unique = Uniqueness::shown;
 }
 

@@ -109,7 +109,8 @@ struct Implicit : Unknowns {
         const bool solved = newton.solve(arrays, y);
         const bool regular = solved && newton.factorize(arrays, y) > uniqueness_parameters.min_determinant;
         if (!regular || is_due()) decide(*this, arrays, before, y, solved);
-        w.now.determinant = newton.factorize(arrays, y);
+        newton.factorize(arrays, y);
+        w.scratch.factored_unknowns = n;
         double last = std::numeric_limits<double>::infinity();
         for (int it = 0; it < Unknowns::parameters.max_newton; ++it) {  // removes the rounding of the arrays
             image(y, newton.image);
@@ -146,8 +147,7 @@ struct Implicit : Unknowns {
             if (!step.allFinite()) throw Failure(Failure::Kind::paradox, t, elements(), 0.0);
             y += step;
         }
-        w.now.determinant = min_determinant(*this, J);
-        throw Failure(Failure::Kind::paradox, t, elements(), w.now.determinant);
+        throw Failure(Failure::Kind::paradox, t, elements(), min_determinant(*this, J));
     }
 
     // Solve trees without rows in O(n). Return false, with the previous guess, if this does not converge.
@@ -162,6 +162,32 @@ struct Implicit : Unknowns {
         if (solve_loaded_trees(*this, y, false)) return true;
         y = before;
         return false;
+    }
+
+    // Iterate Newton's method from the previous solution, with the factor of an earlier evaluation of this step. Return
+    // false without such a factor, or if the iteration contracts slowly.
+    bool iterate_with_last_factor() {
+        if (!bearings || w.scratch.factored_unknowns != n) return false;
+        ReactionNewton& newton = w.scratch.newton;
+        VecX& y = w.scratch.solution;
+        y = w.scratch.unknown.head(n);
+        newton.image.resize(n);
+        double last = std::numeric_limits<double>::infinity();
+        for (;;) {
+            image(y, newton.image);
+            newton.residual = newton.image - y;
+            const double error = newton.residual.cwiseAbs().maxCoeff(), size = y.cwiseAbs().maxCoeff();
+            if (error <= implicit_friction_parameters.tolerance * size) break;
+            if (!(error <= implicit_friction_parameters.max_contraction * last)) {
+                if (error <= implicit_friction_parameters.slow_change * size) break;
+                return false;
+            }
+            last = error;
+            newton.factor.solve(newton.residual, newton.step);
+            y += newton.step;
+        }
+        w.scratch.unknown.head(n) = y;
+        return true;
     }
 
     // Iterate the fixed point from the previous solution. Return false if it contracts slowly.
@@ -211,7 +237,8 @@ struct Implicit : Unknowns {
             exchange([&](int k, int place, int count) { y.segment(k, count) = kept.segment(place, count); });
         w.state.warm = false;  // the state after a failure is no initial guess
         const bool by_trees = solve_trees(is_warm);
-        if (!(by_trees || iterate()) || (bearings && is_due() && !contracts(y, by_trees))) {
+        const bool by_factor = !by_trees && is_warm && iterate_with_last_factor();
+        if (!(by_trees || by_factor || iterate()) || (bearings && is_due() && !contracts(y, by_trees))) {
             VecX& solution = w.scratch.solution;
             solution = y.head(n);
             if (bearings && shares_contact_loads(p, w)) solve_zero_load_sets(solution);
@@ -250,7 +277,6 @@ void find_known_forces(const Program& p, Workspace& w, double t, const VecX& q, 
 }
 
 void solve_with_laws(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, const VecX& known) {
-    w.now.determinant = 1.0;
     const bool act = laws_act(p, w);
     if (!p.needs_reactions || !act) {
         w.now.C = known;

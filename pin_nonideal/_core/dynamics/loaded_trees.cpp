@@ -176,9 +176,7 @@ struct LoadedTrees {
             is_solved = settle(y);
         }
         if (!is_solved || !y.head(u.n).allFinite()) return false;
-        const double determinant = loaded.sweep.relative_determinant(w.now.terms);
-        if (!(determinant > loaded_trees_parameters.min_determinant)) return false;
-        w.now.determinant = determinant;
+        if (!(loaded.sweep.relative_determinant(w.now.terms) > loaded_trees_parameters.min_determinant)) return false;
         accept(y);
         return true;
     }

@@ -256,7 +256,6 @@ void search_other_solutions(Unknowns& u, VecX& y, const MatX& J, double size) {
     const MatX I = MatX::Identity(u.n, u.n);
     const double determinant_at_y = determinant(I - J);
     const bool regular = determinant_at_y > uniqueness_parameters.min_determinant;
-    u.w.now.determinant = determinant_at_y;
     state.unique = Uniqueness::not_shown;
     if (std::abs(determinant_at_y) <= uniqueness_parameters.min_determinant)
         throw paradox(u, std::min(determinant_at_y, 0.0));  // counts as zero

@@ -155,6 +155,7 @@ void set_modes(const Program& p, Workspace& w, const std::vector<Mode>& modes) {
         e = end;
     }
     w.state.steps_since = undecided_steps;
+    w.scratch.factored_unknowns = 0;
     w.now.renew();
     select_rows(p, w);
 }

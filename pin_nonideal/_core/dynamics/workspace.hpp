@@ -133,7 +133,6 @@ struct Evaluation {
     bool several = false;             // true if some element at rest may either slip or stick
     bool no_motion = false;           // true if no motion exists for the modes at the end of a time step
     int several_element = 0;          // element whose friction differs most between several motions, or that allows none
-    double determinant = 1.0;         // det(I - dg/dy) of the implicit reaction equation
     std::vector<Force> body_force;    // given forces on bodies
     VecX override_torque;
     bool has_override = false;
@@ -172,6 +171,7 @@ struct Scratch {
     LoadedJoints loaded;           // friction that follows the loads of tree joints (dynamics/loaded_trees.hpp)
     ReactionEquation equation;
     ReactionNewton newton;
+    int factored_unknowns = 0;     // unknowns of its factor, or 0 if no evaluation of this step and these modes has one
     MatX jacobian;
     std::vector<Force> subtree_force;
     std::vector<Force> body_inertia, body_residual;  // refinement in deep trees

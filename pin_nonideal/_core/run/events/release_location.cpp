@@ -83,11 +83,11 @@ std::optional<FoundEvent> ReleaseLocator::lift_together() {
 
 // Return the part of the step at which its interpolant releases the sticking elements. `rate`: their slip acceleration
 // at the step's end. The search approaches the instant from later times. The search uses secants of the acceleration, which
-// falls to zero toward the instant if limits do not jump, and bisection otherwise.
+// falls to zero toward the instant if limits do not jump. Otherwise it bisects, and only checks if contacts hold.
 double ReleaseLocator::release_part(double rate, const std::vector<Mode>& modes, ModeQuery& mode_query) {
     const double full = stepper_.h, width = parameters.time_tolerance * std::max(std::abs(stepper_.t0) / full, 1.0);
     double low = 0.0, high = 1.0, beyond = 0.0, rate_beyond = 0.0;
-    bool falls = false;  // the rate falls toward the instant
+    bool falls = false, jumps = false;  // the rate falls toward the instant, or is the same on the way to it
     VecX y(system_.ny);
     stepper_.make_interpolant();
     for (int asks = 0; high - low > width; ++asks) {
@@ -102,12 +102,19 @@ double ReleaseLocator::release_part(double rate, const std::vector<Mode>& modes,
         stepper_.interpolate(next, y);
         system_.read(y);
         begin_step(p, w, t, system_.q, system_.v);
+        const bool hold = shares_hold_at(t);
+        if (jumps) {
+            (hold || closed_contacts_hold(p, w, t, system_.q, system_.v) ? low : high) = next;
+            begin_step(p, w, t, system_.q, system_.v);
+            continue;
+        }
         std::optional<double> found_rate;
-        if (!shares_hold_at(t)) found_rate = release_rate(t, y, modes, mode_query);
+        if (!hold) found_rate = release_rate(t, y, modes, mode_query);
         falls = found_rate && rate < HUGE_VAL && *found_rate < parameters.max_rate_ratio * rate;
         if (found_rate) {
             beyond = std::exchange(high, next);
             rate_beyond = std::exchange(rate, *found_rate);
+            jumps = !falls && asks > 0 && !p.gaps.empty();
         } else {
             low = next;
         }

@@ -37,6 +37,7 @@ void Stepper::take(double t, double size) {
     h = size;
     has_interpolant_ = false;
     RunState& state = system_.w.state;
+    system_.w.scratch.factored_unknowns = 0;  // a step does not depend on the previous step, so that runs can resume
     if (state.solves_directions) state.solves_directions = collocation_.has_directions();
     collocates_ = state.solves_directions;
     active = system_.active();
