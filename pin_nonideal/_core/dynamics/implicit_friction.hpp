@@ -2,8 +2,8 @@
 //
 // The unknown y holds the limits of slipping elements and the forces of user laws. The current factors give the motion for
 // y. The motion gives the loads, and the loads give an image g(y). In trees without rows, sweeps over the bodies solve y =
-// g(y) (dynamics/loaded_trees.hpp). Elsewhere fixed-point iteration solves it if it contracts well, else Newton's method.
-// det(I - dg/dy) tests the uniqueness of the solution.
+// g(y) (dynamics/loaded_trees.hpp). Elsewhere fixed-point iteration solves it if it contracts well, else Newton's method,
+// whose factor serves the other evaluations of the step. det(I - dg/dy) tests the uniqueness of the solution.
 #pragma once
 
 #include "dynamics/workspace.hpp"
