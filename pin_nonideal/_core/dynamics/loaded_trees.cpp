@@ -14,6 +14,43 @@ bool are_limits_of_trees(const Unknowns& u) {
 
 namespace {
 
+// Wrench of a joint about its origin, from a wrench about the reference point of its body.
+PN_INLINE Force about_origin(const BodyTerms& terms, int joint, Force r) {
+    r.ang -= terms.body[joint].p.cross(r.lin);
+    return r;
+}
+
+// Linearize the loads at the wrenches of the elements, and add their friction to the left axes of the sweep.
+PN_WIDE void linearize(const BodyTerms& terms, std::vector<LoadedJoint>& elements, std::vector<Motion>& axis) {
+    for (LoadedJoint& element : elements) {
+        Motion& g = element.gradient;
+        g = BearingLoad(*element.friction, element.axis, element.wrench).gradient();
+        g.lin += terms.body[element.joint].p.cross(g.ang);  // about the reference point of the body
+        for (int k = 0; k < element.friction->dim; ++k)
+            axis[element.dof + k] += (-element.factor * element.along[k]) * g;
+        element.rest = dot(g, element.beyond);  // the load is homogeneous in the wrench
+    }
+}
+
+// Compute the loads under the reactions of the sweep, and their limits y. Return the largest change of a limit by the part
+// of its load that is not linear.
+PN_WIDE double load(const BodyTerms& terms, const ObliqueSweep& sweep, std::vector<LoadedJoint>& elements, VecX& y) {
+    double error = 0.0;
+    for (size_t k = 0; k < elements.size(); ++k) {
+        LoadedJoint& element = elements[k];
+        const Force& r = sweep.reaction[element.joint];
+        element.wrench = r;
+        element.wrench += element.beyond;
+        element.wrench = about_origin(terms, element.joint, element.wrench);
+        const double load = BearingLoad(*element.friction, element.axis, element.wrench).size();
+        const double rest = load - dot(element.gradient, r);
+        error = std::max(error, element.factor * std::abs(rest - element.rest));
+        element.rest = rest;
+        y[k] = element.factor * (element.friction->constant + load);
+    }
+    return error;
+}
+
 struct LoadedTrees {
     Unknowns& u;
     const Program& p;
@@ -24,16 +61,6 @@ struct LoadedTrees {
     explicit LoadedTrees(Unknowns& unknowns)
         : u(unknowns), p(u.p), w(u.w), loaded(u.w.scratch.loaded), deep(!p.mechanism.deep_joints.empty()),
           shallow(p.mechanism.deep_joints.size() + 1 < p.mechanism.joints.size()) {}
-
-    // Wrench of a joint about its origin, from a wrench about the reference point of its body, and back for gradients.
-    Force about_origin(int joint, Force r) const {
-        r.ang -= w.now.terms.body[joint].p.cross(r.lin);
-        return r;
-    }
-    Motion about_reference(int joint, Motion g) const {
-        g.lin += w.now.terms.body[joint].p.cross(g.ang);
-        return g;
-    }
 
     // Describe the slipping elements: with the wrenches of the last solution, or with loads fixed at the limits y.
     void describe(const VecX& y, bool has_wrenches) {
@@ -63,16 +90,10 @@ struct LoadedTrees {
         }, [](const UserLaw&) {});
     }
 
-    // Linearize the loads at the wrenches of the elements.
-    bool linearize() {
+    // Linearize at the wrenches of the elements.
+    bool renew_gradients() {
         loaded.sweep.axis = w.now.terms.J;
-        for (LoadedJoint& element : loaded.elements) {
-            element.gradient = about_reference(
-                element.joint, BearingLoad(*element.friction, element.axis, element.wrench).gradient());
-            for (int k = 0; k < element.friction->dim; ++k)
-                loaded.sweep.axis[element.dof + k] += (-element.factor * element.along[k]) * element.gradient;
-            element.rest = dot(element.gradient, element.beyond);  // the load is homogeneous in the wrench
-        }
+        linearize(w.now.terms, loaded.elements, loaded.sweep.axis);
         return loaded.sweep.factorize(p.mechanism, w.now.terms);
     }
 
@@ -86,20 +107,7 @@ struct LoadedTrees {
                 x[element.dof + k] += element.factor * element.along[k] * (element.friction->constant + element.rest);
         loaded.sweep.solve(p.mechanism, w.now.terms, deep ? w.now.wrench.data() : nullptr, x);
         ++w.counters.iterations;
-        double error = 0.0;
-        for (size_t k = 0; k < loaded.elements.size(); ++k) {
-            LoadedJoint& element = loaded.elements[k];
-            const Force& r = loaded.sweep.reaction[element.joint];
-            element.wrench = r;
-            element.wrench += element.beyond;
-            element.wrench = about_origin(element.joint, element.wrench);
-            const double load = BearingLoad(*element.friction, element.axis, element.wrench).size();
-            const double rest = load - dot(element.gradient, r);
-            error = std::max(error, element.factor * std::abs(rest - element.rest));
-            element.rest = rest;
-            y[k] = element.factor * (element.friction->constant + load);
-        }
-        return error;
+        return load(w.now.terms, loaded.sweep, loaded.elements, y);
     }
 
     bool is_rounding(double error, const VecX& y) const {
@@ -137,7 +145,7 @@ struct LoadedTrees {
             loaded.sweep.solve(p.mechanism, w.now.terms, nullptr, loaded.x);
             for (int row = 0; row < u.n; ++row) {
                 const LoadedJoint& element = loaded.elements[row];
-                const Force wrench = about_origin(element.joint, loaded.sweep.reaction[element.joint]);
+                const Force wrench = about_origin(w.now.terms, element.joint, loaded.sweep.reaction[element.joint]);
                 L(row, column) = element.factor * BearingLoad(*element.friction, element.axis, wrench).size();
             }
         }
@@ -171,7 +179,7 @@ struct LoadedTrees {
             is_solved = is_rounding(step(y), y);
         }
         for (int it = 0; it < loaded_trees_parameters.max_gradients && !is_solved; ++it) {
-            if (!y.head(u.n).allFinite() || !linearize()) return false;
+            if (!y.head(u.n).allFinite() || !renew_gradients()) return false;
             if (!(loaded.sweep.least_relative_pivot(w.now.terms) > loaded_trees_parameters.min_pivot)) return false;
             is_solved = settle(y);
         }
