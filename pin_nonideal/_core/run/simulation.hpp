@@ -7,7 +7,7 @@
 #include "run/events/event_location.hpp"
 #include "run/integrators/growth.hpp"
 #include "run/events/hand_over.hpp"
-#include "run/events/mode_switch.hpp"
+#include "run/events/mode_changes.hpp"
 #include "run/integrators/rounding_floor.hpp"
 #include "run/integrators/step_control.hpp"
 #include "run/integrators/stepper_choice.hpp"

@@ -8,7 +8,7 @@
 
 namespace pn {
 
-struct ModeSwitchParameters {
+struct ModeChangeParameters {
     // Minimum time between two forced mode switches, in tiny steps.
     double forced_switch_spacing = 1e3;
     // Maximum speed [m/s or rad/s] of slip that is about to rest or to begin, relative to 1 + the largest velocity.
@@ -21,9 +21,9 @@ struct ModeSwitchParameters {
     int max_drive_steps = 14;  // maximum number of these steps
 };
 
-inline constexpr ModeSwitchParameters mode_switch_parameters{};
+inline constexpr ModeChangeParameters mode_change_parameters{};
 
-inline double tiny_step_at(double t) { return mode_switch_parameters.tiny_step * std::max(1.0, std::abs(t)); }
+inline double tiny_step_at(double t) { return mode_change_parameters.tiny_step * std::max(1.0, std::abs(t)); }
 
 class ModeChanges {
 public:

@@ -1,4 +1,4 @@
-#include "run/events/mode_switch.hpp"
+#include "run/events/mode_changes.hpp"
 
 #include <algorithm>
 
@@ -82,7 +82,7 @@ bool ModeChanges::is_recoverable(const Failure& failure) {
 }
 
 bool ModeChanges::can_switch_modes(const Failure& failure) const {
-    const double spacing = mode_switch_parameters.forced_switch_spacing * tiny_step_at(progress_.t);
+    const double spacing = mode_change_parameters.forced_switch_spacing * tiny_step_at(progress_.t);
     return is_of_modes(failure) && options_.method.adaptive() && system_.ng > 0 &&
            progress_.t >= progress_.forced_switch_time + spacing;
 }
@@ -127,10 +127,10 @@ bool ModeChanges::follow_drive() {
 // rounding of the time step. `before`: modes after the time steps, which record their own events.
 bool ModeChanges::step_with_drive(RunState& before) {
     const double last = progress_.t - drive_end_ < drive_length_ ? drive_length_ : 0.0;
-    const double first = options_.method.adaptive() ? mode_switch_parameters.drive_step
-                                                    : mode_switch_parameters.drive_part * options_.dt;
+    const double first = options_.method.adaptive() ? mode_change_parameters.drive_step
+                                                    : mode_change_parameters.drive_part * options_.dt;
     drive_length_ = std::max(2.0 * last, first);
-    for (int trial = 0; trial < mode_switch_parameters.max_drive_steps; ++trial, drive_length_ *= 2.0) {
+    for (int trial = 0; trial < mode_change_parameters.max_drive_steps; ++trial, drive_length_ *= 2.0) {
         const Progress from = progress_;
         const double stop = std::min(options_.end(), progress_.t + drive_length_);
         if (attempt([&] { time_stepping_.step(drive_length_, stop, options_.end()); })) {
@@ -179,7 +179,7 @@ bool ModeChanges::bridge_with_time_stepping(const Failure& failure, bool of_hand
                              !failure.elements.empty();
     const int element = of_elements ? failure.elements.front() : 0;
     const bool creeps = is_creeping();
-    const double spacing = mode_switch_parameters.forced_switch_spacing * tiny_step_at(progress_.t);
+    const double spacing = mode_change_parameters.forced_switch_spacing * tiny_step_at(progress_.t);
     if (creeps && p.gaps.empty() && progress_.t > rest_time_ + spacing && come_to_rest()) return true;
     if (!(of_hand_over || is_undecided(failure) || chatter_.is_zeno() || creeps)) return false;
     bridge(element);
@@ -206,7 +206,7 @@ void ModeChanges::bridge(int element) {
 // Check if all slipping elements are about to rest.
 bool ModeChanges::is_creeping() const {
     const double speed = system_.velocity(progress_.y).cwiseAbs().maxCoeff();
-    const double max_slip = mode_switch_parameters.max_creep_speed * (1.0 + speed);
+    const double max_slip = mode_change_parameters.max_creep_speed * (1.0 + speed);
     const std::vector<int>& slipping = w.now.slipping;
     return !slipping.empty() && std::all_of(slipping.begin(), slipping.end(), [&](int e) {
         return slip_velocity(w.now, p.frictions[e]).norm() <= max_slip;
