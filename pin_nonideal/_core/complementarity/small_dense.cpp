@@ -49,11 +49,12 @@ bool DenseSolver::eliminate(const Eigen::Ref<const MatX>& A) {
     return true;
 }
 
-bool DenseSolver::reverses() const {
+int DenseSolver::orientation() const {
+    if (!regular_) return 0;
     const auto L = factors_.matrix(n_, n_);
     bool negative = false;
     for (int k = 0; k < n_; ++k) negative ^= (order_[k] != k) ^ (L(k, k) < 0.0);
-    return regular_ && negative;
+    return negative ? -1 : 1;
 }
 
 void DenseSolver::factor_orthogonally(const Eigen::Ref<const MatX>& A, double tolerance) {

@@ -39,8 +39,8 @@ public:
     // left of it.
     void factor_orthogonally(const Eigen::Ref<const MatX>& A, double tolerance = rank_tolerance);
     bool regular() const { return regular_; }
-    // Check if det(A) is negative. Requires a regular A.
-    bool reverses() const;
+    // Return the sign of det(A), or 0 if A is not regular.
+    int orientation() const;
     int rank() const { return rank_; }
     // Compute the minimum-norm x with A x = r, or the x that is nearest to a solution if there is none. x may be r.
     void solve(const Eigen::Ref<const VecX>& r, Eigen::Ref<VecX> x);

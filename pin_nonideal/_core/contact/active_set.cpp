@@ -186,7 +186,8 @@ static Failure with_motion(Failure failure, const Program& p, Workspace& w, doub
     VecX limits(failure.elements.size());
     for (size_t i = 0; i < failure.elements.size(); ++i) {
         const int e = failure.elements[i];
-        limits[i] = w.state.mode[e] == sticking ? static_limits(p, w, e, t, q, v).reach() : w.now.limit[e];
+        const Mode mode = w.state.mode[e];
+        limits[i] = mode == sticking ? static_limits(p, w, e, t, q, v).reach() : slips(mode) ? w.now.limit[e] : 0.0;
     }
     failure.solutions = Failure::Solutions::several;
     failure.limits.push_back(limits);

@@ -104,13 +104,17 @@ std::optional<OnsetMotion> onset_motion(const Program& p, Workspace& w, double t
     return out;
 }
 
-bool closed_contacts_hold(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+std::optional<bool> closed_contacts_hold(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
     OnsetQuery query;
     query.rest = w.state.closed;
-    return with_problem(p, w, t, q, v, query, [](const std::vector<int>&) {}, [](RestingProblem& problem) {
+    std::optional<bool> hold;
+    const auto rest = [&](const std::vector<int>&) { hold = true; };
+    with_problem(p, w, t, q, v, query, rest, [&](RestingProblem& problem) {
         ConeComplementarity solver;
-        return problem.hold(solver);
+        if (!problem.any_slides()) hold = problem.hold(solver);
+        return hold.has_value();
     });
+    return hold;
 }
 
 }  // namespace pn

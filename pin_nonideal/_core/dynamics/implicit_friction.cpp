@@ -151,11 +151,11 @@ struct Implicit : Unknowns {
     }
 
     // Solve trees without rows in O(n). Return false, with the previous guess, if this does not converge.
-    bool solve_trees(bool is_warm) {
+    bool solve_trees(bool has_wrenches) {
         if (!bearings || !are_limits_of_trees(*this)) return false;
         VecX &y = w.scratch.unknown, &before = w.scratch.before;
         before = y;
-        if (is_warm) {
+        if (has_wrenches) {
             if (solve_loaded_trees(*this, y, true)) return true;
             y = before;
         }
@@ -236,7 +236,7 @@ struct Implicit : Unknowns {
         if (is_warm)
             exchange([&](int k, int place, int count) { y.segment(k, count) = kept.segment(place, count); });
         w.state.warm = false;  // the state after a failure is no initial guess
-        const bool by_trees = solve_trees(is_warm);
+        const bool by_trees = w.state.has_wrenches = solve_trees(is_warm && w.state.has_wrenches);
         const bool by_factor = !by_trees && is_warm && iterate_with_last_factor();
         if (!(by_trees || by_factor || iterate()) || (bearings && is_due() && !contracts(y, by_trees))) {
             VecX& solution = w.scratch.solution;

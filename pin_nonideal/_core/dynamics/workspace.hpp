@@ -58,8 +58,9 @@ struct RunState {
     VecX held_torque;             // torque of sampled control
     bool has_held = false;
     VecX unknown;                 // last solution of the implicit reaction equation, by element and law (warm start)
+    bool warm = false;             // true if `unknown` is an initial guess for the next solution
     std::vector<Force> bearing_wrench;  // wrenches of joints in that solution, by element with a load in a tree
-    bool warm = false;             // true if both are initial guesses for the next solution
+    bool has_wrenches = false;     // true if that solution was found by sweeps over trees
     VecX percussion;  // impulses of contacts and friction in the last time step, by row and divided by its length
     VelocityRates last_rates;
     VecX third_order_gap;         // third-order part of the gaps that a step closes, divided by its cubed length
@@ -171,7 +172,7 @@ struct Scratch {
     LoadedJoints loaded;           // friction that follows the loads of tree joints (dynamics/loaded_trees.hpp)
     ReactionEquation equation;
     ReactionNewton newton;
-    int factored_unknowns = 0;     // unknowns of its factor, or 0 if no evaluation of this step and these modes has one
+    int factored_unknowns = 0;     // unknowns of its factor, or 0 if no evaluation in these modes has one since the step began
     MatX jacobian;
     std::vector<Force> subtree_force;
     std::vector<Force> body_inertia, body_residual;  // refinement in deep trees

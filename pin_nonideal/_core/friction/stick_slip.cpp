@@ -16,6 +16,7 @@
 #include "friction/load_dependent_problem.hpp"
 #include "friction/rest_motions.hpp"
 #include "complementarity/load_dependent/solver.hpp"
+#include "math/anderson.hpp"
 #include "math/tolerances.hpp"
 
 namespace pn {
@@ -78,6 +79,7 @@ struct Search {
             const double middle = limits.middle[equation.elements[i].row];
             w.state.unknown[e] = limits[i] - (slips(modes[e]) ? modes[e] * middle : 0.0);
         }
+        w.state.has_wrenches = false;
         apply(modes, motions.are_complete());
     }
 
@@ -163,6 +165,33 @@ struct Search {
         return size <= noise || along >= (1.0 - stick_slip_parameters.max_direction_deviation) * size;
     }
 
+    // Solve for the directions of elements that begin to slip in several directions, from nearby ones: each is that of the
+    // slip acceleration under the friction along all of them. Return false if the iteration does not converge.
+    bool settle_directions() {
+        std::vector<int> turning;
+        for (int e : list)
+            if (slips(w.state.mode[e]) && p.frictions[e].dim > 1) turning.push_back(e);
+        AndersonAcceleration acceleration;
+        VecX x(3 * turning.size()), g(x.size());
+        for (int turn = 0; turn < stick_slip_parameters.max_turns; ++turn) {
+            double deviation = 0.0;
+            for (size_t i = 0; i < turning.size(); ++i) {
+                const Vec3 rate = slip_acceleration(p, w, p.frictions[turning[i]]), now = w.state.last_direction[turning[i]];
+                const Vec3 next = rate.norm() > 0.0 ? rate.normalized() : now;
+                deviation = std::max(deviation, (next - now).norm());
+                x.segment<3>(3 * i) = now.eigen();
+                g.segment<3>(3 * i) = next.eigen();
+            }
+            if (deviation <= stick_slip_parameters.settled_direction) return true;
+            x = acceleration.next(x, g);
+            for (size_t i = 0; i < turning.size(); ++i)
+                w.state.slip_direction[turning[i]] = w.state.last_direction[turning[i]] =
+                    Vec3(x.segment<3>(3 * i)).normalized();
+            solve_dynamics(p, w, t, v);
+        }
+        return false;
+    }
+
     // Try the modes of a nearby motion, which are right if their motion satisfies all laws. Few elements are searched for
     // other motions instead.
     bool keeps_nearby_modes() {
@@ -176,7 +205,7 @@ struct Search {
                 w.state.slip_direction[e] = w.state.last_direction[e] = query.nearby_directions[e];
         const auto failure = attempt({Failure::Kind::paradox, Failure::Kind::not_converged, Failure::Kind::inconsistent},
                                      [&] { apply(modes, false); });
-        if (!failure && satisfies_laws()) return true;
+        if (!failure && satisfies_laws() && settle_directions() && satisfies_laws()) return true;
         w.state.slip_direction = directions;
         w.state.last_direction = last_directions;
         return false;

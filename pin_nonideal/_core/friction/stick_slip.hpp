@@ -18,6 +18,8 @@ struct StickSlipParameters {
     int max_limit_iterations = 100;  // maximum iterations of forces and limits
     // Deviation of a slip's acceleration from the direction of its friction (1 - cosine) that counts as rounding.
     double max_direction_deviation = 1e-10;
+    double settled_direction = 1e-11;  // turn of a slip direction that counts as rounding [rad]
+    int max_turns = 20;                // maximum iterations of the directions of a nearby motion
 };
 
 inline constexpr StickSlipParameters stick_slip_parameters{};

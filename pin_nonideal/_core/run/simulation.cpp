@@ -190,6 +190,7 @@ std::optional<double> Simulation::integrate(const Proposal& proposal) {
     if (watched) before_step = w.state;
     guess = w.state.unknown;
     guessed_wrench = w.state.bearing_wrench;
+    has_guessed_wrench = w.state.has_wrenches;
     has_guess = w.state.warm;
     const int active = system.active();
     stepper.y0.head(system.ns) = progress.y.head(system.ns);
@@ -330,6 +331,7 @@ bool Simulation::recover(const Failure& failure) {
 void Simulation::restore_guess() {
     w.state.unknown = guess;
     w.state.bearing_wrench = guessed_wrench;
+    w.state.has_wrenches = has_guessed_wrench;
     w.state.warm = has_guess;
 }
 

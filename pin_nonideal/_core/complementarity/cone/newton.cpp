@@ -153,12 +153,12 @@ bool ConeNewton::update_modes(const ConeProblem& p, const Eigen::Ref<const VecX>
     return changes;
 }
 
-bool ConeNewton::reverses(const ConeProblem& p, const Eigen::Ref<const VecX>& f) {
+int ConeNewton::orientation(const ConeProblem& p, const Eigen::Ref<const VecX>& f) {
     evaluate(p, f);
     differentiate(p, f);
     solver_.factor(J_.matrix(p.n, p.n));
     mode_.clear();
-    return solver_.reverses();
+    return solver_.orientation();
 }
 
 double ConeNewton::solve(const ConeProblem& p, Eigen::Ref<VecX> f, int max_steps) {

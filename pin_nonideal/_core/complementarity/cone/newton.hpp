@@ -26,8 +26,8 @@ public:
     // Return the relative error of f.
     double error(const ConeProblem& problem, const Eigen::Ref<const VecX>& f);
     bool regular() const { return regular_; }  // the last equations had full rank
-    // Check if the equations at f have a negative determinant.
-    bool reverses(const ConeProblem& problem, const Eigen::Ref<const VecX>& f);
+    // Return the sign of the determinant of the equations at f, or 0 if it is rounding.
+    int orientation(const ConeProblem& problem, const Eigen::Ref<const VecX>& f);
     int steps() const { return steps_; }       // total of all calls
 
 private:

@@ -40,9 +40,8 @@ ConeStatus ConeComplementarity::solve(const Eigen::Ref<const MatX>& W, const Eig
 bool ConeComplementarity::replace_reversed(Eigen::Ref<VecX> f) {
     auto x = even_.vector(problem_.n);
     x = f.cwiseQuotient(problem_.scale()) / problem_.force_unit();
-    if (!unique_shares_ || !newton_.reverses(problem_, x)) return false;
-    const bool found = random_restarts(x, [&] { return !newton_.reverses(problem_, x); });
-    if (!found) return false;
+    if (!unique_shares_ || newton_.orientation(problem_, x) >= 0) return false;
+    if (!random_restarts(x, [&] { return newton_.orientation(problem_, x) > 0; })) return false;
     tidy(x);
     f = problem_.force_unit() * problem_.scale().cwiseProduct(x);
     return true;

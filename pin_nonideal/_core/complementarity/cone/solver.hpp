@@ -48,9 +48,9 @@ public:
     bool hold(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const VecX>& w0,
               const std::vector<ConeElement>& elements, Eigen::Ref<VecX> f);
 
-    // Check if f, the unique forces of a solution just found, is one of several solutions, and set f to another one. The
-    // determinants of the equations have signs that sum up to one over all solutions. A solution with a negative
-    // determinant is therefore one of at least three, and the others are sought from random starts.
+    // Check if f, the unique forces of a solution just found, is one of several solutions, and set f to another one. At
+    // rest the determinants of the equations have signs that sum up to one over all regular solutions. A solution with a
+    // negative determinant is therefore one of at least three, and the others are sought from random starts.
     bool replace_reversed(Eigen::Ref<VecX> f);
 
     // Accept a relative residual up to `max_residual` if no forces meet the laws to rounding. The caller then reports the

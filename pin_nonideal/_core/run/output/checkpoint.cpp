@@ -34,10 +34,10 @@ static void fields(Archive& a, VelocityRates& x) {
 
 static void fields(Archive& a, RunState& x) {
     auto& [mode, closed, slip_direction, last_direction, is_sticking_deferred, solves_directions, is_hyperstatic,
-           rank_tolerance, z, held_torque, has_held, unknown, bearing_wrench, warm, percussion, last_rates,
+           rank_tolerance, z, held_torque, has_held, unknown, warm, bearing_wrench, has_wrenches, percussion, last_rates,
            third_order_gap, has_ideal_row_choice, unique, spectral_bound, steps_since] = x;
     a(mode, closed, slip_direction, last_direction, is_sticking_deferred, solves_directions, is_hyperstatic,
-      rank_tolerance, z, held_torque, has_held, unknown, bearing_wrench, warm, percussion, third_order_gap,
+      rank_tolerance, z, held_torque, has_held, unknown, warm, bearing_wrench, has_wrenches, percussion, third_order_gap,
       has_ideal_row_choice, unique, spectral_bound, steps_since);
     fields(a, last_rates);
 }
