@@ -104,17 +104,13 @@ std::optional<OnsetMotion> onset_motion(const Program& p, Workspace& w, double t
     return out;
 }
 
-std::optional<bool> closed_contacts_hold(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+bool closed_contacts_hold(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
     OnsetQuery query;
     query.rest = w.state.closed;
-    std::optional<bool> hold;
-    const auto rest = [&](const std::vector<int>&) { hold = true; };
-    with_problem(p, w, t, q, v, query, rest, [&](RestingProblem& problem) {
+    return with_problem(p, w, t, q, v, query, [](const std::vector<int>&) {}, [](RestingProblem& problem) {
         ConeComplementarity solver;
-        if (!problem.any_slides()) hold = problem.hold(solver);
-        return hold.has_value();
+        return problem.hold(solver);
     });
-    return hold;
 }
 
 }  // namespace pn

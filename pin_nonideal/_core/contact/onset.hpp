@@ -13,8 +13,8 @@ namespace pn {
 std::optional<OnsetMotion> onset_motion(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
                                         const OnsetQuery& query);
 
-// Check if forces within the cones of all closed contacts hold them at (t, q, v). Return nothing if one of these contacts
-// slides, or if other laws depend on loads too.
-std::optional<bool> closed_contacts_hold(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
+// Return true if forces within the cones of all closed contacts hold them at (t, q, v). Return false if one of these
+// contacts slides, or if other laws depend on loads too.
+bool closed_contacts_hold(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 
 }  // namespace pn

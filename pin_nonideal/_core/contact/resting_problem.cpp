@@ -170,10 +170,8 @@ bool RestingProblem::moves() const {
     return false;
 }
 
-bool RestingProblem::any_slides() const { return std::find(slides.begin(), slides.end(), char(1)) != slides.end(); }
-
 bool RestingProblem::hold(ConeComplementarity& solver) {
-    if (any_slides()) return false;
+    if (std::find(slides.begin(), slides.end(), char(1)) != slides.end()) return false;
     VecX holding(f.size());
     if (!solver.hold(W, w0, cones, holding)) return false;
     f = holding;

@@ -63,8 +63,6 @@ public:
 
     // Solve for the forces. Return false if no motion was found. `shared`: contacts are hyperstatic.
     bool solve(bool& shared);
-    // Check if any contact slides in a known direction.
-    bool any_slides() const;
     // Solve for forces that hold all contacts at rest. Rest is preferred to motion if both are possible.
     bool hold(ConeComplementarity& solver);
     // Store the motion under the forces.

@@ -172,7 +172,8 @@ struct Scratch {
     LoadedJoints loaded;           // friction that follows the loads of tree joints (dynamics/loaded_trees.hpp)
     ReactionEquation equation;
     ReactionNewton newton;
-    int factored_unknowns = 0;     // unknowns of its factor, or 0 if no evaluation in these modes has one since the step began
+    // Unknowns of its factor, or 0 if no evaluation in these modes has one since the step began.
+    int factored_unknowns = 0;
     MatX jacobian;
     std::vector<Force> subtree_force;
     std::vector<Force> body_inertia, body_residual;  // refinement in deep trees

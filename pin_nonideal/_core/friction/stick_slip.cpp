@@ -166,18 +166,21 @@ struct Search {
     }
 
     // Solve for the directions of elements that begin to slip in several directions, from nearby ones: each is that of the
-    // slip acceleration under the friction along all of them. Return false if the iteration does not converge.
+    // slip acceleration under the friction along all of them. Accelerations at an onset exactly at the limits define no
+    // direction, which then stays. Return false if the iteration does not converge.
     bool settle_directions() {
         std::vector<int> turning;
         for (int e : list)
             if (slips(w.state.mode[e]) && p.frictions[e].dim > 1) turning.push_back(e);
         AndersonAcceleration acceleration;
+        const double min_onset = slip_onset_parameters.max_acceleration *
+                                 (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
         VecX x(3 * turning.size()), g(x.size());
         for (int turn = 0; turn < stick_slip_parameters.max_turns; ++turn) {
             double deviation = 0.0;
             for (size_t i = 0; i < turning.size(); ++i) {
                 const Vec3 rate = slip_acceleration(p, w, p.frictions[turning[i]]), now = w.state.last_direction[turning[i]];
-                const Vec3 next = rate.norm() > 0.0 ? rate.normalized() : now;
+                const Vec3 next = rate.norm() > min_onset ? rate.normalized() : now;
                 deviation = std::max(deviation, (next - now).norm());
                 x.segment<3>(3 * i) = now.eigen();
                 g.segment<3>(3 * i) = next.eigen();

@@ -29,7 +29,7 @@ std::optional<double> ReleaseLocator::release_rate(double t, const VecX& y, cons
     for (int e = 0; e < system_.ne; ++e)
         if (!is_open(p, w, e) && at_rest(p, w, e, system_.v)) mode_query.at_rest.push_back(e);
     // Contacts hold as long as any forces within their cones do, not only those of minimum norm.
-    if (!p.gaps.empty() && closed_contacts_hold(p, w, t, system_.q, system_.v).value_or(false)) {
+    if (!p.gaps.empty() && closed_contacts_hold(p, w, t, system_.q, system_.v)) {
         begin_step(p, w, t, system_.q, system_.v);
         return std::nullopt;
     }
@@ -87,7 +87,7 @@ std::optional<FoundEvent> ReleaseLocator::lift_together() {
 double ReleaseLocator::release_part(double rate, const std::vector<Mode>& modes, ModeQuery& mode_query) {
     const double full = stepper_.h, width = parameters.time_tolerance * std::max(std::abs(stepper_.t0) / full, 1.0);
     double low = 0.0, high = 1.0, beyond = 0.0, rate_beyond = 0.0;
-    bool falls = false, asked_cones = p.gaps.empty();  // falls: the rate falls toward the instant
+    bool falls = false;  // the rate falls toward the instant
     VecX y(system_.ny);
     stepper_.make_interpolant();
     for (int asks = 0; high - low > width; ++asks) {
@@ -111,31 +111,7 @@ double ReleaseLocator::release_part(double rate, const std::vector<Mode>& modes,
         } else {
             low = next;
         }
-        if (falls || asks == 0 || std::exchange(asked_cones, true)) continue;
-        if (const auto part = release_part_by_cones(low, high, width, modes, mode_query)) return *part;
     }
-    return high;
-}
-
-// Return the part of the step between `low` and `high` at which the cones of the contacts no longer hold them. This check
-// takes far less time than the modes. Return nothing if there are no such cones, or if the modes deny the release.
-std::optional<double> ReleaseLocator::release_part_by_cones(double low, double high, double width,
-                                                            const std::vector<Mode>& modes, ModeQuery& mode_query) {
-    VecX y(system_.ny);
-    const auto read = [&](double part) {
-        stepper_.interpolate(part, y);
-        system_.read(y);
-        const double t = stepper_.t0 + part * stepper_.h;
-        begin_step(p, w, t, system_.q, system_.v);
-        return t;
-    };
-    while (high - low > width) {
-        const double next = 0.5 * (low + high), t = read(next);
-        const std::optional<bool> hold = closed_contacts_hold(p, w, t, system_.q, system_.v);
-        if (!hold) return std::nullopt;
-        (*hold ? low : high) = next;
-    }
-    if (!release_rate(read(high), y, modes, mode_query)) return std::nullopt;
     return high;
 }
 

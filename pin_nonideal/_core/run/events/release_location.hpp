@@ -39,8 +39,6 @@ private:
     std::optional<double> release_rate(double t, const VecX& y, const std::vector<Mode>& modes, ModeQuery& mode_query);
     std::optional<double> release_rate_at_end(const std::vector<Mode>& modes, ModeQuery& mode_query);
     double release_part(double rate, const std::vector<Mode>& modes, ModeQuery& mode_query);
-    std::optional<double> release_part_by_cones(double low, double high, double width, const std::vector<Mode>& modes,
-                                                ModeQuery& mode_query);
     std::optional<double> release_rate_inside(const std::vector<Mode>& modes, ModeQuery& mode_query);
     bool all_press();
 
