@@ -16,6 +16,7 @@ from ..core.friction.test_stiff_friction import sledge
 from ..support.mechanisms import body, empty, frame
 from ..support.refusals import refuses
 from ..support.same_run import assert_same_run
+from ..support.scenes import kinds
 
 # Difference of recursive Newton-Euler sums from the core's, relative to the largest.
 ROUNDING = 1e-10
@@ -204,6 +205,23 @@ def test_a_joint_carries_the_same_wherever_the_loop_is_cut():
         planar = [0, 2, 4]  # out-of-plane loads of a planar mechanism with spatial closure are not unique
         size = np.abs(a).max()
         np.testing.assert_allclose(a[:, planar], sign * b[:, planar], rtol=0, atol=1e-7 * size, err_msg=mine)
+
+
+TOUCHING = {name: make for name, make in kinds().items() if name.startswith("touching")}
+
+
+@pytest.mark.parametrize("method", ["dop853", "dopri5", "rk4", "semi_implicit_euler", "moreau"])
+@pytest.mark.parametrize("name", TOUCHING)
+def test_open_contacts_have_no_force(name, method):
+    """A body falls, rebounds and comes to rest; between its impacts no force acts."""
+    case = TOUCHING[name]()
+    steps = {"dt": 1e-3} if method in ("rk4", "semi_implicit_euler", "moreau") else {}
+    run = pn.simulate(case.scene, 0.15, case.q0, case.v0, method=method, record="forces", **steps)
+    is_open = ~run.closed.any(axis=1)
+    assert is_open.any()
+    assert run.events
+    for values in (run.lam, run.F_nonideal, *run.contact_forces.values()):
+        assert not np.any(values[is_open])
 
 
 def bar(model, parent, name, length, x=0.0):

@@ -160,12 +160,13 @@ struct Laws {
     void check_friction(int e, double rest) {
         const Friction& element = p.frictions[e];
         const double size = length(p.blocks[element.block]) / scale;
-        if (!(size > 0.0) || !forces.is_determined[e]) return;
         const Vec3 f = forces.shared_friction[e], u = slip_velocity(w.now, element);
+        const double speed = u.norm();
+        // Only an element at rest can share its load.
+        if (!(size > 0.0) || (speed <= rest && !forces.is_determined[e])) return;
         SlipLimits at_rest = forces.limits[e];
         if (element.gap >= 0 && element.load == Friction::Load::multiplier)
             at_rest = element.constant + element.mu * p.described.share(element.row, forces.shared_lam);
-        const double speed = u.norm();
         const SlipLimits kinetic = at_rest * element.speed_factor(speed);
         if (speed > rest) {
             out.coulomb.include(excess(element, kinetic, f) * size, e);

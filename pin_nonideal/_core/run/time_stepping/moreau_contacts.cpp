@@ -160,6 +160,7 @@ bool MoreauContacts::correct(double t, JointDrives::Step& drives) {
 // Set contacts and modes, with their rows. During most of a flight nothing changes. `flies`: no contact is closed and
 // no element active in the new modes.
 void MoreauContacts::select(const std::vector<char>& closed, const std::vector<Mode>& modes, bool flies) {
+    for (const StepRow& row : elements_.rows) w.now.lam[p.blocks[row.block].row + row.k] = 0.0;
     if (flies && !system_.watches() && !w.now.rows.redundant && !w.now.rows.orthogonal) w.now.renew();
     else set_contacts(p, w, closed, modes);
 }
