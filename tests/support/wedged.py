@@ -135,6 +135,26 @@ def pile_of_balls(seed):
     tilt = rng.uniform(0.0, 0.1) * (rng.random() < 0.25)
     gravity = GRAVITY * np.array([np.sin(tilt), 0.0, -np.cos(tilt)])
     inertias = [pin.Inertia.FromSphere(rng.uniform(0.3, 2.0), radius) for radius in radii]
+    return _pile(radii, centers, inertias, gravity, on_balls, on_floor)
+
+
+def pile_with_several_motions():
+    """Six balls in a plane with three motions."""
+    radii = [0.11396322101744352, 0.06560279174443182, 0.0515205361549716]
+    radii += [0.09121202811184786, 0.12783717366334107, 0.08137158639239336]
+    x = [-0.06518191782262772, 0.2600859423071222, -0.222760770969005]
+    x += [0.13478616832955695, 0.013800516792057967, -0.24830949187492546]
+    z = [*radii[:3], 0.15989411885211713, 0.34250032060987323, 0.18193364552368213]
+    masses = [1.9716376774666857, 1.4858349760825647, 0.5686331627256419]
+    masses += [0.5848578783559729, 1.2100979970287027, 0.730490210970817]
+    centers = np.column_stack([x, np.zeros(6), z])
+    inertias = [pin.Inertia.FromSphere(mass, radius) for mass, radius in zip(masses, radii, strict=True)]
+    gravity = np.array([0.0, 0.0, -GRAVITY])
+    return _pile(radii, centers, inertias, gravity, 0.7871721248338499, 0.18183842423635843)
+
+
+def _pile(radii, centers, inertias, gravity, on_balls, on_floor):
+    """Balls of these inertias on a floor and on each other, with these coefficients of friction."""
     model = model_of(inertias, gravity)
     q0 = pin.neutral(model)
     contacts, touches = [], []

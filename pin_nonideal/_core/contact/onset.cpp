@@ -104,6 +104,19 @@ std::optional<OnsetMotion> onset_motion(const Program& p, Workspace& w, double t
     return out;
 }
 
+bool is_choice_unique(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, const OnsetQuery& query) {
+    int rough = 0, resting = 0;
+    for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
+        const int e = p.gaps[i].sliding;
+        if (!query.rest[i] || e < 0) continue;
+        ++rough;
+        resting += is_at_rest(p, w, v, query, w.state, e);
+    }
+    if (rough < 2 || resting == 0) return true;
+    return with_problem(p, w, t, q, v, query, [](const std::vector<int>&) {},
+                        [](const RestingProblem& problem) { return problem.has_one_motion(); });
+}
+
 bool closed_contacts_hold(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
     OnsetQuery query;
     query.rest = w.state.closed;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "complementarity/cone/uniqueness.hpp"
 #include "dynamics/friction_limit.hpp"
 #include "math/tolerances.hpp"
 
@@ -82,6 +83,13 @@ RestingProblem::RestingProblem(const Program& program, Workspace& workspace, con
     dragging = chosen(rows.W * drag.leftCols(n));
     w0 = chosen(free);
     f.setZero(n);
+}
+
+bool RestingProblem::has_one_motion() const {
+    const auto is_plain = [&](int e) { return e < 0 || p.frictions[e].static_ratio == 1.0; };
+    for (size_t i = 0; i < cones.size(); ++i)
+        if (!is_plain(rows.element(i)) || (head(i) && slides[i])) return false;
+    return pn::has_one_motion(W, cones);
 }
 
 // Select the rows of the problem from all rows.

@@ -65,6 +65,8 @@ public:
     bool solve(bool& shared);
     // Solve for forces that hold all contacts at rest. Rest is preferred to motion if both are possible.
     bool hold(ConeComplementarity& solver);
+    // Check if a bound proves that the laws admit one motion. Sliding contacts and static ratios prove nothing.
+    bool has_one_motion() const;
     // Store the motion under the forces.
     void read(OnsetMotion& out) const;
 

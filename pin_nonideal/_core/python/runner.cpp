@@ -71,6 +71,7 @@ void Runner::read_directions(const Array& directions) {
 
 void Runner::choose_modes(double t, const std::optional<std::vector<Mode>>& modes) {
     state_.open.clear();
+    is_choice_unique_ = true;
     if (!p->gaps.empty()) choose_contacts(t, modes);
     else choose_friction(t, modes, nullptr);
 }
@@ -82,6 +83,7 @@ void Runner::choose_contacts(double t, const std::optional<std::vector<Mode>>& m
     query.rest = touching_contacts(*p, *w, t, q, v, true).rest;
     query.after_impact = true;
     query.prescribed = modes.has_value();
+    is_choice_unique_ = modes || is_choice_unique(*p, *w, t, q, v, query);
     select_active_contacts(*p, *w, t, q, v, query, [&](const OnsetMotion* joint_motion) {
         update_kinematics(*p, *w, t, q, v);
         choose_friction(t, modes, joint_motion);
@@ -169,7 +171,7 @@ Instant Runner::solve(const Array& q_in, const Array& v_in, double t, const std:
     out.lam_ideal = to_numpy(split.lam_ideal);
     out.rank = constraint_rank();
     if (unique == Uniqueness::several) out.unique = false;
-    else if (unique == Uniqueness::shown) out.unique = true;
+    else if (unique == Uniqueness::shown && is_choice_unique_) out.unique = true;
     return out;
 }
 

@@ -86,6 +86,7 @@ struct Runner {
 private:
     ReusedRun run_;  // kept run, which records only states
     MotionState state_;  // state of the motion with the last selected modes
+    bool is_choice_unique_ = true;  // the last modes are the only ones with a motion
     std::vector<Vec3> directions_;  // given slip directions of the elements
 
     // Set the state and the torques. Throw std::invalid_argument if they do not fit the model, which Python explains.

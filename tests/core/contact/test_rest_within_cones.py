@@ -17,16 +17,6 @@ DURATION = 0.05  # [s]
 SAME = 1e-7  # part of the accelerations by which equal motions may differ
 ROUNDING = 1e-8  # part of the weight: least squares of nearly dependent rows
 
-SEVERAL = 132  # pile of balls with three motions, of which time stepping takes one
-
-
-@pytest.fixture(autouse=True)
-def _several(request):
-    arguments = request.node.callspec.params if hasattr(request.node, "callspec") else {}
-    case = (arguments.get("family"), arguments.get("seed"))
-    if case == (wedged.pile_of_balls, SEVERAL) and arguments.get("method") != "moreau":
-        request.applymarker(pytest.mark.xfail(raises=pn.FrictionParadoxError, strict=True))
-
 
 families = pytest.mark.parametrize("family", wedged.FAMILIES, ids=lambda family: family.__name__)
 
@@ -59,7 +49,7 @@ def motions_from_random_starts(case, count):
 
 
 def test_two_of_several_motions_are_told():
-    case = wedged.pile_of_balls(SEVERAL)
+    case = wedged.pile_with_several_motions()
     q, v = case.scene.initial_state()
     expected = motions_from_random_starts(case, 30)
     assert len(expected) == 3
