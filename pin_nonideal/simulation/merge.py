@@ -91,7 +91,7 @@ def _motion(
     # One row per coordinate, so that each component fills contiguous times.
     states, moved = np.zeros((nq + nv + columns, t.size)), np.zeros(t.size)
     modes, sought = np.zeros((2, ne, t.size), dtype=np.int8)
-    turns = any(one.directions.shape[2] for one in dense)
+    turns = any(one.turning.size for one in dense)
     directions = np.zeros((ne if turns else 0, 3, t.size))
     for part, one in zip(parts, dense, strict=True):
         step = np.searchsorted(one.times[:, 0], t, side="right") - 1
@@ -105,9 +105,9 @@ def _motion(
             states[nq + nv + part.works] += own[last:]
         modes[part.elements] = one.modes[step].T
         sought[part.elements] = one.sought[step].T
-        if one.directions.shape[2]:
+        if one.turning.size:
             own = inside_steps(one.directions, step, at).reshape(t.size, -1, 3)
-            directions[part.elements] = own.transpose(1, 2, 0)
+            directions[part.elements[one.turning]] = own.transpose(1, 2, 0)
         before = np.concatenate([[0.0], one.moved])[step]
         moved += before + at * (one.moved[step] - before)
     return states.T, modes.T, directions.reshape(3 * len(directions), t.size).T, sought.T, moved
@@ -139,7 +139,21 @@ def _samples(
     y, held, turns, sought_modes = (
         np.ascontiguousarray(x[:k], dtype=float) for x in (states, modes, directions, sought)
     )
-    inside = core.sample_inside(program, options, t[:k], y, held, turns, sought_modes, no_torques, moved[:k])
+    turning, no_gaps, no_impacts = np.arange(directions.shape[1] // 3), np.zeros((k, 0)), np.zeros(k)
+    inside = core.sample_inside(
+        program,
+        options,
+        t[:k],
+        y,
+        held,
+        no_gaps,
+        turning,
+        turns,
+        sought_modes,
+        no_torques,
+        moved[:k],
+        no_impacts,
+    )
     samples = {name: getattr(inside, name) for name in dir(core.Outcome) if not name.startswith("_")}
     if evaluated:
         return samples
@@ -168,5 +182,9 @@ def _join_dense(
     joined.dense_times, joined.dense_states = stretches.ravel(), states.ravel()
     joined.dense_modes = modes[::points].ravel()
     joined.dense_directions, joined.dense_sought = directions.ravel(), sought[::points].ravel()
+    elements, steps = directions.shape[1] // 3, len(stretches)
+    joined.dense_turning = np.tile(np.arange(elements), steps)
+    joined.dense_turning_counts = np.full(steps, elements)
+    joined.dense_closed, joined.dense_impacts = np.zeros(0, np.int8), np.zeros(2 * steps)
     joined.dense_torque = np.zeros(0)
     joined.dense_moved = _motion(compiled, parts, dense, ends[1:])[4]

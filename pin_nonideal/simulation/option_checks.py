@@ -106,22 +106,16 @@ def wall_limit(max_wall: float | None) -> float:
     return positive("simulate: max_wall", max_wall)
 
 
-def check_opening(method: str, record: str | Sequence[str], name: str) -> None:
-    """Check that method and records support unilateral contacts.
+def check_opening(method: str, name: str) -> None:
+    """Check that the method supports unilateral contacts.
 
     Args:
         method: integration method.
-        record: names of quantities to record.
         name: name of a contact that may open.
 
     Raises:
-        InputError: the method or a record does not support them.
+        InputError: the method does not support them.
     """
-    if "dense" in ((record,) if isinstance(record, str) else record):
-        raise InputError(
-            f'simulate: record "dense" knows no contacts that open, and "{name}" may open; leave it out, or '
-            "keep the contact closed with unilateral=False"
-        )
     known = [m for m in METHODS if m not in SCIPY]
     if method not in known:
         raise InputError(

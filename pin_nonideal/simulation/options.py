@@ -127,7 +127,7 @@ def run_options(
     """
     check_method(method, rtol, atol, dt)
     if opening := compiled.opening_names:
-        check_opening(method, record, compiled.contact(opening[0]))
+        check_opening(method, compiled.contact(opening[0]))
     nv = compiled.model.nv
     if nv == 0:
         raise InputError(f'simulate: "{name}" has no joint that moves; there is nothing to simulate')

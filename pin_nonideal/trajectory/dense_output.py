@@ -30,23 +30,30 @@ class DenseOutput:
         states: q, v, states of laws and work of the energy ledger at the points of each step, (n, points,
             size).
         modes: modes of the friction elements during each step, (n, ne).
-        directions: slip directions of the elements at the points of each step, (n, points, 3 ne), or without
-            columns if each element slips along one direction. Steps that did not solve for directions store
-            the directions at their end.
+        closed: whether each unilateral contact of the core is closed during each step, (n, gaps).
+        turning: elements of several slip directions that carried load in any step, (m,).
+        directions: slip directions of these elements at the points of each step, (n, points, 3 m), zero in
+            steps without their load. Steps that did not solve for directions store the directions at their
+            end.
         sought: whether each step solved for the slip direction of each element, as in slow slip, (n, ne).
         torque: torque that each step holds constant, (n, nv), NaN for steps without one; (0, nv) if no step
             has one.
         moved: energy change by projection from the start of the run to the end of each step [J], (n,).
+        impacts: energy change by impacts from the start of the run to the start and to the end of each step
+            [J], (n, 2).
         options: options of the run, a RunOptions.
     """
 
     times: Array
     states: Array
     modes: NDArray[np.int8]
+    closed: NDArray[np.int8]
+    turning: NDArray[np.int64]
     directions: Array
     sought: NDArray[np.int8]
     torque: Array
     moved: Array
+    impacts: Array
     options: Any
 
     def check(self) -> None:
@@ -58,9 +65,10 @@ class DenseOutput:
         n, elements = len(self.times), self.modes.shape[1]
         shapes = [self.times.shape[1:] == (2,), self.states.ndim == 3, self.moved.shape == (n,)]
         shapes += [self.torque.ndim == 2, self.sought.shape == (n, elements), self.directions.ndim == 3]
-        shapes += [self.directions.shape[:2] == self.states.shape[:2]]
-        shapes += [self.directions.shape[2:] in ((0,), (3 * elements,))]
-        rows = {len(x) for x in (self.states, self.modes, self.moved)} | {len(self.torque) or n}
+        shapes += [self.directions.shape[:2] == self.states.shape[:2], self.turning.ndim == 1]
+        shapes += [self.directions.shape[2:] == (3 * self.turning.size,), self.impacts.shape == (n, 2)]
+        shapes += [self.closed.ndim == 2, bool(np.isin(self.turning, np.arange(elements)).all())]
+        rows = {len(x) for x in (self.states, self.modes, self.closed, self.moved)} | {len(self.torque) or n}
         if not all(shapes) or rows != {n} or not np.isin(self.modes, [int(mode) for mode in core.Mode]).all():
             raise ValueError("dense output does not fit together")
 
@@ -84,28 +92,32 @@ class DenseOutput:
             span = f"{self.times[0, 0]:g} to {self.times[-1, 1]:g} s" if len(self) else "no time"
             outside_time = t.max() if len(self) and self.times[0, 0] <= t.min() else t.min()
             raise InputError(f"at: t must lie in the run, which took {span}; got {outside_time:g} s")
-        sizes = (self.states.shape[2], self.modes.shape[1], len(self.torque) and self.torque.shape[1])
+        sizes = (self.states.shape[2], self.modes.shape[1], self.closed.shape[1])
+        torques = len(self.torque) and self.torque.shape[1]
         program, nv = compiled.program, compiled.model.nv
         work = len(program.power_names) if self.options.energy else 0
-        known = (compiled.model.nq + nv + program.states + work, len(program.element_names))
-        if sizes[:2] != known or sizes[2] not in (0, nv):
+        states, gaps = compiled.model.nq + nv + program.states + work, len(compiled.opening_names)
+        if sizes != (states, len(program.element_names), gaps) or torques not in (0, nv):
             raise InputError(f'at: the scene "{name}" is not the one of the run')
         step = np.maximum(np.searchsorted(self.times[:, 0], t, side="right") - 1, 0)
         begin, end = self.times[step].T
         part = (t - begin) / (end - begin)
         moved_before = np.concatenate([[0.0], self.moved])[step]
         moved = moved_before + part * (self.moved[step] - moved_before)
-        states = inside_steps(self.states, step, part)
+        before, after = self.impacts[step].T
         outcome = core.sample_inside(
             program,
             self.options,
             np.ascontiguousarray(t),
-            np.ascontiguousarray(states),
+            np.ascontiguousarray(inside_steps(self.states, step, part)),
             np.ascontiguousarray(self.modes[step], dtype=float),
+            np.ascontiguousarray(self.closed[step], dtype=float),
+            self.turning,
             inside_steps(self.directions, step, part),
             np.ascontiguousarray(self.sought[step], dtype=float),
             np.ascontiguousarray(self.torque[step] if len(self.torque) else self.torque),
             moved,
+            before + part * (after - before),
         )
         return outcome_fields(compiled, outcome, self.options)
 
@@ -136,16 +148,32 @@ def dense_output(outcome: core.Outcome, options: Any, nv: int, elements: int) ->
     times = outcome.dense_times.reshape(-1, 2)
     n = len(times)
     points = core.dense_points(options.method)
-    turns = 3 * elements if outcome.dense_directions.size else 0
+    turning, directions = _directions_by_step(outcome, n, points)
     return DenseOutput(
         times,
         outcome.dense_states.reshape(n, points, -1) if n else np.zeros((0, points, 0)),
         outcome.dense_modes.reshape(n, elements),
-        outcome.dense_directions.reshape(n, points, turns),
+        outcome.dense_closed.reshape(n, -1) if n else np.zeros((0, 0), np.int8),
+        turning,
+        directions,
         np.broadcast_to(outcome.dense_sought.reshape(n, -1), (n, elements))
         if n
         else np.zeros((0, elements), np.int8),
         outcome.dense_torque.reshape(-1, nv),
         outcome.dense_moved,
+        outcome.dense_impacts.reshape(n, 2),
         options,
     )
+
+
+def _directions_by_step(outcome: core.Outcome, n: int, points: int) -> tuple[NDArray[np.int64], Array]:
+    """Return the elements with slip directions in any step, and their directions, (n, points, 3 m)."""
+    counts = outcome.dense_turning_counts
+    turning, column = np.unique(outcome.dense_turning, return_inverse=True)
+    table = np.zeros((n, points, turning.size, 3))
+    # The flat directions run over the steps, the points of each step, and its elements with load.
+    step = np.repeat(np.arange(n), counts * points)
+    point = np.concatenate([np.repeat(np.arange(points), count) for count in counts] or [step])
+    columns = [np.tile(own, points) for own in np.split(column, np.cumsum(counts)[:-1])]
+    table[step, point, np.concatenate(columns or [step])] = outcome.dense_directions.reshape(-1, 3)
+    return turning.astype(np.int64), table.reshape(n, points, 3 * turning.size)

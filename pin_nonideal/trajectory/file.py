@@ -41,7 +41,11 @@ OPTIONAL_FIELDS = (*REASONS, "z", "modes", "closed")
 # Fields by name, with one row or number for each sample; a file has a table for each, or None.
 GROUPS = ("energy", "power", "law_forces", "reactions", "contact_forces", "contact_torques")
 TABLES = ("law_forces/", "reactions/", "contact_forces/", "contact_torques/", "points/")
-DENSE_FIELDS = ("times", "states", "modes", "directions", "sought", "torque", "moved")
+DENSE_FIELDS = (
+    *("times", "states", "modes", "closed", "turning", "directions", "sought", "torque", "moved"),
+    "impacts",
+)
+
 LISTS = ("element_names", "element_laws", "law_names", "law_dofs")
 
 
@@ -302,16 +306,27 @@ def _extra_fields(loose: Table, header: Table, samples: int) -> Table:
     if "dense" in header:
         options = SimpleNamespace(**header["dense"])
         options.atol = np.array(options.atol, dtype=float)
-        dense = {key: loose[f"loose/dense/{key}"] for key in DENSE_FIELDS if key != "sought"}
-        if "loose/dense/sought" in loose:
-            dense["sought"] = loose["loose/dense/sought"]
-        else:  # files of earlier versions have directions at the end of each step only
-            points = dense["states"].shape[1]
-            dense["directions"] = np.repeat(dense["directions"][:, None], points, axis=1)
-            dense["sought"] = np.zeros_like(dense["modes"])
-        fields["dense"] = DenseOutput(**dense, options=options)
+        found = [key for key in DENSE_FIELDS if f"loose/dense/{key}" in loose]
+        dense = {key: loose[f"loose/dense/{key}"] for key in found}
+        fields["dense"] = DenseOutput(**_completed(dense), options=options)
         fields["dense"].check()
     return fields
+
+
+def _completed(dense: Table) -> Table:
+    """Return the arrays of dense output with those that files of earlier versions lack."""
+    steps, elements = dense["modes"].shape
+    if "sought" not in dense:  # the directions are those at the end of each step
+        points = dense["states"].shape[1]
+        dense["directions"] = np.repeat(dense["directions"][:, None], points, axis=1)
+        dense["sought"] = np.zeros_like(dense["modes"])
+    earlier: Table = {}
+    if "closed" not in dense:
+        several = elements if dense["directions"].shape[2] else 0
+        earlier["closed"] = np.zeros((steps, 0), np.int8)
+        earlier["turning"] = np.arange(several)
+        earlier["impacts"] = np.zeros((steps, 2))
+    return earlier | dense
 
 
 def _check_ledger(names: Sequence[str], source: Path) -> None:

@@ -17,7 +17,7 @@ import pinocchio as pin
 import pytest
 
 import pin_nonideal as pn
-from pin_nonideal.errors import InputError, LoadingError, OutputError, RunInterrupted
+from pin_nonideal.errors import InputError, LoadingError, OutputError, RunError, RunInterrupted
 from pin_nonideal.loading.robot_files import robot_folders
 from pin_nonideal.simulation import checkpoint
 from pin_nonideal.simulation.options import run_options
@@ -26,6 +26,7 @@ from ..support.mechanisms import again
 from ..support.random_trees import add
 from ..support.refusals import refuses
 from ..support.same_run import assert_same_run
+from ..support.scenes import kinds, random_cases
 from ..support.standing import balls
 
 ALL = ("a", "forces", "energy", "power")
@@ -114,6 +115,37 @@ def test_every_part_of_a_run_goes_on_bit_by_bit(case, kept, tmp_path):
     for k in sorted({0, len(states) - 1, *chosen.integers(len(states), size=6).tolist()}):
         path.write_bytes(states[k])
         assert_same_run(alone, pn.resume(path, scene, checkpoint_interval=1e9))
+
+
+CASES = kinds() | random_cases(4)
+METHODS = ("dop853", "rk4", "moreau", "semi_implicit_euler")
+# Prescribed motions that start friction or break, and contacts that strike and open.
+SHORT = ("started loop 0", "started with friction Spline", "motion Spline", "touching BoxContact")
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(
+    "name", [n if n in SHORT else pytest.param(n, marks=pytest.mark.slow) for n in CASES]
+)
+def test_a_run_of_any_scene_resumes_bit_by_bit(name, method, kept, tmp_path):
+    case, path = CASES[name](), tmp_path / "run"
+    duration = min(case.duration, 3.0)
+    options: dict = {"record": ALL, "max_wall": 10.0}
+    if method != "dop853":
+        options |= {"method": method, "dt": max(case.dt, duration / 200.0)}
+    if method == "moreau":  # most steps are no samples
+        options["output_dt"] = duration / 19.3
+    start = case.q0, case.v0
+    try:
+        alone = pn.simulate(case.scene, duration, *start, **options)
+    except RunError:
+        pytest.skip("the method does not finish this run")
+    written = pn.simulate(case.scene, duration, *start, **options, checkpoint=path, checkpoint_interval=0.0)
+    assert_same_run(alone, written)
+    states, chosen = list(kept), np.random.default_rng(0)
+    for k in sorted({0, len(states) - 1, *chosen.integers(len(states), size=5).tolist()}):
+        path.write_bytes(states[k])
+        assert_same_run(alone, pn.resume(path, case.scene, checkpoint_interval=1e9))
 
 
 def test_a_run_that_is_stopped_again_and_again(kept, tmp_path):

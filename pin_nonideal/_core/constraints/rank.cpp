@@ -41,6 +41,7 @@ void decide_rows(const Mechanism& m, Terms& terms, const std::vector<Block>& blo
         for (size_t k = 0; k < block.kept.size(); ++k) {
             if (keeps) length[k] = std::max(length[k], std::sqrt(s.longest[block.row + k]));
             length[k] = length[k] > 0.0 ? 1.0 / length[k] : 1.0;
+            s.chosen_scale[block.row + k] = length[k];
             lasting += lasts && s.required[block.row + k];
         }
     }

@@ -7,7 +7,7 @@ namespace pn {
 void RowSystem::allocate(const RowLayout& layout, int block_count, int nv) {
     blocks.reserve(block_count);
     block_used.assign(block_count, 0);
-    scale = longest = longest_chosen = VecX::Zero(layout.rows);
+    scale = chosen_scale = longest = longest_chosen = VecX::Zero(layout.rows);
     active.assign(layout.rows, 0);
     required.assign(layout.rows, 0);
     Q.resize(nv, 0);

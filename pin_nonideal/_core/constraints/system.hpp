@@ -14,7 +14,7 @@
 
 namespace pn {
 
-// Choice of active rows among the required ones, and the records that make a new choice due.
+// Choice of active rows among the required ones, and the records that make a new choice due or test dependent rows.
 struct RowChoice {
     std::vector<char> active;
     bool redundant = false;  // some required row is not active
@@ -22,12 +22,13 @@ struct RowChoice {
     // longest_chosen: the same since the last choice. chosen_pivot: greatest of the smallest pivots since the last choice.
     VecX longest, longest_chosen;
     double chosen_pivot = 0.0;
+    VecX chosen_scale;  // 1 / length of each row of B by which the last choice scaled it
 };
 
 struct RowSystem : RowChoice {
     Envelope envelope;              // envelope of the blocks in use
     std::vector<double> G, factor;  // B B^T and its Cholesky factor, in the envelope
-    VecX scale;                     // 1 / length of each row of B
+    VecX scale;                     // 1 / length of each active row of B
     std::vector<char> required;     // rows that must hold (constraints, sticking elements)
     std::vector<int> blocks;        // blocks with a required row
     std::vector<char> block_used;

@@ -67,7 +67,7 @@ static int contradicting_block(const Program& p, Workspace& w, const VecX& v, do
                 step_start_parameters.consistency_tolerance * (size + step_start_parameters.background * reach);
             if (std::abs(sum) <= allowed * excess) continue;
             if (!lacking) lacking = unseen(p, w, v);
-            allowed += *lacking / w.now.rows.scale[row];
+            allowed += *lacking / w.now.rows.chosen_scale[row];
             if (std::abs(sum) > allowed * excess) {
                 excess = std::abs(sum) / allowed;
                 worst = sum;

@@ -63,6 +63,7 @@ struct RunState {
     bool has_wrenches = false;     // true if that solution was found by sweeps over trees
     VecX percussion;  // impulses of contacts and friction in the last time step, by row and divided by its length
     VelocityRates last_rates;
+    VecX q_without_rest;  // configuration that no forces held at rest in earlier time steps, or empty
     VecX third_order_gap;         // third-order part of the gaps that a step closes, divided by its cubed length
     bool has_ideal_row_choice = false;   // rows that are independent without sticking elements are chosen for this step
     Uniqueness unique = Uniqueness::shown;  // uniqueness of the motion in these modes, as last decided

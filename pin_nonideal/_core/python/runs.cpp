@@ -60,12 +60,15 @@ void set_hint(Options& o, const Hint& hint) {
 
 // Compute samples inside the steps of a run with record "dense" from interpolated states and the data of each step.
 Outcome samples_inside(const Program& p, const Options& options, const Array& t, const Array2& y, const Array2& modes,
-                      const Array2& directions, const Array2& sought, const Array2& torque, const Array& moved) {
+                      const Array2& closed, const Indices& turning, const Array2& directions, const Array2& sought,
+                      const Array2& torque, const Array& moved, const Array& impacts) {
     InsideStates inside;
     inside.t.assign(t.data(), t.data() + t.shape(0));
     inside.moved.assign(moved.data(), moved.data() + moved.shape(0));
+    inside.impacts.assign(impacts.data(), impacts.data() + impacts.shape(0));
+    inside.turning.assign(turning.data(), turning.data() + turning.shape(0));
     inside.end = options.end();
-    const size_t elements = p.frictions.size();
+    const size_t elements = p.frictions.size(), gaps = p.gaps.size();
     for (size_t k = 0; k < t.shape(0); ++k) {
         inside.y.emplace_back(map(y).row(k));
         inside.directions.emplace_back(map(directions).row(k));
@@ -76,8 +79,11 @@ Outcome samples_inside(const Program& p, const Options& options, const Array& t,
             held[e] = static_cast<Mode>(static_cast<int>(map(modes)(k, e)));
             is_sought[e] = map(sought)(k, e) != 0.0;
         }
+        std::vector<char> is_closed(gaps);
+        for (size_t i = 0; i < gaps; ++i) is_closed[i] = map(closed)(k, i) != 0.0;
         inside.modes.push_back(std::move(held));
         inside.sought.push_back(std::move(is_sought));
+        inside.closed.push_back(std::move(is_closed));
     }
     Workspace w(p);
     w.continues = options.continues;
@@ -245,8 +251,8 @@ void bind_runs(nb::module_& m, nb::class_<Runner>& runner) {
           "names"_a, "values"_a);
     m.def("dense_points", [](const std::string& method) { return DenseRecorder::points(method_named(method)); }, "method"_a);
     m.def("inside_steps", &inside_steps, "states"_a, "step"_a, "part"_a);
-    m.def("sample_inside", &samples_inside, "program"_a, "options"_a, "t"_a, "y"_a, "modes"_a, "directions"_a,
-          "sought"_a, "torque"_a, "moved"_a);
+    m.def("sample_inside", &samples_inside, "program"_a, "options"_a, "t"_a, "y"_a, "modes"_a, "closed"_a, "turning"_a,
+          "directions"_a, "sought"_a, "torque"_a, "moved"_a, "impacts"_a);
     m.def("rollout", &rollout, "program"_a, "q"_a, "v"_a, "options"_a, "threads"_a,
           "names"_a, "values"_a);
     m.def("with_numbers", &with_numbers, "program"_a, "names"_a, "values"_a);

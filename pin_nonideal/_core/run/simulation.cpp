@@ -17,7 +17,7 @@ Simulation::Simulation(const Program& program, Workspace& workspace, const Optio
     : p(program), w(workspace), options(run_options), out(recording), t_end(options.end()),
       run_limits(run_options, workspace, progress, recording), system(program, workspace, options.record.energy),
       norm(system, options.rtol, options.atol, progress.rounding), stepper(options.method, system, norm),
-      control(options.method, options.rtol), choice(system, stepper, progress, run_options),
+      control(options.method, options.rtol, progress.trials), choice(system, stepper, progress, run_options),
       stiffness(system, stepper, progress, run_options),
       floor(system, stepper, norm, progress, recording), growth(system, progress, run_options, recording),
       watch(system, progress.gaps),
@@ -46,6 +46,8 @@ void Simulation::start(const VecX& q0, const VecX& v0) {
     progress.y.segment(system.nq, system.nv) = v0;
     if (system.nz > 0) progress.y.segment(system.nq + system.nv, system.nz) = w.state.z;
     w.now.dependent_at_start = -1;
+    progress.trials = {};
+    progress.misses_laws = false;
     modes.start();
     output.begin();
     breaks.enter();
@@ -111,8 +113,6 @@ bool Simulation::between_steps() {
 
 void Simulation::restore(const std::string& state) {
     from_bytes(state, system, progress, out);
-    w.now.dependent_at_start = -1;
-    breaks.enter();
 }
 
 // --- Propose --------------------------------------------------------------------------------------------------------

@@ -30,6 +30,7 @@ SAMPLED_FIELDS = (
     "lam",
     "lam_ideal",
     "limits",
+    "z",
 )
 TABLE_FIELDS = ("energy", "power", "law_forces", "reactions", "contact_forces", "contact_torques")
 

@@ -66,14 +66,16 @@ Breaks::Breaks(System& system, Progress& progress, Output& output, Recording& ou
 void Breaks::enter(double time) {
     const auto after = std::upper_bound(p.breaks.begin(), p.breaks.end(), time);
     double last = after == p.breaks.begin() ? -HUGE_VAL : *(after - 1);
-    next_ = after == p.breaks.end() ? HUGE_VAL : *after;
+    double next = after == p.breaks.end() ? HUGE_VAL : *after;
     double& found = progress_.detected_break;
     if (found <= time) {
         last = std::max(last, found);
         found = HUGE_VAL;
     }
-    next_ = std::min(next_, found);
-    w.now.set_stretch(last, next_);
+    next = std::min(next, found);
+    progress_.last_break = last;
+    progress_.next_break = next;
+    w.now.set_stretch(last, next);
 }
 
 double Breaks::next(double after) const {

@@ -38,9 +38,9 @@ public:
     void enter(double time);
     // Time of the next break after the current time or after another one (infinity if none), and a check if it is
     // reached.
-    double next() const { return next_; }
+    double next() const { return progress_.next_break; }
     double next(double after) const;
-    bool reached() const { return progress_.t >= next_; }
+    bool reached() const { return progress_.t >= next(); }
     // Pass the break that was reached, and recompute the rate. Return true if the velocity has jumped. The caller must
     // then select the modes of contacts and friction.
     bool pass();
@@ -66,7 +66,6 @@ private:
     Output& output_;
     Recording& out_;
     std::vector<Motion> motions_;
-    double next_ = HUGE_VAL;
 };
 
 }  // namespace pn

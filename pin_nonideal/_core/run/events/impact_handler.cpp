@@ -54,10 +54,12 @@ void ImpactHandler::end_bouncing(double stop) {
     if (!rest) restore_start();
     if (failure) throw *failure;
     if (!rest) return;
+    const double from = progress_.t, impact_energy_from = progress_.impact_energy;
     progress_.t = rest->time;
-    progress_.y = y_end;
+    progress_.y.swap(y_end);
     progress_.rate = rate_end;
     progress_.impact_energy += rest->work;
+    output_.keep_time_step({from, y_end, state.closed, state.mode}, impact_energy_from);
     for (const Event& event : rest->events) out_.events.push_back(event);
     output_.configured_now();
     remember_gaps();

@@ -126,20 +126,20 @@ bool ModeChanges::follow_drive() {
 // A motion that starts smoothly has no acceleration at first. Its speed shows which elements slip, once it is above the
 // rounding of the time step. `before`: modes after the time steps, which record their own events.
 bool ModeChanges::step_with_drive(RunState& before) {
-    const double last = progress_.t - drive_end_ < drive_length_ ? drive_length_ : 0.0;
+    const double last = progress_.t - progress_.drive_end < progress_.drive_length ? progress_.drive_length : 0.0;
     const double first = options_.method.adaptive() ? mode_change_parameters.drive_step
                                                     : mode_change_parameters.drive_part * options_.dt;
-    drive_length_ = std::max(2.0 * last, first);
-    for (int trial = 0; trial < mode_change_parameters.max_drive_steps; ++trial, drive_length_ *= 2.0) {
+    progress_.drive_length = std::max(2.0 * last, first);
+    for (int trial = 0; trial < mode_change_parameters.max_drive_steps; ++trial, progress_.drive_length *= 2.0) {
         const Progress from = progress_;
-        const double stop = std::min(options_.end(), progress_.t + drive_length_);
-        if (attempt([&] { time_stepping_.step(drive_length_, stop, options_.end()); })) {
+        const double stop = std::min(options_.end(), progress_.t + progress_.drive_length);
+        if (attempt([&] { time_stepping_.step(progress_.drive_length, stop, options_.end()); })) {
             progress_ = from;
             restore_modes(before);
             continue;
         }
         before = w.state;
-        drive_end_ = progress_.t;
+        progress_.drive_end = progress_.t;
         if (!attempt([&] { switch_modes(system_, progress_.t, progress_.y, progress_.rate, std::nullopt); })) return true;
         restore_modes(before);
     }
@@ -180,7 +180,7 @@ bool ModeChanges::bridge_with_time_stepping(const Failure& failure, bool of_hand
     const int element = of_elements ? failure.elements.front() : 0;
     const bool creeps = is_creeping();
     const double spacing = mode_change_parameters.forced_switch_spacing * tiny_step_at(progress_.t);
-    if (creeps && p.gaps.empty() && progress_.t > rest_time_ + spacing && come_to_rest()) return true;
+    if (creeps && p.gaps.empty() && progress_.t > progress_.rest_time + spacing && come_to_rest()) return true;
     if (!(of_hand_over || is_undecided(failure) || chatter_.is_zeno() || creeps)) return false;
     bridge(element);
     return true;
@@ -235,7 +235,7 @@ bool ModeChanges::come_to_rest() {
         attempt([&] { evaluate_again(); });
         return false;
     }
-    rest_time_ = progress_.t;
+    progress_.rest_time = progress_.t;
     for (const Event& change : changes_since(system_, progress_.t, before.closed, before.mode)) {
         out_.events.push_back(change);
         chatter_.count();

@@ -31,7 +31,7 @@ public:
                 ImpactHandler& impacts, TimeStepping& time_stepping, ChatterDetector& chatter, Recording& out);
 
     // Forget the mode switches of an earlier run.
-    void start() { drive_end_ = rest_time_ = -HUGE_VAL; }
+    void start() { progress_.drive_end = progress_.rest_time = -HUGE_VAL; }
     // Switch modes and state at an event that has been reached.
     void change(FoundEvent event);
     // Forced switch: if no step is short enough, the motion of the current modes may have ended. `can_switch_modes`
@@ -81,8 +81,6 @@ private:
     TimeStepping& time_stepping_;
     ChatterDetector& chatter_;
     Recording& out_;
-    double drive_end_ = -HUGE_VAL, drive_length_ = 0.0;  // end and length [s] of the last time step with a drive
-    double rest_time_ = -HUGE_VAL;  // last time at which creeping slip came to rest
 };
 
 }  // namespace pn

@@ -18,19 +18,19 @@ double StepControl::aim(const Method& method) { return std::pow(parameters.safet
 
 bool StepControl::needs_detour(double min_pivot, double start_pivot, double end_pivot) const {
     const double way = std::sqrt(start_pivot) + std::sqrt(end_pivot);
-    return method_.adaptive() && detours_ < parameters.max_detours &&
+    return method_.adaptive() && trials_.detours < parameters.max_detours &&
            std::sqrt(min_pivot) < parameters.clearance * way && rounding_at(min_pivot) > rtol_;
 }
 
 bool StepControl::accepts(std::optional<double> error, double size, bool last, double& h) {
     const double power = -1.0 / method_.order;
     if (!error) {
-        ++detours_;
+        ++trials_.detours;
         h = parameters.detour * size;
         return false;
     }
     if (!(*error <= 1.0)) {
-        last_rejected_ = true;
+        trials_.last_rejected = true;
         h = size * std::max(parameters.min_step_ratio,
                             std::isfinite(*error) ? parameters.retry_safety * std::pow(*error, power) : 0.0);
         return false;
@@ -38,11 +38,11 @@ bool StepControl::accepts(std::optional<double> error, double size, bool last, d
     if (method_.adaptive()) {
         double factor = parameters.max_step_ratio;
         if (*error > 0.0) factor = std::min(factor, parameters.safety * std::pow(*error, power));
-        if (last_rejected_) factor = std::min(1.0, factor);
+        if (trials_.last_rejected) factor = std::min(1.0, factor);
         if (!(last && factor * size < h)) h = size * std::max(factor, parameters.min_step_ratio);
     }
-    last_rejected_ = false;
-    detours_ = 0;
+    trials_.last_rejected = false;
+    trials_.detours = 0;
     return true;
 }
 

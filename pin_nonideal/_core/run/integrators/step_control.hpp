@@ -23,12 +23,18 @@ struct StepControlParameters {
     int max_detours = 3;  // maximum number of such steps in a row
 };
 
+// Earlier trials of the step.
+struct StepTrials {
+    bool last_rejected = false;  // the last trial was rejected
+    int detours = 0;             // detours around a singular position
+};
+
 class StepControl {
 public:
     using Parameters = StepControlParameters;
     static constexpr Parameters parameters{};
 
-    StepControl(const Method& method, double rtol) : method_(method), rtol_(rtol) {}
+    StepControl(const Method& method, double rtol, StepTrials& trials) : method_(method), rtol_(rtol), trials_(trials) {}
 
     // Return the error norm at which the next step has the size of the last.
     static double aim(const Method& method);
@@ -43,8 +49,7 @@ public:
 private:
     const Method& method_;
     double rtol_;
-    bool last_rejected_ = false;
-    int detours_ = 0;  // detours of this step around a singular position
+    StepTrials& trials_;
 };
 
 }  // namespace pn

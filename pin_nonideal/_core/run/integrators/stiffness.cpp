@@ -4,8 +4,6 @@
 #include <cmath>
 #include <complex>
 
-#include "dynamics/evaluation.hpp"
-
 namespace pn {
 
 StiffnessGuard::StiffnessGuard(System& system, Stepper& stepper, Progress& progress, const Options& options)
@@ -34,7 +32,7 @@ double StiffnessGuard::stage_rate() const {
 }
 
 // Return the derivative of the rate along a unit direction. `force` receives that of the forces.
-VecX StiffnessGuard::difference(double relative, const VecX& direction, VecX& force) {
+VecX StiffnessGuard::difference(System& system, double relative, const VecX& direction, VecX& force) {
     const double end = stepper_.t0 + stepper_.h;
     const int n = static_cast<int>(direction.size());
     const double step = relative * (1.0 + stepper_.y1.head(n).cwiseAbs().maxCoeff());
@@ -42,28 +40,28 @@ VecX StiffnessGuard::difference(double relative, const VecX& direction, VecX& fo
     for (int side = 0; side < 2; ++side) {
         probe_ = stepper_.y1;
         probe_.head(n) += (side == 0 ? step : -step) * direction;
-        probe_rate_ = VecX::Zero(system_.ny);
-        system_.derivative(end, probe_, probe_rate_);
+        probe_rate_ = VecX::Zero(system.ny);
+        system.derivative(end, probe_, probe_rate_);
         there[side] = probe_rate_.head(n);
-        forces[side] = system_.w.now.F;
-        if (system_.p.has_laws()) forces[side] += system_.w.now.C;
+        forces[side] = system.w.now.F;
+        if (system.p.has_laws()) forces[side] += system.w.now.C;
     }
     force = (forces[0] - forces[1]) / (2.0 * step);
     return (there[0] - there[1]) / (2.0 * step);
 }
 
-StiffnessGuard::FastestMode StiffnessGuard::fastest_mode(double relative) {
-    const int n = system_.nq + system_.nv + system_.nz;
+StiffnessGuard::FastestMode StiffnessGuard::fastest_mode(System& system, double relative) {
+    const int n = system.nq + system.nv + system.nz;
     VecX x = VecX::Ones(n).normalized(), force, other_force;
-    for (int pass = 0; pass < parameters.power_passes; ++pass) x = difference(relative, x, force).normalized();
+    for (int pass = 0; pass < parameters.power_passes; ++pass) x = difference(system, relative, x, force).normalized();
     // Largest eigenvalue in the plane of x and its image.
-    const VecX image = difference(relative, x, force);
+    const VecX image = difference(system, relative, x, force);
     VecX other = image - x.dot(image) * x;
     const double a = x.dot(image), c = other.norm();
     std::complex<double> eigenvalue = a;
     if (c > 1e-9 * image.norm()) {
         other /= c;
-        const VecX other_image = difference(relative, other, other_force);
+        const VecX other_image = difference(system, relative, other, other_force);
         const double b = x.dot(other_image), d = other.dot(other_image);
         const std::complex<double> root = std::sqrt(std::complex<double>(0.25 * (a - d) * (a - d) + b * c));
         const std::complex<double> one = 0.5 * (a + d) + root, two = 0.5 * (a + d) - root;
@@ -74,20 +72,25 @@ StiffnessGuard::FastestMode StiffnessGuard::fastest_mode(double relative) {
         }
     }
     int dof = 0;
-    const VecX power = force.cwiseAbs().cwiseProduct(x.segment(system_.nq, system_.nv).cwiseAbs());
+    const VecX power = force.cwiseAbs().cwiseProduct(x.segment(system.nq, system.nv).cwiseAbs());
     (power.maxCoeff() > 0.0 ? power : force.cwiseAbs()).eval().maxCoeff(&dof);
     return {-eigenvalue.real(), std::abs(eigenvalue.imag()), dof};
 }
 
 StiffnessGuard::FastestMode StiffnessGuard::mode_here() {
-    const RunState kept = system_.w.state;
-    const FastestMode mode = fastest_mode(parameters.difference_step);
-    system_.w.state = kept;
-    system_.read(stepper_.y1);
-    system_.read_law_states(stepper_.y1);
-    evaluate(system_.p, system_.w, stepper_.t0 + stepper_.h, system_.q, system_.v);
-    system_.w.state = kept;
-    return mode;
+    const Program& p = system_.p;
+    const Workspace& run = system_.w;
+    Workspace w(p);
+    w.state = run.state;
+    w.continues = run.continues;
+    w.now.not_before = run.now.not_before;
+    w.now.not_after = run.now.not_after;
+    w.now.has_override = run.now.has_override;
+    w.now.override_torque = run.now.override_torque;
+    select_rows(p, w);
+    static_cast<RowChoice&>(w.now.rows) = run.now.rows;
+    System system(p, w, false);
+    return fastest_mode(system, parameters.difference_step);
 }
 
 void StiffnessGuard::check_step() {
@@ -116,9 +119,7 @@ void StiffnessGuard::estimate_remaining_time() {
     const double size = stepper_.h, end = stepper_.t0 + size, left = options_.end() - end;
     const double so_far = std::chrono::duration<double>(Clock::now() - start_time_).count();
     if (so_far / static_cast<double>(steps_) * (left / size) < parameters.long_time) return;
-    const Counters kept = system_.w.counters;  // the instant depends on the clock, so the evaluations are not counted
     const FastestMode mode = mode_here();
-    system_.w.counters = kept;
     const double radians = size * mode.rate();
     const bool follows =
         mode.decays() ? radians > parameters.near_border * stepper_.method.stability && left < max_steps_ * size
@@ -131,9 +132,9 @@ void StiffnessGuard::estimate_remaining_time() {
 void StiffnessGuard::require_time_steps(double size) {
     // Time stepping solves for slip directions together with the forces, so slow slip may turn arbitrarily fast.
     system_.w.state.solves_directions = true;
-    const FastestMode mode = fastest_mode(parameters.difference_step);
+    const FastestMode mode = fastest_mode(system_, parameters.difference_step);
     if (!(size * mode.rate() > parameters.euler_border && mode.decays())) return;
-    const double shorter = fastest_mode(parameters.shorter_step).rate();
+    const double shorter = fastest_mode(system_, parameters.shorter_step).rate();
     if (shorter < parameters.same_rate * mode.rate() || mode.rate() < parameters.same_rate * shorter) return;
     throw Failure(Failure::Kind::stiff, stepper_.t0 + stepper_.h, {mode.dof}, mode.rate());
 }

@@ -61,11 +61,12 @@ private:
 
     void check_stability_limit();
     void estimate_remaining_time();
-    // Return the fastest mode at the step's end. The workspace stays evaluated there.
+    // Return the fastest mode at the step's end, in a workspace of its own: the instant of an estimate depends on the clock,
+    // and the run must not.
     FastestMode mode_here();
     double stage_rate() const;
-    VecX difference(double relative, const VecX& direction, VecX& force);
-    FastestMode fastest_mode(double relative);  // `relative`: difference step relative to the state
+    VecX difference(System& system, double relative, const VecX& direction, VecX& force);
+    FastestMode fastest_mode(System& system, double relative);  // `relative`: difference step relative to the state
 
     System& system_;
     Stepper& stepper_;

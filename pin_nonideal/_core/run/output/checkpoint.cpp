@@ -35,11 +35,17 @@ static void fields(Archive& a, VelocityRates& x) {
 static void fields(Archive& a, RunState& x) {
     auto& [mode, closed, slip_direction, last_direction, is_sticking_deferred, solves_directions, is_hyperstatic,
            rank_tolerance, z, held_torque, has_held, unknown, warm, bearing_wrench, has_wrenches, percussion, last_rates,
-           third_order_gap, has_ideal_row_choice, unique, spectral_bound, steps_since] = x;
+           q_without_rest, third_order_gap, has_ideal_row_choice, unique, spectral_bound, steps_since] = x;
     a(mode, closed, slip_direction, last_direction, is_sticking_deferred, solves_directions, is_hyperstatic,
       rank_tolerance, z, held_torque, has_held, unknown, warm, bearing_wrench, has_wrenches, percussion, third_order_gap,
       has_ideal_row_choice, unique, spectral_bound, steps_since);
     fields(a, last_rates);
+    a.sized(q_without_rest);
+}
+
+static void fields(Archive& a, RowChoice& x) {
+    auto& [active, redundant, longest, longest_chosen, chosen_pivot, chosen_scale] = x;
+    a(active, redundant, longest, longest_chosen, chosen_pivot, chosen_scale);
 }
 
 static void fields(Archive& a, TravelState& x) {
@@ -59,15 +65,17 @@ static void fields(Archive& a, GapState& x) {
 }
 
 static void fields(Archive& a, Progress& x) {
-    auto& [t, h, y, rate, configured_t, configured_y, numerical_energy, samples, next_period, detected_break,
-           recent_event_times, mode_change_times, event_signs, counted_steps, counted_from, bridged_time, bridged_end,
-           slip_at_start, in_tension, gaps, forced_switch_time, impact_energy, several_motions, stiff_steps, quiet_steps,
-           rounding, next_rounding_check, growth_times, growth_speeds, growth_steps, is_stationary, has_forces,
-           turning_steps, may_hand_over, hand_over_time] = x;
-    a(t, h, y, rate, configured_t, configured_y, numerical_energy, samples, next_period, detected_break, event_signs,
-      counted_steps, counted_from, bridged_time, bridged_end, slip_at_start, in_tension, forced_switch_time, impact_energy,
-      several_motions, stiff_steps, quiet_steps, rounding, next_rounding_check, is_stationary, has_forces, turning_steps,
-      may_hand_over, hand_over_time);
+    auto& [t, h, trials, y, rate, configured_t, configured_y, numerical_energy, samples, next_period,
+           detected_break, last_break, next_break, recent_event_times, mode_change_times, event_signs, counted_steps,
+           counted_from, bridged_time, bridged_end, slip_at_start, in_tension, gaps, forced_switch_time, impact_energy,
+           several_motions, stiff_steps, quiet_steps, rounding, next_rounding_check, growth_times, growth_speeds,
+           growth_steps, is_stationary, has_forces, turning_steps, may_hand_over, hand_over_time, drive_end,
+           drive_length, rest_time, misses_laws] = x;
+    a(t, h, trials.last_rejected, trials.detours, y, rate, configured_t, configured_y, numerical_energy, samples, next_period,
+      detected_break, last_break, next_break, event_signs, counted_steps, counted_from, bridged_time, bridged_end,
+      slip_at_start, in_tension, forced_switch_time, impact_energy, several_motions, stiff_steps, quiet_steps, rounding,
+      next_rounding_check, is_stationary, has_forces, turning_steps, may_hand_over, hand_over_time, drive_end,
+      drive_length, rest_time, misses_laws);
     fields(a, gaps);
     a.list(recent_event_times);
     a.list(growth_times);
@@ -84,9 +92,11 @@ static void fields(Archive& a, Event& x) {
 }
 
 static void fields(Archive& a, DenseOutput& x) {
-    auto& [times, states, step_modes, directions, sought, torque, moved] = x;
-    for (auto* numbers : {&times, &states, &directions, &torque, &moved}) a.list(*numbers);
+    auto& [times, states, step_modes, closed, turning, turning_counts, directions, sought, torque, moved, impacts] = x;
+    for (auto* numbers : {&times, &states, &directions, &torque, &moved, &impacts}) a.list(*numbers);
+    for (auto* indices : {&turning, &turning_counts}) a.list(*indices);
     a.list(step_modes);
+    a.list(closed);
     a.list(sought);
 }
 
@@ -109,8 +119,8 @@ static void fields(Archive& a, Recording& x) {
 // The choice of independent rows, and the data that tests this choice, are kept from step to step until the choice
 // proves wrong.
 static void archive(Archive& a, Workspace& w, Progress& progress, Recording& out) {
-    RowSystem& rows = w.now.rows;
-    a(w.state, w.counters, rows.active, rows.longest, rows.longest_chosen, rows.chosen_pivot, progress, out);
+    RowChoice& choice = w.now.rows;
+    a(w.state, w.counters, choice, w.now.dependent_at_start, progress, out);
 }
 
 std::string to_bytes(Workspace& w, Progress& progress, Recording& out) {
@@ -130,7 +140,7 @@ static void evaluate_anew(System& system, const Progress& progress) {
     const Counters counters = w.counters;
     select_rows(p, w);
     static_cast<RowChoice&>(w.now.rows) = choice;
-    w.now.rows.redundant = choice.active != w.now.rows.required;
+    w.now.rows.scale = choice.chosen_scale;  // of dependent rows; factors rescale the active ones
     system.read(progress.y);
     configure(p, w, progress.t, system.q, system.v);
     if (state.has_ideal_row_choice) {
@@ -151,6 +161,7 @@ void from_bytes(const std::string& bytes, System& system, Progress& progress, Re
     Archive a(bytes);
     archive(a, system.w, progress, out);
     a.end();
+    system.w.now.set_stretch(progress.last_break, progress.next_break);
     const int elements = static_cast<int>(std::max(system.p.frictions.size(), system.p.blocks.size()));
     for (const Event& e : out.events) {
         const int known = Event::of_drive(e.kind) ? system.nv : elements;
@@ -162,7 +173,7 @@ void from_bytes(const std::string& bytes, System& system, Progress& progress, Re
 }
 
 std::string state_layout() {
-    const size_t sizes[] = {sizeof(RunState), sizeof(Counters), sizeof(Progress), sizeof(Recording), sizeof(long)};
+    const size_t sizes[] = {sizeof(RunState), sizeof(RowChoice), sizeof(Counters), sizeof(Progress), sizeof(Recording), sizeof(long)};
     std::string layout;
     for (size_t size : sizes) layout += std::to_string(size) + ".";
     return layout;

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "run/events/gap_search.hpp"
+#include "run/integrators/step_control.hpp"
 #include "run/output/recorder.hpp"
 
 namespace pn {
@@ -12,6 +13,7 @@ namespace pn {
 // State of a time loop from step to step, in addition to the RunState of its workspace.
 struct Progress {
     double t = 0.0, h = 0.0;  // current time, and step that the error control suggests
+    StepTrials trials;        // earlier trials of the step
     VecX y, rate;             // current state, and its rate
     // Time and state of the workspace's last configuration: the current state, or a sample inside the last step.
     double configured_t = 0.0;
@@ -20,6 +22,7 @@ struct Progress {
     long samples = 0;           // number of samples on the output grid
     long next_period = 0;       // index of the next period of sampled control
     double detected_break = HUGE_VAL;  // time of a break that was detected in a user's time function
+    double last_break = -HUGE_VAL, next_break = HUGE_VAL;  // breaks around the stretch in which rows are evaluated
     std::vector<double> recent_event_times;  // times of recent events, for the detection of chatter
     std::vector<double> mode_change_times;  // times of the last instants at which modes changed
     std::vector<double> event_signs;  // signs of the values of value events
@@ -43,6 +46,9 @@ struct Progress {
     int turning_steps = 0;  // consecutive stiff steps with turning slip, negative: not counted yet
     bool may_hand_over = false;  // a closed contact may pass to the next feature in the next step
     double hand_over_time = -HUGE_VAL;  // time of the last hand-over
+    double drive_end = -HUGE_VAL, drive_length = 0.0;  // end and length [s] of the last time step with a drive
+    double rest_time = -HUGE_VAL;  // last time at which creeping slip came to rest
+    bool misses_laws = false;      // the last time step violated the laws of contact
 };
 
 std::string to_bytes(Workspace& w, Progress& progress, Recording& out);

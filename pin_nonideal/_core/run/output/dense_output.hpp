@@ -12,13 +12,17 @@ namespace pn {
 struct DenseOutput {
     std::vector<double> times;   // start and end of each step
     std::vector<double> states;  // y without watch at each point, step by step
-    std::vector<std::int8_t> modes;  // modes of the elements over each step
-    // Slip directions of all elements at each point, if an element has several directions. A step that did not solve for
-    // slip directions stores the directions at the step's end.
+    std::vector<std::int8_t> modes;   // modes of the elements over each step
+    std::vector<std::int8_t> closed;  // whether each gap is closed over each step
+    // Elements of several directions with a load, step by step, and their number in each step.
+    std::vector<std::int32_t> turning, turning_counts;
+    // Slip directions of these elements at each point of each step. A step that did not solve for slip directions stores
+    // the directions at the step's end.
     std::vector<double> directions;
     std::vector<std::int8_t> sought;  // whether the step solved for the directions
     std::vector<double> torque;  // torque held over each step, NaN if none, empty if the run holds none
     std::vector<double> moved;   // total energy change by projections at the end of each step [J]
+    std::vector<double> impacts;  // total energy change by impacts at the start and at the end of each step [J]
 };
 
 class DenseRecorder {
@@ -30,19 +34,32 @@ public:
 
     DenseRecorder(System& system, Stepper& stepper, bool holds_torque, DenseOutput& out);
 
+    // Total energy changes since the start of the run [J].
+    struct EnergyChanges {
+        double projections, impacts_before, impacts;  // impacts: at the start and at the end of the step
+    };
     // Record the step just taken. This leaves the workspace at other states.
-    void step(double numerical_energy);
-    // Record a step of time stepping as a straight line between both states.
-    void straight(double t0, const VecX& y0, double t1, const VecX& y1, double numerical_energy);
+    void step(const EnergyChanges& changes);
+    // Record a step of time stepping from (t0, y0) as a straight line between both states. Inside the step contacts are
+    // closed, and elements stick, if they do at its start and at its end.
+    struct StepStart {
+        double t;
+        const VecX& y;
+        const std::vector<char>& closed;
+        const Modes& mode;
+    };
+    void straight(const StepStart& start, double t1, const VecX& y1, const EnergyChanges& changes);
 
 private:
+    void find_turning();
     void state_at_point();
-    void rest_of_step(double t0, double t1, double numerical_energy, bool sought);
+    void rest_of_step(double t0, double t1, const EnergyChanges& changes, bool sought);
 
     System& system_;
     Stepper& stepper_;
-    const bool holds_torque_, turns_;  // the run holds torques, the scene has elements with several directions
+    const bool holds_torque_;  // the run holds torques
     DenseOutput& out_;
+    std::vector<int> turning_;  // elements of several directions with a load in the step
     VecX state_;
 };
 

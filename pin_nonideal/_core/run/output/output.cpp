@@ -78,11 +78,15 @@ void Output::evaluate_inside(const Visit& visit) {
 }
 
 void Output::keep_step() {
-    if (options_.record.dense) evaluate_inside([&] { dense_.step(progress_.numerical_energy); });
+    if (!options_.record.dense || !(stepper_.t0 + stepper_.h > stepper_.t0)) return;
+    const double impacts = progress_.impact_energy;
+    evaluate_inside([&] { dense_.step({progress_.numerical_energy, impacts, impacts}); });
 }
 
-void Output::keep_time_step(double from, const VecX& y_from) {
-    if (options_.record.dense) dense_.straight(from, y_from, progress_.t, progress_.y, progress_.numerical_energy);
+void Output::keep_time_step(const DenseRecorder::StepStart& start, double impact_energy_from) {
+    if (!options_.record.dense || !(progress_.t > start.t)) return;
+    dense_.straight(start, progress_.t, progress_.y,
+                    {progress_.numerical_energy, impact_energy_from, progress_.impact_energy});
 }
 
 void Output::emit_between(double time) {

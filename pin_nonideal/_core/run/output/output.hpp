@@ -25,10 +25,10 @@ public:
     void end_time_step(double rounding);
     // Record samples of the grid inside the step just taken, and one at the time `between`.
     void inside_step(std::optional<double> between);
-    // Record the interpolant of the step just taken, if dense output is on. A step of time stepping from another state
-    // is recorded as a straight line. The workspace is restored.
+    // Record the interpolant of the step just taken, if dense output is on. A step of time stepping, or the end of
+    // bouncing, from another state is recorded as a straight line. The workspace is restored.
     void keep_step();
-    void keep_time_step(double from, const VecX& y_from);
+    void keep_time_step(const DenseRecorder::StepStart& start, double impact_energy_from);
     // Store that the workspace is configured at the current state.
     void configured_now();
 

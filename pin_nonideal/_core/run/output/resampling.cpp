@@ -43,7 +43,8 @@ static void enter_stretch(const Program& p, Workspace& w, double t, double end) 
 }
 
 static void hold(const Program& p, Workspace& w, const InsideStates& inside, size_t k) {
-    if (k == 0 || !(inside.modes[k] == inside.modes[k - 1])) set_modes(p, w, inside.modes[k]);
+    const bool is_same = k > 0 && inside.modes[k] == inside.modes[k - 1] && inside.closed[k] == inside.closed[k - 1];
+    if (!is_same) set_contacts(p, w, inside.closed[k], inside.modes[k]);
     w.state.warm = false;
     w.now.has_override = !inside.torque.empty() && inside.torque[k].allFinite();
     if (w.now.has_override) w.now.override_torque = inside.torque[k];
@@ -55,8 +56,8 @@ static void set_directions(const Program& p, Workspace& w, const System& system,
     state.solves_directions = false;
     reset_slip_directions(w);
     const VecX& directions = inside.directions[k];
-    for (int e = 0; e < directions.size() / 3; ++e)
-        state.last_direction[e] = directions.segment<3>(3 * e).stableNormalized();
+    for (size_t i = 0; i < inside.turning.size(); ++i)
+        state.last_direction[inside.turning[i]] = directions.segment<3>(3 * i).stableNormalized();
     const std::vector<char>& sought = inside.sought[k];
     if (std::find(sought.begin(), sought.end(), 1) == sought.end()) return;
     update_kinematics(p, w, inside.t[k], system.q, system.v);
@@ -72,7 +73,7 @@ void sample_inside(const Program& p, Workspace& w, const InsideStates& inside, c
                    Recording& out) {
     System system(p, w, options.energy);
     Recorder recorder(system, options, out);
-    VecX y = VecX::Zero(system.ny);
+    VecX y = VecX::Zero(system.ny), rate = y;
     for (size_t k = 0; k < inside.t.size(); ++k) {
         y.head(system.ns) = inside.y[k];
         system.normalize(y);
@@ -85,7 +86,10 @@ void sample_inside(const Program& p, Workspace& w, const InsideStates& inside, c
         choose_rows_near(p, w, inside.t[k], system.q, system.v);
         project_into_modes(p, w, inside.t[k], system.q, system.v);
         system.write(y);
-        recorder.sample(inside.t[k], y, {0.0, inside.moved[k]}, false);
+        // The modes of a time step with contacts may allow no motion inside the step.
+        const bool evaluates = options.evaluates() && !p.gaps.empty();
+        if (evaluates) system.evaluate_step_end(inside.t[k], y, rate, true);
+        recorder.sample(inside.t[k], y, {inside.impacts[k], inside.moved[k]}, evaluates);
     }
 }
 

@@ -22,12 +22,13 @@ private:
     std::vector<double> places_, weights_;  // of the points
 };
 
-// States inside steps, each with the modes and torques of its step. Each element has a slip direction, and a flag if
-// the step solved for it. Without elements of several directions the vectors of directions are empty.
+// States inside steps, each with the modes, closed contacts and torques of its step.
 struct InsideStates {
-    std::vector<double> t, moved;
-    std::vector<VecX> y, torque, directions;
-    std::vector<std::vector<char>> sought;
+    std::vector<double> t, moved, impacts;  // times, and total energy changes by projections and impacts
+    std::vector<VecX> y, torque;
+    std::vector<int> turning;      // elements with slip directions
+    std::vector<VecX> directions;  // slip directions of these elements
+    std::vector<std::vector<char>> sought, closed;  // elements for whose directions the step solved; closed gaps
     std::vector<std::vector<Mode>> modes;
     double end = HUGE_VAL;  // end of the run [s]
 };

@@ -21,7 +21,7 @@ bool may_differ(const Program& p, const Options& options) {
 
 // Check if accelerations and forces are read at the end of every step, whatever the samples record.
 bool reads_forces_always(const Program& p, const Options& options) {
-    return options.record.dense || options.callback || options.save || !options.events.empty() || !p.contacts.empty() ||
+    return options.record.dense || options.callback || !options.events.empty() || !p.contacts.empty() ||
            p.calls_functions;
 }
 
@@ -90,11 +90,11 @@ void TimeStepping::step_part(double end, double t_end, double least) {
         moreau_contacts_.repeat();
     }
     const StepForces::LawMiss& relaxed = moreau_contacts_.law_miss();
-    if (relaxed.block >= 0 && !misses_laws_) {
+    if (relaxed.block >= 0 && !progress_.misses_laws) {
         out_.events.push_back({progress_.t, Event::Kind::relaxed, relaxed.block});
         out_.events.back().miss = relaxed.miss;
     }
-    misses_laws_ = relaxed.block >= 0;
+    progress_.misses_laws = relaxed.block >= 0;
 }
 
 // Take a part of length h of a step to `end`, or the whole step if little would be left.
@@ -124,7 +124,7 @@ void TimeStepping::step_with_contacts(double end, double t_end) {
         closed_before_step_ = w.state.closed;
     }
     while (progress_.t < end) step_part(end, t_end, min_size);
-    progress_.is_stationary = may_stand && !misses_laws_ && progress_.y == y_from_ &&
+    progress_.is_stationary = may_stand && !progress_.misses_laws && progress_.y == y_from_ &&
                               same_bytes<Mode>(before_step_, w.state.mode) &&
                               same_bytes(closed_before_step_, w.state.closed);
 }
@@ -196,6 +196,7 @@ void TimeStepping::step(double size, double stop, double t_end) {
         open_before_ = !watched;
     }
     const VecX y_from = options_.record.dense ? y : VecX();
+    const double impact_energy_from = progress_.impact_energy;
     const bool lacks_forces = !progress_.has_forces && (reads_forces_ || system_.ng == 0) && needs_forces(end, t_end);
     if (!progress_.is_stationary || lacks_forces) take(end, t_end);
     t = end;
@@ -208,7 +209,7 @@ void TimeStepping::step(double size, double stop, double t_end) {
     // The records of a run must not change the events of bridged stretches.
     const bool is_evaluated = progress_.has_forces && options_.method.scheme == Method::Scheme::moreau;
     if (is_evaluated || system_.ng == 0) warnings_.check_uniqueness(false);
-    output_.keep_time_step(from, y_from);
+    output_.keep_time_step({from, y_from, closed_before_, before_}, impact_energy_from);
     value_events_.sample_end(t, y);
     value_events_.append_events(t, out_.events);
     if (!value_events_.found().empty()) output_.now();

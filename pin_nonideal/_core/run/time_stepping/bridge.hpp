@@ -52,7 +52,6 @@ private:
     Moreau moreau_;
     MoreauContacts moreau_contacts_;
     const bool is_autonomous_;  // a state that a step leaves unchanged stays unchanged
-    bool misses_laws_ = false;  // the last step violated the laws of contact
     double rounding_ = 0.0;  // difference of two times that are one end of a step
     const bool samples_every_step_;  // every step's end is a sample, or user code reads it
     // Something reads accelerations and forces. If nothing does, steps of separate trees evaluate none.

@@ -167,7 +167,8 @@ bool StepForces::solve(double h, const VecX& q0, const VecX& v0) {
     const double error = separate_ ? trees_.solve(elements_.cones, middle_, f) : HUGE_VAL;
     error_ = separate_ ? error : 0.0;
     bool solved = error <= parameters.max_residual;
-    const bool starts = v0.cwiseAbs().maxCoeff() <= rest_speed && !(q_without_rest_.size() > 0 && q_without_rest_ == q0);
+    const VecX& without_rest = w.state.q_without_rest;
+    const bool starts = v0.cwiseAbs().maxCoeff() <= rest_speed && !(without_rest.size() > 0 && without_rest == q0);
     if (solved && !(starts && moves())) return true;
     if (separate_ && starts && hold_trees(q0)) return true;
     if (separate_ && solved) return true;
@@ -200,7 +201,7 @@ bool StepForces::hold_trees(const VecX& q0) {
         error_ = 0.0;
         return true;
     }
-    q_without_rest_ = q0;  // the next sweeps and the step after the start skip this check
+    w.state.q_without_rest = q0;  // the next sweeps and the step after the start skip this check
     return false;
 }
 
@@ -242,7 +243,7 @@ bool StepForces::keep_rest(bool solved, const VecX& q0) {
                        parameters.rest_rounding * end_rows.head(n).cwiseAbs().maxCoeff();
     if (solved && !moves) return false;
     const bool holds = solver_.hold(W, end_rows.head(n), elements_.cones, f.head(n));
-    if (!holds) q_without_rest_ = q0;  // the next sweeps and the step after the start skip this check
+    if (!holds) w.state.q_without_rest = q0;  // the next sweeps and the step after the start skip this check
     return holds;
 }
 

@@ -42,7 +42,7 @@ public:
     StepForces(const Program& p, Workspace& w, const StepElements& elements);
 
     // Discard the configuration that no forces held at rest in earlier steps.
-    void reset() { q_without_rest_.resize(0); }
+    void reset() { w.state.q_without_rest.resize(0); }
     // Set up the problem of the elements for the acceleration `a_free` without the forces, over a step of length h. The
     // forces of the last step are the guess. `anew`: the rows have changed.
     void pose(const MeanVelocity& mean, double h, const VecX& a_free, bool anew);
@@ -105,7 +105,7 @@ private:
     std::vector<int> dry_rows_;
     ConeComplementarity solver_;
     LawMiss law_miss_;
-    VecX free_rows_, offset_, middle_, guess_, best_f_, q_without_rest_, a_;
+    VecX free_rows_, offset_, middle_, guess_, best_f_, a_;
 };
 
 }  // namespace pn

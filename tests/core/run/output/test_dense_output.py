@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -10,6 +13,8 @@ import pin_nonideal as pn
 from pin_nonideal.trajectory.dense_output import inside_steps
 
 from ....support.refusals import refuses
+from ....support.same_run import assert_same_run
+from ....support.scenes import kinds
 
 ORDERS = {"dop853": 8, "dopri5": 5, "rk4": 4}
 FIELDS = ("q", "v", "a", "F_ideal", "F_nonideal", "lam", "tau", "violation", "modes", "limits")
@@ -172,6 +177,105 @@ def test_what_at_refuses():
         pn.simulate(pendulum(), 0.01).at(0.0)
     with refuses('at: the scene "four_bar" is not the one of the run', pn.InputError):
         run.dense.at(pn.load("four_bar")._compiled, np.array([0.1]), "four_bar")
+
+
+# --- Contacts that open -----------------------------------------------------------------------------------
+
+CASES = kinds()
+# Every kind of contact that opens.
+OPENING = [name for name in CASES if name.startswith("touching")]
+FALLING = [*OPENING, "robot solo12_dropped"]
+
+
+def box_on_box():
+    """Return a box that falls onto a box on the ground, slips, tips and opens corners."""
+    model, shapes = pin.Model(), pin.GeometryModel()
+    for k, (height, turn) in enumerate(((0.1, 0.0), (0.35, 0.1))):
+        place = pin.SE3(pin.rpy.rpyToMatrix(turn, 0.5 * turn, turn), np.array([0.02 * k, 0.0, height]))
+        shape = coal.Box(0.2, 0.2, 0.2)
+        pn.free_body(model, f"box {k}", shape, mass=1.0, collision_model=shapes, place=place)
+    contacts = pn.ground_contacts(model, shapes, ["box 0"], mu=0.5, restitution=0.2)
+    contacts += pn.geometry_contacts(model, shapes, mu=0.4, restitution=0.2)
+    v = np.zeros(12)
+    v[6] = 0.3
+    return pn.Scene(model, contacts=contacts, collision_model=shapes, v0=v)
+
+
+def away_from(events, times, distance):
+    return np.array([min((abs(t - e.time) for e in events), default=np.inf) > distance for t in times])
+
+
+@pytest.mark.parametrize(
+    ("name", "method"), [("boxes", "dop853"), *itertools.product(FALLING, ("dop853", "rk4"))]
+)
+def test_samples_between_the_steps_are_those_of_a_grid(name, method):
+    case = None if name == "boxes" else CASES[name]()
+    scene, duration = (box_on_box(), 0.3) if case is None else (case.scene, case.duration)
+    options = {"rtol": 1e-9, "atol": 1e-11} if method == "dop853" else {"method": method, "dt": 2e-3}
+    options |= {"record": ("forces", "energy"), "max_wall": 60.0}
+    start = {} if case is None else {"q": case.q0, "v": case.v0}
+    grid = pn.simulate(scene, duration, output_dt=duration / 57, **start, **options)
+    options["record"] = ("forces", "energy", "dense")
+    run = pn.simulate(scene, duration, **start, **options)
+    assert run.events == grid.events
+    assert run.events
+    found, smooth = run.at(grid.t), away_from(run.events, grid.t, 1e-9)
+    for key in ("q", "v", "lam", "F_nonideal", "closed", "modes"):
+        one, other = getattr(found, key), getattr(grid, key)
+        if one is not None:
+            scale = np.abs(other).max() + 1e-12
+            np.testing.assert_allclose(one[smooth], other[smooth], rtol=0, atol=1e-9 * scale, err_msg=key)
+    for key in ("total", "impacts"):
+        np.testing.assert_allclose(
+            found.energy[key][smooth], grid.energy[key][smooth], rtol=0, atol=1e-9, err_msg=key
+        )
+
+
+@pytest.mark.parametrize("name", [*OPENING, "boxes"])
+def test_time_steps_of_contacts_are_straight_lines_through_their_samples(name):
+    case = None if name == "boxes" else CASES[name]()
+    scene, duration = (box_on_box(), 0.3) if case is None else (case.scene, case.duration)
+    start = {} if case is None else {"q": case.q0, "v": case.v0}
+    run = pn.simulate(
+        scene, duration, method="moreau", dt=1e-3, record=("forces", "energy", "dense"), **start
+    )
+    assert run.events
+    again = run.at(run.t)
+    np.testing.assert_allclose(again.q, run.q, rtol=0, atol=1e-9)
+    # Samples satisfy the rates of contacts and sticking elements; ends of steps do to the scheme's order.
+    np.testing.assert_allclose(again.v, run.v, rtol=0, atol=2e-3)
+    np.testing.assert_allclose(again.energy["impacts"], run.energy["impacts"], rtol=0, atol=1e-12)
+    middle = run.at(0.5 * (run.t[1:] + run.t[:-1]))
+    np.testing.assert_allclose(middle.v, 0.5 * (run.v[1:] + run.v[:-1]), rtol=0, atol=2e-3)
+
+
+def test_an_impact_lies_between_two_steps():
+    """A ball falls from 0.2 m onto the ground and rebounds with half of its speed."""
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelPZ(), pin.SE3.Identity(), "height")
+    model.appendBodyToJoint(joint, pin.Inertia(1.0, np.zeros(3), 0.1 * np.eye(3)), pin.SE3.Identity())
+    model.addFrame(pin.Frame("ball", joint, 0, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
+    contact = pn.PointContact("ball", radius=0.1, restitution=0.5, name="ground")
+    run = pn.simulate(pn.Scene(model, contacts=[contact]), 0.4, q=[0.3], record=("forces", "energy", "dense"))
+    strike, speed = np.sqrt(2.0 * 0.2 / 9.81), np.sqrt(2.0 * 0.2 * 9.81)
+    assert run.events[0].time == pytest.approx(strike, abs=1e-12)
+    before, after = run.at(strike - 1e-6), run.at(strike + 1e-6)
+    assert before.v[0] == pytest.approx(-speed + 9.81e-6, abs=1e-12)
+    assert after.v[0] == pytest.approx(0.5 * speed - 9.81e-6, abs=1e-12)
+    assert (before.energy["impacts"], before.lam[0], after.lam[0]) == (0.0, 0.0, 0.0)
+    assert after.energy["impacts"] == pytest.approx(-0.75 * 0.5 * speed**2, rel=1e-12)
+    assert after.energy["balance"] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_dense_output_of_contacts_is_saved_and_resumed(kept, tmp_path):
+    case, path = CASES["touching BoxContact"](), tmp_path / "run"
+    options = {"record": ("forces", "energy", "dense"), "q": case.q0, "v": case.v0}
+    alone = pn.simulate(case.scene, case.duration, **options)
+    pn.simulate(case.scene, case.duration, **options, checkpoint=path, checkpoint_interval=0.0)
+    path.write_bytes(kept[len(kept) // 2])
+    assert_same_run(alone, pn.resume(path, case.scene))
+    back, times = pn.Trajectory.load(alone.save(tmp_path / "run.npz"), scene=case.scene), [0.07, 0.1]
+    np.testing.assert_array_equal(back.at(times).lam, alone.at(times).lam)
 
 
 # --- The grid ----------------------------------------------------------------------------------------------
