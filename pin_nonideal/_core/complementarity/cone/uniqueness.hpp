@@ -1,6 +1,7 @@
 // Proof that all solutions of a cone problem have the same velocities.
 //
-// Two solutions with forces f, g and velocities w, u differ by d = f - g, and w - u = W d. Signorini's and Coulomb's laws give
+// Two solutions with forces f, g and velocities w, u differ by d = f - g, and w - u = W d. The laws of Signorini and Coulomb
+// give
 //     d . W d <= sum mu_i |d_n,i| |(W d)_t,i|
 // over the contacts i. With W = C C^T, where C has full column rank, and z = C^T d the left side is |z|^2. If z determines
 // the normal force of each rough contact, d_n,i = b_i . z, the right side is at most z . S z,

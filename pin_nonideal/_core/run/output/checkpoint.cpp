@@ -71,11 +71,11 @@ static void fields(Archive& a, Progress& x) {
            several_motions, stiff_steps, quiet_steps, rounding, next_rounding_check, growth_times, growth_speeds,
            growth_steps, is_stationary, has_forces, turning_steps, may_hand_over, hand_over_time, drive_end,
            drive_length, rest_time, misses_laws] = x;
-    a(t, h, trials.last_rejected, trials.detours, y, rate, configured_t, configured_y, numerical_energy, samples, next_period,
-      detected_break, last_break, next_break, event_signs, counted_steps, counted_from, bridged_time, bridged_end,
-      slip_at_start, in_tension, forced_switch_time, impact_energy, several_motions, stiff_steps, quiet_steps, rounding,
-      next_rounding_check, is_stationary, has_forces, turning_steps, may_hand_over, hand_over_time, drive_end,
-      drive_length, rest_time, misses_laws);
+    a(t, h, trials.last_rejected, trials.detours, y, rate, configured_t, configured_y, numerical_energy, samples,
+      next_period, detected_break, last_break, next_break, event_signs, counted_steps, counted_from, bridged_time,
+      bridged_end, slip_at_start, in_tension, forced_switch_time, impact_energy, several_motions, stiff_steps,
+      quiet_steps, rounding, next_rounding_check, is_stationary, has_forces, turning_steps, may_hand_over, hand_over_time,
+      drive_end, drive_length, rest_time, misses_laws);
     fields(a, gaps);
     a.list(recent_event_times);
     a.list(growth_times);
@@ -173,7 +173,8 @@ void from_bytes(const std::string& bytes, System& system, Progress& progress, Re
 }
 
 std::string state_layout() {
-    const size_t sizes[] = {sizeof(RunState), sizeof(RowChoice), sizeof(Counters), sizeof(Progress), sizeof(Recording), sizeof(long)};
+    const size_t sizes[] = {sizeof(RunState), sizeof(RowChoice), sizeof(Counters),
+                            sizeof(Progress), sizeof(Recording), sizeof(long)};
     std::string layout;
     for (size_t size : sizes) layout += std::to_string(size) + ".";
     return layout;
