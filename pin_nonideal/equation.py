@@ -64,8 +64,8 @@ class Solution:
         closed: whether each contact of a scene is closed, in the order of its `contact_names`; empty without
             contacts.
         unique: whether this is the only motion that constraints and laws admit. True: uniqueness is proven.
-            False: another motion is known. None: unknown, for example if user functions read the reactions
-            or many elements load each other strongly.
+            False: another motion is known. None: unknown, for example if user functions read the reactions,
+            many elements load each other strongly, or several rough contacts are at rest.
     """
 
     a: Array

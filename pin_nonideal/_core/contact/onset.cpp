@@ -113,8 +113,11 @@ bool is_choice_unique(const Program& p, Workspace& w, double t, const VecX& q, c
         resting += is_at_rest(p, w, v, query, w.state, e);
     }
     if (rough < 2 || resting == 0) return true;
-    return with_problem(p, w, t, q, v, query, [](const std::vector<int>&) {},
-                        [](const RestingProblem& problem) { return problem.has_one_motion(); });
+    bool is_proven = false;
+    with_problem(p, w, t, q, v, query, [](const std::vector<int>&) {}, [&](const RestingProblem& problem) {
+        return is_proven = problem.has_one_motion();
+    });
+    return is_proven;
 }
 
 bool closed_contacts_hold(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {

@@ -14,7 +14,7 @@ std::optional<OnsetMotion> onset_motion(const Program& p, Workspace& w, double t
                                         const OnsetQuery& query);
 
 // Check if a bound proves that the contacts at rest have one motion at (t, q, v), whatever opens, sticks and slips. Without
-// several rough contacts the search of the modes proves it.
+// several rough contacts the search of the modes proves it. For many contacts that rest at once the bound is not computed.
 bool is_choice_unique(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, const OnsetQuery& query);
 
 // Return true if forces within the cones of all closed contacts hold them at (t, q, v). Return false if one of these

@@ -67,6 +67,22 @@ def test_several_motions_are_not_called_unique():
     assert several >= 3
 
 
+def test_rest_of_many_rough_contacts_is_no_proof():
+    """Five light rods, each on two points with strong friction."""
+    model, contacts = pin.Model(), []
+    for k in range(5):
+        joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), f"rod {k}")
+        model.appendBodyToJoint(joint, pin.Inertia(1.0, np.zeros(3), 1e-4 * np.eye(3)), pin.SE3.Identity())
+        for side in (-1.0, 1.0):
+            place = pin.SE3(np.eye(3), np.array([0.3 * side, 0.0, 0.0]))
+            model.addFrame(pin.Frame(f"{k} {side}", joint, 0, place, pin.FrameType.OP_FRAME))
+            contacts.append(pn.PointContact(f"{k} {side}", mu=2.0))
+    scene = pn.Scene(model, contacts=contacts)
+    solution = scene.solve(*scene.initial_state())
+    assert not solution.a.any()
+    assert solution.unique is None
+
+
 def test_weak_friction_is_proven_to_have_one_motion():
     """The bodies are up to a thousand times lighter about their axes than on their levers."""
     scenes = [body_on_points(seed, 2, (0.0, 0.1))[0] for seed in range(40)]
