@@ -208,13 +208,18 @@ void move_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap) 
 // Penetrations of all gaps and rates of closed ones. Open gaps are measured here.
 static void gap_violations(const Program& p, Workspace& w, double t, const VecX& v, double& position, double& velocity,
                            const std::vector<char>* open_gaps) {
-    for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
-        if (open_gaps && (*open_gaps)[i]) continue;
+    const auto add = [&](int i) {
         const RowValues& values = w.now.values[p.gaps[i].block];
         if (!w.state.closed[i]) measure_gap(p, w, t, v, i);
         else velocity = std::max(velocity, std::abs(values.rate[0]));
         position = std::max(position, -values.residual[0]);
-    }
+    };
+    const size_t count = p.gaps.size();
+    if (open_gaps)
+        for (size_t i = next_other(*open_gaps, 0, char(1)); i < count; i = next_other(*open_gaps, i + 1, char(1)))
+            add(static_cast<int>(i));
+    else
+        for (size_t i = 0; i < count; ++i) add(static_cast<int>(i));
 }
 
 void violations(const Program& p, Workspace& w, double t, const VecX& v, double& position, double& velocity,

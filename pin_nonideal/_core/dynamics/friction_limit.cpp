@@ -170,12 +170,13 @@ Vec3 force_direction(const Program& p, Workspace& w, int e) {
 static PN_INLINE void add_force_of_slip(const Program& p, Workspace& w, int e, VecX& C) {
     if (!slips(w.state.mode[e])) return;
     const Block& block = p.blocks[p.frictions[e].block];
-    w.now.slip_force[e] = w.now.limit[e] * force_direction(p, w, e);
+    Vec3& force = w.now.slip_force.change(e);
+    force = w.now.limit[e] * force_direction(p, w, e);
     w.now.reactions.current = false;
     if (block.dof >= 0)
-        for (int k = 0; k < block.total; ++k) C[block.dof + k] += w.now.slip_force[e][k];
+        for (int k = 0; k < block.total; ++k) C[block.dof + k] += force[k];
     else
-        add_along(block, w.now.A, w.now.slip_force[e], C);
+        add_along(block, w.now.A, force, C);
 }
 
 void add_slip_force(const Program& p, Workspace& w, int e, VecX& C) { add_force_of_slip(p, w, e, C); }

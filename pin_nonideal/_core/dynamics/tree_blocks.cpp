@@ -16,12 +16,6 @@ TreeBlocks::TreeBlocks(const Program& p) : size_(p.mechanism.nv, 0), node_(p.mec
         local_.push_back(size_[root]++);
         contiguous_ = contiguous_ && root + local_[dof] == dof;
     }
-    for (const Block& block : p.blocks) {
-        std::vector<int> trees;
-        for (int dof : block.support)
-            if (std::find(trees.begin(), trees.end(), root_[dof]) == trees.end()) trees.push_back(root_[dof]);
-        trees_.push_back(trees);
-    }
 }
 
 // Check the ratio of the pivots of a tree, in units of its dofs. Pivots of different trees may differ by any factor.
@@ -67,7 +61,8 @@ bool TreeBlocks::fill(const Program& p, const Workspace& w, const std::vector<St
     for (const ConeElement& cone : cones) {
         int trees[2] = {-1, -1};
         for (int k = 0; k < cone.dim; ++k)
-            for (int root : trees_[rows[at + k].block]) {
+            for (int dof : p.blocks[rows[at + k].block].support) {
+                const int root = root_[dof];
                 if (root == trees[0] || root == trees[1]) continue;
                 if (trees[1] >= 0) return false;
                 trees[trees[0] >= 0] = root;

@@ -30,7 +30,6 @@ private:
 
     std::vector<int> root_, local_, size_;  // by dof: first dof of its tree, index in it; by first dof: dofs of the tree
     bool contiguous_ = true;                // the dofs of every tree follow one another
-    std::vector<std::vector<int>> trees_;   // first dofs of the trees that a block moves
     std::vector<int> node_;                 // node of a tree by first dof, -1 if it takes no part
 };
 

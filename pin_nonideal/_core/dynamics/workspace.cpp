@@ -54,7 +54,7 @@ static void size(const Program& p, Evaluation& now) {
     now.reactions.motion.assign(bodies, Motion{Vec3::Zero(), Vec3::Zero()});
     now.load.assign(elements, SlipLimits());
     now.limit.assign(elements, 0.0);
-    now.slip_force.assign(elements, Vec3::Zero());
+    now.slip_force.resize(elements);
     now.user_C.assign(p.user_laws, VecX::Zero(nv));
     now.dz = VecX::Zero(p.states);
 }
@@ -75,7 +75,8 @@ static void size(const Program& p, const Evaluation& now, Scratch& scratch) {
     for (VecX* x : {&forces.given, &forces.magnitude, &scratch.law_weight, &scratch.law_residual, &scratch.law_magnitude})
         *x = VecX::Zero(nv);
     forces.lam = forces.shared_lam = VecX::Zero(p.layout.rows);
-    forces.friction = forces.shared_friction = now.slip_force;
+    forces.friction.assign(now.slip_force.size(), Vec3::Zero());
+    forces.shared_friction = forces.friction;
     forces.limits = now.load;
     forces.is_determined.assign(now.load.size(), 1);
 }
@@ -152,11 +153,7 @@ void set_modes(const Program& p, Workspace& w, const std::vector<Mode>& modes) {
     values = modes;
     for (size_t e = next_other(values, 0, unloaded); e < values.size(); e = next_other(values, e + 1, unloaded))
         if (is_open(p, w, static_cast<int>(e))) values[e] = unloaded;
-    for (size_t e = 0; e < values.size(); ++e) {
-        const size_t end = next_other(values, e, unloaded);
-        std::fill(w.now.slip_force.begin() + e, w.now.slip_force.begin() + end, Vec3::Zero());
-        e = end;
-    }
+    w.now.slip_force.unload(values);
     w.state.steps_since = undecided_steps;
     w.scratch.factored_unknowns = 0;
     w.now.renew();

@@ -11,6 +11,7 @@
 #include "dynamics/implicit_drives.hpp"
 #include "dynamics/motion_forces.hpp"
 #include "dynamics/program.hpp"
+#include "dynamics/slip_forces.hpp"
 #include "complementarity/fixed_point/equation.hpp"
 #include "math/bytes.hpp"
 #include "math/tolerances.hpp"
@@ -127,7 +128,7 @@ struct Evaluation {
     bool ideal = false;               // true if the motion is due to the ideal constraints alone
     std::vector<SlipLimits> load;     // limits at rest before the static ratio
     std::vector<double> limit;        // kinetic limit of each element
-    std::vector<Vec3> slip_force;     // force of each slipping element, along its directions
+    SlipForces slip_force;            // force of each slipping element, along its directions
     std::vector<VecX> user_C;
     VecX dz;
     VecX v;                           // velocity, if laws act

@@ -113,7 +113,7 @@ void RestProblem::move(const VecX& x) {
     w.now.a = without_ + problem_.response * x;
     w.now.lam = lam_without_ + problem_.multipliers * x;
     for (size_t i = 0; i < problem_.elements.size(); ++i) {
-        Vec3& force = w.now.slip_force[problem_.elements[i]];
+        Vec3& force = w.now.slip_force.change(problem_.elements[i]);
         force = Vec3::Zero();
         for (int k = 0; k < equation.elements[i].dim; ++k) force[k] = x[equation.elements[i].row + k];
     }

@@ -119,7 +119,7 @@ void FrictionProblem::add_forces(const Program& p, Workspace& w, const VecX& f, 
     int row = 0;
     for (int e : elements) {
         const Block& block = block_of(p, e);
-        for (size_t k = 0; k < block.kept.size(); ++k, ++row) by_row[block.row + k] = w.now.slip_force[e][k] = f[row];
+        for (size_t k = 0; k < block.kept.size(); ++k, ++row) by_row[block.row + k] = w.now.slip_force.change(e)[k] = f[row];
         add_transpose(block, w.now.A, by_row, C);
     }
     w.now.reactions.current = false;

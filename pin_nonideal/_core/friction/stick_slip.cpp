@@ -152,7 +152,7 @@ struct Search {
         for (int e : list) modes[e] = unloaded;
         if (all)
             for (int e : slipping) modes[e] = unloaded;
-        for (int e : list) w.now.slip_force[e] = Vec3::Zero();
+        for (int e : list) w.now.slip_force.change(e) = Vec3::Zero();
         apply(modes, false);
     }
 

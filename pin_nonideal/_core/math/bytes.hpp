@@ -28,4 +28,18 @@ size_t next_other(const std::vector<Byte>& list, size_t from, Byte value) {
     return from;
 }
 
+// Return the first index from `from` on at which two lists of one length differ, or their length.
+template <class Byte>
+size_t next_difference(const std::vector<Byte>& a, const std::vector<Byte>& b, size_t from) {
+    static_assert(sizeof(Byte) == 1);
+    std::uint64_t eight, other;
+    for (; from + sizeof eight <= a.size(); from += sizeof eight) {
+        std::memcpy(&eight, a.data() + from, sizeof eight);
+        std::memcpy(&other, b.data() + from, sizeof other);
+        if (eight != other) break;
+    }
+    while (from < a.size() && a[from] == b[from]) ++from;
+    return from;
+}
+
 }  // namespace pn

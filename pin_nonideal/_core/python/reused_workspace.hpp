@@ -9,7 +9,6 @@ namespace pn {
 
 // Reset every field that a run reads before it writes it. `first`: run state of a new workspace.
 inline void reset_workspace(const Program& p, Workspace& w, const RunState& first) {
-    const Vec3 none = Vec3::Zero();
     w.state = first;
     w.counters = {};
     w.now.has_override = false;
@@ -20,7 +19,7 @@ inline void reset_workspace(const Program& p, Workspace& w, const RunState& firs
         x->setZero();
     std::fill(w.now.load.begin(), w.now.load.end(), SlipLimits());
     std::fill(w.now.limit.begin(), w.now.limit.end(), 0.0);
-    std::fill(w.now.slip_force.begin(), w.now.slip_force.end(), none);
+    w.now.slip_force.resize(p.frictions.size());
     w.now.renew();
     select_rows(p, w);
 }

@@ -207,13 +207,17 @@ std::vector<Event> changes_since(const System& system, double t, const std::vect
     const RunState& now = system.w.state;
     std::vector<Event> changes;
     if (turned < 0 && same_bytes(closed, now.closed) && same_bytes<Mode>(before, now.mode)) return changes;
-    for (size_t i = 0; i < closed.size(); ++i)
-        if (closed[i] != now.closed[i])
-            changes.push_back({t, closed[i] ? Event::Kind::lift_off : Event::Kind::touch_down, p.gaps[i].block});
-    for (int e = 0; e < system.ne; ++e) {
+    for (size_t i = next_difference(closed, now.closed, 0); i < closed.size();
+         i = next_difference(closed, now.closed, i + 1))
+        changes.push_back({t, closed[i] ? Event::Kind::lift_off : Event::Kind::touch_down, p.gaps[i].block});
+    const size_t turning = turned < 0 ? before.size() : static_cast<size_t>(turned);
+    for (size_t e = 0; e < before.size(); ++e) {
+        const size_t changed = next_difference<Mode>(before, now.mode, e);
+        e = turning < e ? changed : std::min(changed, turning);
+        if (e == before.size()) break;
         const bool begins = before[e] == unloaded && slips(now.mode[e]);  // a contact that slides as soon as it closes
-        if (e == turned || (before[e] != now.mode[e] && now.mode[e] != unloaded && !begins))
-            changes.push_back({t, kind_of_change(before[e], now.mode[e]), e});
+        if (e == turning || (now.mode[e] != unloaded && !begins))
+            changes.push_back({t, kind_of_change(before[e], now.mode[e]), static_cast<int>(e)});
     }
     return changes;
 }

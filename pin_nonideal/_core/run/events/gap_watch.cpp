@@ -5,14 +5,20 @@
 
 #include "contact/queries.hpp"
 #include "dynamics/evaluation.hpp"
+#include "math/bytes.hpp"
 
 namespace pn {
 
 GapWatch::GapWatch(System& system, GapState& state)
     : gaps(state), travel(system.p), system_(system), p(system.p), w(system.w) {
     bool round = false;
-    for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) round |= Separation::has(p, i);
-    gaps = GapState(p.gaps.size(), round);
+    for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
+        round |= Separation::has(p, i);
+        if (i == 0 || p.bodies_of_gap[i] != p.bodies_of_gap[i - 1]) first_of_group_.push_back(i);
+        group_.push_back(static_cast<int>(first_of_group_.size()) - 1);
+    }
+    gaps = GapState(p.gaps.size(), first_of_group_.size(), round);
+    first_of_group_.push_back(static_cast<int>(p.gaps.size()));
     travel.size(gaps.travel);
 }
 
@@ -34,14 +40,14 @@ void GapWatch::classify(int gap) {
     gaps.skipped[gap] = 1;
     gaps.path_length[gap] = travel.path_length(gaps.travel, gap);
     gaps.turn[gap] = gaps.travel.turn[pair.second];
-    gaps.recheck_travel = std::min(gaps.recheck_travel, gaps.travel.scene + travel.min_scene_travel(pair, gaps.width[gap]));
+    gaps.recheck_at(group_[gap], gaps.travel.scene + travel.min_scene_travel(pair, gaps.width[gap]));
 }
 
 void GapWatch::sample_all(double t) {
     followed = gaps.travel.placed = false;
     travel.sum_up(gaps.travel);
     gaps.current = true;
-    gaps.recheck_travel = HUGE_VAL;
+    gaps.recheck_all_at(HUGE_VAL);
     for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
         gaps.monitored[i] = gaps.skipped[i] = 0;
         if (is_bare(p, i)) continue;
@@ -78,13 +84,25 @@ void GapWatch::skip_wide() {
     if (leave) gaps.list_monitored();
 }
 
-// Monitor the skipped gaps whose bodies may have traveled half of the width. If a gap is proven open over the step, it is
-// sampled at the step's end only. Other gaps are returned in `unsampled_`, for a sample at the step's start.
+// Recheck the skipped gaps of all groups that are due.
 void GapWatch::recheck_skipped() {
-    const TravelState& here = gaps.travel;
+    const double ahead = gaps.travel.scene + parameters.steps_ahead * gaps.travel.scene_step;
+    bool leave = false;
+    for (int group = 0; group < static_cast<int>(gaps.group_recheck.size()); ++group)
+        if (!(ahead < gaps.group_recheck[group])) leave |= recheck_group(group);
     gaps.recheck_travel = HUGE_VAL;
-    bool has_unsampled = false;
-    for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
+    for (double travel : gaps.group_recheck) gaps.recheck_travel = std::min(gaps.recheck_travel, travel);
+    if (leave) gaps.list_monitored();
+}
+
+// Monitor the skipped gaps of a group whose bodies may have traveled half of the width. If a gap is proven open over the
+// step, it is sampled at the step's end only. Other gaps are returned in `unsampled_`, for a sample at the step's start.
+// Return true if any gap is monitored from now on.
+bool GapWatch::recheck_group(int group) {
+    const TravelState& here = gaps.travel;
+    gaps.group_recheck[group] = HUGE_VAL;
+    bool leave = false;
+    for (int i = first_of_group_[group]; i < first_of_group_[group + 1]; ++i) {
         if (!gaps.skipped[i]) continue;
         const TravelBound::Pair& pair = travel.pair(i);
         const double path_length = travel.path_length(here, i),
@@ -95,16 +113,15 @@ void GapWatch::recheck_skipped() {
                                                     times * turned + steps * here.turn_step[pair.second], gaps.distance[i]);
         };
         if (is_open(parameters.recheck_factor, parameters.steps_ahead)) {
-            const double until = here.scene + travel.min_scene_travel(pair, gaps.width[i] - traveled);
-            gaps.recheck_travel = std::min(gaps.recheck_travel, until);
+            gaps.recheck_at(group, here.scene + travel.min_scene_travel(pair, gaps.width[i] - traveled));
             continue;
         }
-        has_unsampled = true;
+        leave = true;
         gaps.skipped[i] = 0;
         gaps.monitored[i] = is_open(1.0, 1.0) ? GapState::from_step_end : 1;
         if (gaps.monitored[i] == 1) unsampled_.push_back(i);
     }
-    if (has_unsampled) gaps.list_monitored();
+    return leave;
 }
 
 // Undo the last step, which is repeated: gaps to be sampled at its end were not sampled.
@@ -113,7 +130,7 @@ void GapWatch::undo_step() {
         if (gaps.monitored[i] != GapState::from_step_end) continue;
         gaps.monitored[i] = 0;
         gaps.skipped[i] = 1;
-        gaps.recheck_travel = 0.0;
+        gaps.recheck_at(group_[i], 0.0);
     }
     gaps.list_monitored();
 }
@@ -143,7 +160,7 @@ void GapWatch::begin_time_steps(double least) {
     gaps.list_monitored();
     if (!gaps.current) {
         gaps.travel.placed = false;
-        gaps.recheck_travel = HUGE_VAL;
+        gaps.recheck_all_at(HUGE_VAL);
     }
     followed = gaps.current = false;
 }
@@ -159,6 +176,18 @@ const std::vector<int>& GapWatch::advance(const VecX& path_length) {
     step(path_length, 1.0);
     gaps.travel.add_step();
     return gaps.monitored_gaps;
+}
+
+const std::vector<char>& GapWatch::open_after(const VecX& path_length) {
+    ahead_ = gaps.travel;
+    travel.step(w.now.terms, path_length, 1.0, ahead_);
+    travel.sum_up(ahead_);
+    const double reached = ahead_.scene + ahead_.scene_step;
+    open_ = gaps.skipped;
+    for (size_t group = 0; group < gaps.group_recheck.size(); ++group)
+        if (!(reached < gaps.group_recheck[group]))
+            std::fill(open_.begin() + first_of_group_[group], open_.begin() + first_of_group_[group + 1], char(0));
+    return open_;
 }
 
 GapSample GapSample::here(const Program& p, const Workspace& w, int gap, double part) {
@@ -180,8 +209,8 @@ void GapState::defer_retry(int gap, double t) {
 
 void GapState::list_monitored() {
     monitored_gaps.clear();
-    for (int i = 0; i < static_cast<int>(monitored.size()); ++i)
-        if (monitored[i]) monitored_gaps.push_back(i);
+    for (size_t i = next_other(monitored, 0, char(0)); i < monitored.size(); i = next_other(monitored, i + 1, char(0)))
+        monitored_gaps.push_back(static_cast<int>(i));
 }
 
 }  // namespace pn

@@ -30,19 +30,32 @@ struct GapState {
     // Travel of the bodies of skipped gaps at the last sample (contact/bounds/travel.hpp).
     std::vector<double> path_length, turn, distance;
     TravelState travel;
-    double recheck_travel = 0.0;      // travel of the scene at which skipped gaps are rechecked
+    // Travel of the scene at which skipped gaps are rechecked: of each group of gaps, and the least one.
+    std::vector<double> group_recheck;
+    double recheck_travel = 0.0;
     bool current = false;             // the samples belong to the current state, or to the step that led to it
     std::vector<int> monitored_gaps;  // indices of monitored gaps, ascending
     // For a touching gap that the solver left open: time of the first attempt, and time before which it is not retried.
     std::vector<double> blocked_since, retry_time;
 
-    // `round`: true if a gap is between round bodies.
-    explicit GapState(size_t gaps = 0, bool round = false)
+    // `groups`: number of groups of gaps. `round`: true if a gap is between round bodies.
+    explicit GapState(size_t gaps = 0, size_t groups = 0, bool round = false)
         : width(gaps, 0.0), rate(gaps, 0.0), separation(round ? gaps : 0), monitored(gaps, 0), skipped(gaps, 0),
-          path_length(gaps, 0.0), turn(gaps, 0.0), distance(gaps, 0.0), blocked_since(gaps, 0.0),
+          path_length(gaps, 0.0), turn(gaps, 0.0), distance(gaps, 0.0), group_recheck(groups, 0.0),
+          blocked_since(gaps, 0.0),
           retry_time(gaps, -HUGE_VAL) {}
     void keep(int gap, const GapSample& sample);
     void list_monitored();
+    // Recheck a group at this travel of the scene, or before.
+    void recheck_at(int group, double scene_travel) {
+        group_recheck[group] = std::min(group_recheck[group], scene_travel);
+        recheck_travel = std::min(recheck_travel, scene_travel);
+    }
+    // Set the travel at which all groups are rechecked.
+    void recheck_all_at(double scene_travel) {
+        std::fill(group_recheck.begin(), group_recheck.end(), scene_travel);
+        recheck_travel = scene_travel;
+    }
     void defer_retry(int gap, double t);
     bool is_blocked(int gap) const { return retry_time[gap] > -HUGE_VAL; }
     // Retry all blocked gaps, after a change of contacts.
@@ -85,6 +98,9 @@ public:
     void skip_wide();
     // Check if a monitored gap was wider at its sample than its bodies can close by the end of this step of time stepping.
     bool stays_open_in_step(int gap) const;
+    // Return the gaps that stay open while the dofs travel `path_length` from the state of the last call of `advance`, by
+    // gap. Their width is positive there without a measurement.
+    const std::vector<char>& open_after(const VecX& path_length);
     // Begin time stepping: all gaps are monitored, except skipped gaps wider than `least`.
     void begin_time_steps(double least);
 
@@ -100,12 +116,18 @@ private:
     void classify(int gap);
     void step(const VecX& speed, double h);
     void recheck_skipped();
+    bool recheck_group(int group);
     void undo_step();
 
     System& system_;
     const Program& p;
     Workspace& w;
     std::vector<int> unsampled_;
+    // Groups of gaps between the same two bodies that follow each other: group of each gap, and first gap of each group
+    // with the number of gaps at the end.
+    std::vector<int> group_, first_of_group_;
+    TravelState ahead_;
+    std::vector<char> open_;
 };
 
 }  // namespace pn

@@ -56,10 +56,10 @@ static void fields(Archive& a, TravelState& x) {
 }
 
 static void fields(Archive& a, GapState& x) {
-    auto& [width, rate, separation, monitored, skipped, path_length, turn, distance, travel, recheck_travel, current,
-           monitored_gaps, blocked_since, retry_time] = x;
-    a(width, rate, separation, monitored, skipped, path_length, turn, distance, recheck_travel, current, blocked_since,
-      retry_time);
+    auto& [width, rate, separation, monitored, skipped, path_length, turn, distance, travel, group_recheck,
+           recheck_travel, current, monitored_gaps, blocked_since, retry_time] = x;
+    a(width, rate, separation, monitored, skipped, path_length, turn, distance, group_recheck, recheck_travel, current,
+      blocked_since, retry_time);
     fields(a, travel);
     x.list_monitored();
 }

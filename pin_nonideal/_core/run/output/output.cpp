@@ -25,12 +25,12 @@ void Output::begin() {
     if (apart > 0.0) recorder_.reserve(static_cast<size_t>(std::min(options_.duration / apart + 2.0, max_reserved_samples)));
 }
 
-void Output::emit(double time, const VecX& state, bool evaluated) {
+void Output::emit(double time, const VecX& state, bool evaluated, const std::vector<char>* open_gaps) {
     if (!out_.t.empty() && (jumps_ ? time < out_.t.back() : time <= out_.t.back())) return;
     jumps_ = false;
     const GapState& gaps = progress_.gaps;
     recorder_.sample(time, state, {progress_.impact_energy, progress_.numerical_energy}, evaluated,
-                     gaps.current ? &gaps.skipped : nullptr);
+                     gaps.current ? &gaps.skipped : open_gaps);
 }
 
 void Output::before_jump() {
@@ -59,12 +59,18 @@ void Output::end_step(bool is_needed) {
     now();
 }
 
-void Output::end_time_step(double rounding) {
-    const double t = progress_.t;
-    const bool on_grid = options_.output_dt > 0.0 && next() <= t + std::max(rounding, same_time(t));
-    progress_.samples += on_grid;
-    if (options_.output_dt != 0.0 && !on_grid && t < options_.end()) return;
-    emit(t, progress_.y, progress_.has_forces || system_.ng == 0);
+bool Output::is_on_grid(double rounding) const {
+    return options_.output_dt > 0.0 && next() <= progress_.t + std::max(rounding, same_time(progress_.t));
+}
+
+bool Output::is_due(double rounding) const {
+    return options_.output_dt == 0.0 || is_on_grid(rounding) || !(progress_.t < options_.end());
+}
+
+void Output::end_time_step(double rounding, const std::vector<char>* open_gaps) {
+    const bool due = is_due(rounding);
+    progress_.samples += is_on_grid(rounding);
+    if (due) emit(progress_.t, progress_.y, progress_.has_forces || system_.ng == 0, open_gaps);
 }
 
 template <class Visit>

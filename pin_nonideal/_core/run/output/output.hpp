@@ -21,8 +21,10 @@ public:
     void now();
     // Record a sample at the end of a step without mode changes, if one is due or `is_needed` is true.
     void end_step(bool is_needed);
-    // Record a sample at the end of a step of time stepping if one is due, up to the rounding of the end.
-    void end_time_step(double rounding);
+    // Check if a sample is due at the end of a step of time stepping, up to the rounding of the end.
+    bool is_due(double rounding) const;
+    // Record this sample if it is due. `open_gaps`: gaps that are known to be open, by gap.
+    void end_time_step(double rounding, const std::vector<char>* open_gaps);
     // Record samples of the grid inside the step just taken, and one at the time `between`.
     void inside_step(std::optional<double> between);
     // Record the interpolant of the step just taken, if dense output is on. A step of time stepping, or the end of
@@ -33,7 +35,8 @@ public:
     void configured_now();
 
 private:
-    void emit(double time, const VecX& state, bool evaluated);
+    void emit(double time, const VecX& state, bool evaluated, const std::vector<char>* open_gaps = nullptr);
+    bool is_on_grid(double rounding) const;
     // Record a sample inside the step just taken, from its interpolant. This leaves the workspace at the sample.
     void emit_between(double time);
     void choose_as_before(double time);

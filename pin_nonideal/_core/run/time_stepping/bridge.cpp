@@ -76,14 +76,14 @@ bool TimeStepping::needs_forces(double end, double t_end) const {
 void TimeStepping::step_part(double end, double t_end, double least) {
     const double from = progress_.t, numerical = progress_.numerical_energy, impacts = progress_.impact_energy;
     double h = std::max(moreau_contacts_.allowed(from, end - from, progress_.y), least);
-    y_before_part_ = progress_.y;
+    y_before_part_ = progress_.y.head(system_.ns);
     before_part_ = w.state.mode;
     closed_before_part_ = w.state.closed;
     for (;; h = std::max(0.5 * h, least)) {
         try_part(h, end, t_end);
         if (h <= least || !moreau_contacts_.passes_edge(progress_.t, progress_.y)) break;
         progress_.t = from;
-        progress_.y = y_before_part_;
+        progress_.y.head(system_.ns) = y_before_part_;
         progress_.numerical_energy = numerical;
         progress_.impact_energy = impacts;
         set_contacts(p, w, closed_before_part_, before_part_);
@@ -119,12 +119,12 @@ void TimeStepping::step_with_contacts(double end, double t_end) {
     const double min_size = parameters.min_cut * (end - progress_.t);
     const bool may_stand = is_autonomous_ && (system_.velocity(progress_.y).array() == 0.0).all();
     if (may_stand) {
-        y_from_ = progress_.y;
+        y_from_ = progress_.y.head(system_.ns);
         before_step_ = w.state.mode;
         closed_before_step_ = w.state.closed;
     }
     while (progress_.t < end) step_part(end, t_end, min_size);
-    progress_.is_stationary = may_stand && !progress_.misses_laws && progress_.y == y_from_ &&
+    progress_.is_stationary = may_stand && !progress_.misses_laws && progress_.y.head(system_.ns) == y_from_ &&
                               same_bytes<Mode>(before_step_, w.state.mode) &&
                               same_bytes(closed_before_step_, w.state.closed);
 }
@@ -213,7 +213,8 @@ void TimeStepping::step(double size, double stop, double t_end) {
     value_events_.sample_end(t, y);
     value_events_.append_events(t, out_.events);
     if (!value_events_.found().empty()) output_.now();
-    output_.end_time_step(rounding_);
+    const bool measures = system_.ng > 0 && output_.is_due(rounding_);
+    output_.end_time_step(rounding_, measures ? &moreau_contacts_.open_gaps(y) : nullptr);
 }
 
 }  // namespace pn

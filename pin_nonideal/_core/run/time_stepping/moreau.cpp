@@ -183,8 +183,9 @@ void Moreau::apply_forces() {
     w.now.lam = lam_free_;
     w.now.lam.noalias() += problem_.multipliers * force_;
     for (int e = 0, at = 0; e < system_.ne; ++e) {
-        w.now.slip_force[e] = Vec3::Zero();
-        for (int k = 0; k < problem_.dims[e]; ++k) w.now.slip_force[e][k] = force_[at++];
+        Vec3& force = w.now.slip_force.change(e);
+        force = Vec3::Zero();
+        for (int k = 0; k < problem_.dims[e]; ++k) force[k] = force_[at++];
     }
     w.now.renew();
 }

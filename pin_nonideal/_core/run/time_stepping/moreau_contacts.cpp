@@ -122,6 +122,14 @@ bool MoreauContacts::project(double t, VecX& y, double& numerical_energy) {
     return true;
 }
 
+const std::vector<char>& MoreauContacts::open_gaps(const VecX& y) {
+    if (q_sampled_.size() == 0) return open_;  // no step was taken yet: no gap is known to be open
+    const VecX change = y.head(system_.nq) - q_sampled_;
+    ambient_to_tangent(p.mechanism, q_sampled_.data(), change.data(), force_.data());
+    force_ = force_.cwiseAbs().cwiseMax(0.5 * h_ * v1_.cwiseAbs());
+    return watch_.open_after(force_);
+}
+
 // Solve the step with the forces at the predicted mean velocity. If no motion is found, or only a relaxed one, solve it at
 // the velocity of the start.
 void MoreauContacts::begin_sweeps(double t, JointDrives::Step& drives) {
@@ -176,7 +184,7 @@ void MoreauContacts::solve_free(double t) {
     }
     b_ = w.now.b;
     mean_.meet_at_end(p, w, b_);
-    lam_free_ = w.now.lam;
+    lam_free_.head(p.blocks[p.first_gap].row) = w.now.lam.head(p.blocks[p.first_gap].row);
     solve_motion(p, w, p.has_laws(), b_, a_free_, lam_free_);
 }
 
@@ -244,6 +252,14 @@ void MoreauContacts::move_touching(double t) {
     elements_.move(p, w);
 }
 
+// Set the multipliers of the constraints for the forces f. In a step all contacts are open: their other rows have none.
+void MoreauContacts::begin_multipliers() {
+    if (w.now.rows.blocks.empty()) return;
+    const int rows = p.blocks[p.first_gap].row;
+    w.now.lam.head(rows) = lam_free_.head(rows);
+    forces_.add_multipliers(w.now.lam);
+}
+
 // Compute the motion under the forces f.
 void MoreauContacts::apply() {
     const auto& parts = elements_.parts;
@@ -253,16 +269,12 @@ void MoreauContacts::apply() {
     w.now.renew();
     if (n == 0) return;
     forces_.add_motion(w.now.a);
-    if (w.now.rows.blocks.empty()) w.now.lam.setZero();
-    else {
-        w.now.lam = lam_free_;
-        forces_.add_multipliers(w.now.lam);
-    }
+    begin_multipliers();
     for (size_t e = 0, at = 0; e < parts.size(); at += cones[e].dim, ++e) {
         const int head = parts[e].gap >= 0;
         if (head) w.now.lam[p.blocks[p.gaps[parts[e].gap].block].row] = forces_.f[at];
         if (parts[e].element < 0) continue;
-        Vec3& force = w.now.slip_force[parts[e].element];
+        Vec3& force = w.now.slip_force.change(parts[e].element);
         force = Vec3::Zero();
         for (int k = head; k < cones[e].dim; ++k) force[k - head] = forces_.f[at + k];
     }
@@ -387,10 +399,7 @@ void MoreauContacts::book_work(VecX& y, double& numerical_energy, double& impact
     const auto& rows = elements_.rows;
     const auto& parts = elements_.parts;
     const auto& cones = elements_.cones;
-    if (!w.now.rows.blocks.empty()) {
-        w.now.lam = lam_free_;
-        forces_.add_multipliers(w.now.lam);
-    }
+    begin_multipliers();
     force_ = 0.5 * (mean_.start() + mean_.finish());
     powers(p, w, force_, power_.data());
     for (size_t e = 0, at = 0; e < parts.size(); at += cones[e].dim, ++e) {

@@ -51,6 +51,9 @@ public:
     // the scene must project it then.
     bool project(double t, VecX& y, double& numerical_energy);
 
+    // Return the gaps that are open at the end y of the last step, by gap. Narrow open gaps may be missing.
+    const std::vector<char>& open_gaps(const VecX& y);
+
     // Check if the last step was solved tree by tree.
     bool is_separate() const { return forces_.is_separate(); }
     // Contact whose laws the last step missed.
@@ -73,6 +76,7 @@ private:
     bool find_forces(double t);
     void solve_forces(double t);
     void solve(double t);
+    void begin_multipliers();
     void apply();
     void find_loaded();
     void keep_percussions();
