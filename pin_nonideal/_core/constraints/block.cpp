@@ -22,31 +22,37 @@ Block::Block(std::string its_name, Kind what)
     for (int k = 0; k < total; ++k) kept.push_back(k);
 }
 
-void Block::lay_out(const Mechanism& m) {
-    deep = false;
-    support.clear();
-    parent.clear();
-    entries.clear();
-    holonomic.clear();
-    for (int k : kept) holonomic.push_back(is_holonomic(kind, k));
+// Return the dofs of a kind. `joint1`, `joint2`: bodies of a geometric kind.
+static DofSupport make_support(const Mechanism& m, const Kind& kind, int joint1, int joint2) {
+    DofSupport out;
     std::vector<char> in(m.nv, 0);
     for (int dof : dofs(kind, m))
         for (int d = dof; d >= 0 && !in[d]; d = m.dof_parent[d]) in[d] = 1;
     std::vector<int> place(m.nv, -1);
     for (int d = m.nv - 1; d >= 0; --d)
         if (in[d]) {
-            place[d] = static_cast<int>(support.size());
-            support.push_back(d);
-            deep |= m.is_deep[d] != 0;
+            place[d] = static_cast<int>(out.dofs.size());
+            out.dofs.push_back(d);
+            out.deep |= m.is_deep[d] != 0;
         }
-    for (int d : support) parent.push_back(m.dof_parent[d] < 0 ? -1 : place[m.dof_parent[d]]);
-    if (!frames(kind).first) return;
+    for (int d : out.dofs) out.parent.push_back(m.dof_parent[d] < 0 ? -1 : place[m.dof_parent[d]]);
+    if (!frames(kind).first) return out;
     // A differs from zero only on dofs that move one body and not the other.
     const std::vector<int> d1 = m.dofs_of(joint1), d2 = m.dofs_of(joint2);
     for (int d : d1)
-        if (std::find(d2.begin(), d2.end(), d) == d2.end()) entries.push_back({place[d], d, 1.0});
+        if (std::find(d2.begin(), d2.end(), d) == d2.end()) out.entries.push_back({place[d], d, 1.0});
     for (int d : d2)
-        if (std::find(d1.begin(), d1.end(), d) == d1.end()) entries.push_back({place[d], d, -1.0});
+        if (std::find(d1.begin(), d1.end(), d) == d1.end()) out.entries.push_back({place[d], d, -1.0});
+    return out;
+}
+
+void Block::lay_out(const Mechanism& m, SharedSupports& shared) {
+    holonomic.clear();
+    for (int k : kept) holonomic.push_back(is_holonomic(kind, k));
+    std::shared_ptr<const DofSupport> own;
+    std::shared_ptr<const DofSupport>& known = frames(kind).first ? shared[{joint1, joint2}] : own;
+    if (!known) known = std::make_shared<const DofSupport>(make_support(m, kind, joint1, joint2));
+    acts_on = known;
 }
 
 // Return a unit wrench as a force on one body of a block, about its reference point. The reference points of both
@@ -61,24 +67,24 @@ static PN_INLINE Force about(const Wrench& w, const Body& body) {
     const int r = static_cast<int>(block.kept.size());
     for (int k = 0; k < r; ++k) {
         const Wrench& w = values.wrench[block.kept[k]];
-        for (const Block::Entry& e : block.entries)  // Eq. (3)
+        for (const DofSupport::Entry& e : block.entries())  // Eq. (3)
             A[e.place * r + k] = e.sign * dot(terms.J[e.dof], about(w, terms.body[m.dof_joint[e.dof]]));
     }
 }
 
 PN_WIDE void fill_A(const Block& block, const Mechanism& m, const Terms& terms, const RowValues& values, double* A) {
-    const int r = static_cast<int>(block.kept.size()), n = static_cast<int>(block.support.size());
+    const int r = static_cast<int>(block.kept.size()), n = static_cast<int>(block.support().size());
     if (!values.geometric) {
         for (int l = 0; l < n; ++l)
-            for (int k = 0; k < r; ++k) A[l * r + k] = values.A(block.kept[k], block.support[l]);  // Eq. (3)
+            for (int k = 0; k < r; ++k) A[l * r + k] = values.A(block.kept[k], block.support()[l]);  // Eq. (3)
         return;
     }
     std::fill(A, A + static_cast<size_t>(r) * n, 0.0);
-    if (block.deep) return fill_deep_A(block, m, terms, values, A);
+    if (block.is_deep()) return fill_deep_A(block, m, terms, values, A);
     for (int k = 0; k < r; ++k) {
         const Wrench& w = values.wrench[block.kept[k]];
         const Force f1 = about(w, terms.body[block.joint1]), f2 = about(w, terms.body[block.joint2]);
-        for (const Block::Entry& e : block.entries) {
+        for (const DofSupport::Entry& e : block.entries()) {
             A[e.place * r + k] = e.sign > 0.0 ? dot(terms.J[e.dof], f1) : -dot(terms.J[e.dof], f2);  // Eq. (3)
         }
     }
@@ -95,25 +101,25 @@ PN_WIDE void fill_A(const Block& block, const Mechanism& m, const Terms& terms, 
             const Wrench& w = values.wrench[block.kept[k]];
             f1 = about(w, terms.body[block.joint1]);
             f2 = about(w, terms.body[block.joint2]);
-            for (size_t l = 0; l < block.support.size(); ++l)
-                if (m.is_deep[block.support[l]]) B[l * r + k] = 0.0;
+            for (size_t l = 0; l < block.support().size(); ++l)
+                if (m.is_deep[block.support()[l]]) B[l * r + k] = 0.0;
         }
-        scale_row_articulated(m, terms, block.support, block.joint1, f1, block.joint2, f2, B + k, r);
+        scale_row_articulated(m, terms, block.support(), block.joint1, f1, block.joint2, f2, B + k, r);
     }
 }
 
 // Scale the part of the rows on dofs with rows of the factor.
 template <bool some_deep>
 static PN_INLINE void scale_flat_rows(const Mechanism& m, const Terms& terms, const Block& block, double* B) {
-    const int n = static_cast<int>(block.support.size());
+    const int n = static_cast<int>(block.support().size());
     const double *L = terms.L.data(), *inv_sqrt_D = terms.inv_sqrt_D.data();
     with_rows(static_cast<int>(block.kept.size()), [&](auto r) {
         for (int l = 0; l < n; ++l) {
-            const int dof = block.support[l];
+            const int dof = block.support()[l];
             if (some_deep && m.is_deep[dof]) continue;
             const double* row = L + m.row_offset[dof];
             double* __restrict x = B + l * r;
-            for (int p = block.parent[l], s = 1; p >= 0; p = block.parent[p], ++s) {
+            for (int p = block.parent()[l], s = 1; p >= 0; p = block.parent()[p], ++s) {
                 double* __restrict y = B + p * r;  // entries of an ancestor
                 for (int k = 0; k < r; ++k) y[k] -= row[s] * x[k];
             }
@@ -125,8 +131,8 @@ static PN_INLINE void scale_flat_rows(const Mechanism& m, const Terms& terms, co
 
 void scale_rows(const Mechanism& m, Terms& terms, const Block& block, const RowValues& values, const double* A,
                 double* B) {
-    std::copy(A, A + block.kept.size() * block.support.size(), B);
-    if (!block.deep) return scale_flat_rows<false>(m, terms, block, B);
+    std::copy(A, A + block.kept.size() * block.support().size(), B);
+    if (!block.is_deep()) return scale_flat_rows<false>(m, terms, block, B);
     scale_deep_rows(m, terms, block, values, B);
     scale_flat_rows<true>(m, terms, block, B);
 }
@@ -134,10 +140,10 @@ void scale_rows(const Mechanism& m, Terms& terms, const Block& block, const RowV
 void add_transpose(const Block& block, const std::vector<double>& B, const VecX& lam, VecX& y) {
     with_rows(static_cast<int>(block.kept.size()), [&](auto r) {
         const double *x = B.data() + block.offset, *l = lam.data() + block.row;
-        for (size_t p = 0; p < block.support.size(); ++p, x += r) {
+        for (size_t p = 0; p < block.support().size(); ++p, x += r) {
             double sum = 0.0;
             for (int k = 0; k < r; ++k) sum += x[k] * l[k];
-            y[block.support[p]] += sum;
+            y[block.support()[p]] += sum;
         }
     });
 }
@@ -145,8 +151,8 @@ void add_transpose(const Block& block, const std::vector<double>& B, const VecX&
 void add_transpose(const Block& block, const Mechanism& m, const Terms& terms, const RowValues& values,
                    const std::vector<double>& A, const VecX& lam, VecX& y, std::vector<Force>& body) {
     const size_t r = block.kept.size();
-    for (size_t l = 0; l < block.support.size(); ++l) {
-        const int dof = block.support[l];
+    for (size_t l = 0; l < block.support().size(); ++l) {
+        const int dof = block.support()[l];
         if (values.geometric && m.is_deep[dof]) continue;
         for (size_t k = 0; k < r; ++k) y[dof] += A[block.offset + l * r + k] * lam[block.row + k];
     }
@@ -159,8 +165,8 @@ void multiply(const Block& block, const std::vector<double>& B, const VecX& x, V
         const double* a = B.data() + block.offset;
         double* __restrict out = r.data() + block.row;
         for (int k = 0; k < n; ++k) out[k] = 0.0;
-        for (size_t p = 0; p < block.support.size(); ++p, a += n) {
-            const double xp = x[block.support[p]];
+        for (size_t p = 0; p < block.support().size(); ++p, a += n) {
+            const double xp = x[block.support()[p]];
             for (int k = 0; k < n; ++k) out[k] += a[k] * xp;
         }
     });
@@ -169,10 +175,10 @@ void multiply(const Block& block, const std::vector<double>& B, const VecX& x, V
 void add_along(const Block& block, const std::vector<double>& rows, const Vec3& f, VecX& force) {
     const int n = static_cast<int>(block.kept.size());
     const double* A = rows.data() + block.offset;
-    for (size_t l = 0; l < block.support.size(); ++l) {
+    for (size_t l = 0; l < block.support().size(); ++l) {
         double sum = 0.0;
         for (int k = 0; k < n; ++k) sum += A[l * n + k] * f[k];
-        if (sum != 0.0) force[block.support[l]] += sum;
+        if (sum != 0.0) force[block.support()[l]] += sum;
     }
 }
 

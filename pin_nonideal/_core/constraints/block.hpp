@@ -1,12 +1,25 @@
 // A constraint or a direction of friction, with the position of its rows among the rows of the scene.
 #pragma once
 
+#include <map>
+#include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "constraints/row_type.hpp"
 
 namespace pn {
+
+// Dofs on which the rows of a block act.
+struct DofSupport {
+    std::vector<int> dofs;    // dofs of the scaled rows, descending and closed under ancestors
+    std::vector<int> parent;  // index in dofs of each dof's parent, or -1
+    struct Entry { int place, dof; double sign; };
+    std::vector<Entry> entries;  // entries of A that may be nonzero, for a geometric kind
+    bool deep = false;           // some dofs belong to a deep tree
+};
+using SharedSupports = std::map<std::pair<int, int>, std::shared_ptr<const DofSupport>>;  // by both bodies
 
 struct Block {
     std::string name;
@@ -20,18 +33,18 @@ struct Block {
     bool affine_rate = true;       // the rate is A(q, t) v + phi_t (a user's rate may depend on v otherwise)
     int user_row = 0;              // first row in the user's numbering
     int row = 0;                   // first row among the kept rows of the scene
-    std::vector<int> support;      // dofs of the scaled rows, descending and closed under ancestors
-    std::vector<int> parent;       // index in support of each dof's parent, or -1
-    struct Entry { int place, dof; double sign; };
-    std::vector<Entry> entries;    // entries of A that may be nonzero, for a geometric kind
-    bool deep = false;             // some dofs of the support belong to a deep tree
-    int offset = 0;                // first of its support.size() x kept.size() entries in Evaluation::A and ::B
+    int offset = 0;                // first of its support().size() x kept.size() entries in Evaluation::A and ::B
+    std::shared_ptr<const DofSupport> acts_on;  // set by lay_out
 
     Block() = default;
     // Create a block that keeps all rows.
     Block(std::string its_name, Kind what);
-    // Compute support, entries and flags from the kept rows.
-    void lay_out(const Mechanism& m);
+    const std::vector<int>& support() const { return acts_on->dofs; }
+    const std::vector<int>& parent() const { return acts_on->parent; }
+    const std::vector<DofSupport::Entry>& entries() const { return acts_on->entries; }
+    bool is_deep() const { return acts_on->deep; }
+    // Compute the support of the block, and flags of the kept rows. Blocks between the same two bodies share a support.
+    void lay_out(const Mechanism& m, SharedSupports& shared);
 };
 
 // Fill A on the block's support from the wrenches or the dense rows, dof-major.

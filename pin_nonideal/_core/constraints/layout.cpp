@@ -84,9 +84,9 @@ std::vector<int> elimination_order(const RowLayout& layout, Neighbors& near) {
 // Supports are in descending order.
 CommonDofs common_dofs(const Block& one, const Block& other) {
     CommonDofs common;
-    for (size_t l = 0, k = 0; l < one.support.size() && k < other.support.size();) {
-        if (one.support[l] == other.support[k]) common.emplace_back(l++, k++);
-        else if (one.support[l] > other.support[k]) ++l;
+    for (size_t l = 0, k = 0; l < one.support().size() && k < other.support().size();) {
+        if (one.support()[l] == other.support()[k]) common.emplace_back(l++, k++);
+        else if (one.support()[l] > other.support()[k]) ++l;
         else ++k;
     }
     return common;
@@ -99,14 +99,14 @@ RowLayout layout_rows(const std::vector<Block>& blocks, int nv) {
     std::vector<std::vector<int>> supports;
     for (const Block& block : blocks) {
         layout.rows += static_cast<int>(block.kept.size());
-        supports.push_back(block.support);
+        supports.push_back(block.support());
     }
     layout.support = numbered(supports);
     std::vector<std::vector<int>> with_support(count(layout.support)), at_dof(nv);
     for (size_t b = 0; b < blocks.size(); ++b) {
         std::vector<int>& alike = with_support[layout.support[b]];
         if (alike.empty())
-            for (int dof : blocks[b].support) at_dof[dof].push_back(layout.support[b]);
+            for (int dof : blocks[b].support()) at_dof[dof].push_back(layout.support[b]);
         alike.push_back(static_cast<int>(b));
     }
     const std::vector<int> group = numbered(at_dof);
@@ -114,7 +114,7 @@ RowLayout layout_rows(const std::vector<Block>& blocks, int nv) {
     layout.groups.resize(with_support.size());
     for (size_t s = 0; s < with_support.size(); ++s) {
         std::vector<int>& dof_groups = layout.groups[s];
-        for (int dof : blocks[with_support[s].front()].support) dof_groups.push_back(group[dof]);
+        for (int dof : blocks[with_support[s].front()].support()) dof_groups.push_back(group[dof]);
         std::sort(dof_groups.begin(), dof_groups.end());
         dof_groups.erase(std::unique(dof_groups.begin(), dof_groups.end()), dof_groups.end());
     }

@@ -22,8 +22,8 @@ void dense_columns(const std::vector<Block>& blocks, const std::vector<double>& 
             s.columns.push_back(block.row + k);
             auto column = s.Q.col(c);
             column.setZero();
-            for (size_t l = 0; l < block.support.size(); ++l)
-                column[block.support[l]] = B[block.offset + l * r + k] * s.scale[block.row + k];
+            for (size_t l = 0; l < block.support().size(); ++l)
+                column[block.support()[l]] = B[block.offset + l * r + k] * s.scale[block.row + k];
         }
     }
 }

@@ -23,7 +23,7 @@ static bool keeps_length(const Block& block, const RowValues& values) {
 static void present_lengths(const Block& block, const std::vector<double>& B, double* length) {
     const size_t r = block.kept.size();
     std::fill_n(length, r, 0.0);
-    for (size_t l = 0; l < block.support.size(); ++l)
+    for (size_t l = 0; l < block.support().size(); ++l)
         for (size_t k = 0; k < r; ++k) length[k] += B[block.offset + l * r + k] * B[block.offset + l * r + k];
     for (size_t k = 0; k < r; ++k) length[k] = std::sqrt(length[k]);
 }

@@ -21,7 +21,7 @@ static MatX columns_of(const std::vector<Block>& blocks, const std::vector<doubl
     for (int i : s.blocks) {
         const Block& block = blocks[i];
         const double* entry = B.data() + block.offset;
-        for (int dof : block.support)
+        for (int dof : block.support())
             for (size_t k = 0; k < block.kept.size(); ++k, ++entry)
                 if (column[block.row + k] >= 0) out(dof, column[block.row + k]) = *entry;
     }

@@ -13,7 +13,7 @@ namespace {
 class Lengths {
 public:
     Lengths(const Mechanism& m, Terms& terms, const Block& block) : m_(m), terms_(terms), block_(block), x_(m.nv) {
-        if (block.deep) body_.resize(m.joints.size());
+        if (block.is_deep()) body_.resize(m.joints.size());
         double mass = 0.0;
         for (const Joint& joint : m.joints) mass += joint.mass;
         if (mass > 0.0) least_ = rank_parameters.min_length_part * rank_parameters.min_length_part / mass;
@@ -22,16 +22,16 @@ public:
     // Return the squared length of the row of one unit wrench.
     double square(const Wrench& w) {
         x_.setZero();
-        for (const Block::Entry& e : block_.entries) {
+        for (const DofSupport::Entry& e : block_.entries()) {
             if (m_.is_deep[e.dof]) continue;
             const Body& body = terms_.body[m_.dof_joint[e.dof]];
             x_[e.dof] = e.sign * dot(terms_.J[e.dof], {w.force, w.couple + (w.point - body.ref).cross(w.force)});
         }
-        if (block_.deep) {
+        if (block_.is_deep()) {
             std::fill(body_.begin(), body_.end(), Force{});
             add_wrench(block_, terms_, w, 1.0, body_);
         }
-        solve_R(m_, terms_, x_, block_.deep ? body_.data() : nullptr);
+        solve_R(m_, terms_, x_, block_.is_deep() ? body_.data() : nullptr);
         return x_.squaredNorm();
     }
 

@@ -16,8 +16,8 @@ static std::pair<double, double> rate_of_rate(const Program& p, const Workspace&
     const double bias = w.now.values[p.gaps[gap].block].bias[block.kept[0]];
     double sum = bias, size = std::abs(bias);
     const double* A = w.now.A.data() + block.offset;
-    for (size_t l = 0; l < block.support.size(); ++l) {
-        const double term = A[l] * w.now.a[block.support[l]];
+    for (size_t l = 0; l < block.support().size(); ++l) {
+        const double term = A[l] * w.now.a[block.support()[l]];
         sum += term;
         size += std::abs(term);
     }

@@ -22,7 +22,7 @@ static double row_size(const Workspace& w, const Block& block, int row) {
     const size_t n = block.kept.size();
     for (size_t k = 0; k < n; ++k) {
         if (block.kept[k] != row) continue;
-        for (size_t l = 0; l < block.support.size(); ++l)
+        for (size_t l = 0; l < block.support().size(); ++l)
             size = std::max(size, std::abs(w.now.A[block.offset + l * n + k]));
     }
     return size;

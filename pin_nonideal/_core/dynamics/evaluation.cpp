@@ -130,7 +130,7 @@ static bool is_balanced(const Program& p, Workspace& w) {
     for (int i : w.now.rows.blocks) {
         const Block& block = p.blocks[i];
         const double* entry = w.now.A.data() + block.offset;
-        for (int dof : block.support)
+        for (int dof : block.support())
             for (size_t k = 0; k < block.kept.size(); ++k) size[dof] += std::abs(*entry++ * w.now.lam[block.row + k]);
     }
     return (left.cwiseAbs().array() <= evaluation_parameters.residual_sum_rounding * size.array()).all();

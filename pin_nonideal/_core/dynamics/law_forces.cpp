@@ -53,7 +53,7 @@ struct ActedDofs {
         for (int dof : p.mechanism.dofs_of(joint)) dofs[dof] = 1;
     }
     void along(int block, const Vec3&) {
-        for (int dof : p.blocks[block].support) dofs[dof] = 1;
+        for (int dof : p.blocks[block].support()) dofs[dof] = 1;
     }
     void on_all(const VecX&) { std::fill(dofs.begin(), dofs.end(), char(1)); }
     void on_state(int, double) {}
@@ -100,7 +100,7 @@ std::vector<std::vector<int>> law_supports(const Program& p) {
     return supports;
 }
 
-void add_forces_by_law(const Program& p, const Workspace& w, const VecX& v, std::vector<VecX>& force) {
+void add_forces_by_law(const Program& p, const Workspace& w, const VecX& v, LawForceList& force) {
     const LawState state = law_state(w, v);
     for (const Law& each : p.laws)
         std::visit([&](const auto& law) {

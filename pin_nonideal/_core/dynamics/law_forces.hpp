@@ -12,7 +12,7 @@ void add_smooth_forces(const Program& p, Workspace& w, double t, const VecX& q, 
 // Dofs on which each law can act in any configuration, ascending.
 std::vector<std::vector<int>> law_supports(const Program& p);
 // Add C of each law at the evaluation in the workspace to the entry of that law.
-void add_forces_by_law(const Program& p, const Workspace& w, const VecX& v, std::vector<VecX>& force);
+void add_forces_by_law(const Program& p, const Workspace& w, const VecX& v, LawForceList& force);
 // Add C of all laws without modes at the evaluation in the workspace. No function of a user is called.
 void add_law_forces(const Program& p, const Workspace& w, const VecX& v, VecX& C);
 // Add the forces of smooth laws on bodies to `body`, the forces that the joints carry.

@@ -58,8 +58,8 @@ struct Laws {
         }
         const size_t n = block.kept.size();
         const double* A = w.now.A.data() + block.offset;
-        for (size_t l = 0; l < block.support.size(); ++l)
-            for (size_t k = 0; k < n; ++k) subtract(block.support[l], *A++ * f[k]);
+        for (size_t l = 0; l < block.support().size(); ++l)
+            for (size_t k = 0; k < n; ++k) subtract(block.support()[l], *A++ * f[k]);
     }
 
     void check_motion() {
@@ -88,8 +88,8 @@ struct Laws {
         }
         const size_t n = block.kept.size();
         const double* A = w.now.A.data() + block.offset;
-        for (size_t l = 0; l < block.support.size(); ++l)
-            for (size_t k = 0; k < n; ++k) longest = std::max(longest, weight[block.support[l]] * std::abs(*A++));
+        for (size_t l = 0; l < block.support().size(); ++l)
+            for (size_t k = 0; k < n; ++k) longest = std::max(longest, weight[block.support()[l]] * std::abs(*A++));
         return longest;
     }
 
@@ -104,7 +104,7 @@ struct Laws {
         if (!(size > 0.0)) return;
         double acceleration = w.now.values[p.gaps[gap].block].bias[block.kept[0]];
         const double* A = w.now.A.data() + block.offset;
-        for (size_t l = 0; l < block.support.size(); ++l) acceleration += A[l] * a[block.support[l]];
+        for (size_t l = 0; l < block.support().size(); ++l) acceleration += A[l] * a[block.support()[l]];
         if (depends(block.row)) acceleration = 0.0;
         const double load = w.state.closed[gap] ? forces.shared_lam[block.row] : 0.0;
         out.signorini.include(std::abs(std::min(load * size, acceleration / size)) / scale, p.gaps[gap].block);

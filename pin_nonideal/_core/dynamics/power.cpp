@@ -18,15 +18,15 @@ std::vector<std::string> power_names(const Program& p) {
 }
 
 // Compute C of each law without sticking forces, which have no power.
-static void moving_law_forces(const Program& p, Workspace& w, const VecX& v, std::vector<VecX>& force) {
-    for (VecX& each : force) each.setZero();
+static void moving_law_forces(const Program& p, Workspace& w, const VecX& v, LawForceList& force) {
+    force.clear();
     add_forces_by_law(p, w, v, force);
-    for (size_t e = 0; e < p.frictions.size(); ++e) add_slip_force(p, w, e, force[p.frictions[e].law]);
+    for (int e : w.now.slipping) add_slip_force(p, w, e, force[p.frictions[e].law]);
 }
 
-void law_forces(const Program& p, Workspace& w, const VecX& v, std::vector<VecX>& force) {
+void law_forces(const Program& p, Workspace& w, const VecX& v, LawForceList& force) {
     moving_law_forces(p, w, v, force);
-    for (size_t e = 0; e < p.frictions.size(); ++e) {
+    for (int e : w.now.loaded_elements) {
         if (w.state.mode[e] != sticking) continue;
         const Friction& f = p.frictions[e];
         const Block& block = p.blocks[f.block];
@@ -47,13 +47,11 @@ void powers(const Program& p, Workspace& w, const VecX& v, double* out) {
         out[2] = v.dot(w.scratch.work);
     }
     if (!p.has_laws()) return;
-    if (p.has_contact_friction_only && w.now.slipping.empty()) {
-        std::fill_n(out + first_law_power, p.law_names.size(), 0.0);
-        return;
-    }
-    std::vector<VecX>& force = w.scratch.law_force;
+    std::fill_n(out + first_law_power, p.law_names.size(), 0.0);
+    if (p.has_contact_friction_only && w.now.slipping.empty()) return;
+    LawForceList& force = w.scratch.law_force;
     moving_law_forces(p, w, v, force);
-    for (size_t l = 0; l < p.law_names.size(); ++l) out[first_law_power + l] = v.dot(force[l]);
+    for (int law : force.acting()) out[first_law_power + law] = v.dot(force[law]);
 }
 
 }  // namespace pn

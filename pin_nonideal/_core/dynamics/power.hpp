@@ -16,7 +16,7 @@ constexpr int first_law_power = std::size(scene_powers);
 int power_count(const Program& p);
 std::vector<std::string> power_names(const Program& p);
 // Compute C of each law, sticking forces included. The sum over the laws is C of the decomposition.
-void law_forces(const Program& p, Workspace& w, const VecX& v, std::vector<VecX>& force);
+void law_forces(const Program& p, Workspace& w, const VecX& v, LawForceList& force);
 void powers(const Program& p, Workspace& w, const VecX& v, double* out);
 
 }  // namespace pn

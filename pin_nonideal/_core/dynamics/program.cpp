@@ -105,7 +105,7 @@ static std::vector<int> acting_dofs(const Program& p, const Block& block) {
     if (block.kept.empty()) return {};
     if (!frames(block.kind).first) return dofs(block.kind, p.mechanism);
     std::vector<int> acting;
-    for (const Block::Entry& entry : block.entries) acting.push_back(entry.dof);
+    for (const DofSupport::Entry& entry : block.entries()) acting.push_back(entry.dof);
     return acting;
 }
 
@@ -156,17 +156,18 @@ static bool loads_are_of_trees(const Program& p) {
 void Program::finish() {
     int row = 0;
     entries = 0;
+    SharedSupports supports;
     for (Block& block : blocks) {
         block.row = row;
         row += static_cast<int>(block.kept.size());
-        block.lay_out(mechanism);
+        block.lay_out(mechanism, supports);
         block.offset = static_cast<int>(entries);
-        entries += block.support.size() * block.kept.size();
+        entries += block.support().size() * block.kept.size();
     }
     layout = layout_rows(blocks, mechanism.nv);
     std::vector<char> reached(mechanism.nv, 0);
     for (const Block& block : blocks)
-        for (int dof : block.support) reached[dof] = 1;
+        for (int dof : block.support()) reached[dof] = 1;
     constrained_dofs.clear();
     for (int dof = 0; dof < mechanism.nv; ++dof)
         if (reached[dof]) constrained_dofs.push_back(dof);

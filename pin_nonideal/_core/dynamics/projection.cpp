@@ -30,8 +30,8 @@ void least_move(const Program& p, Workspace& w, VecX& x) {
 double row_size(const Program& p, const Workspace& w, const Block& block, size_t k) {
     double size = 0.0;
     const double* entry = w.now.A.data() + block.offset + k;
-    for (size_t l = 0; l < block.support.size(); ++l, entry += block.kept.size())
-        size = std::max(size, std::abs(*entry) / p.mechanism.lever[block.support[l]]);
+    for (size_t l = 0; l < block.support().size(); ++l, entry += block.kept.size())
+        size = std::max(size, std::abs(*entry) / p.mechanism.lever[block.support()[l]]);
     return size;
 }
 
@@ -246,8 +246,8 @@ static void rest_alone(const Program& p, const Workspace& w, VecX& v) {
         const size_t n = block.kept.size();
         for (size_t k = 0; k < n; ++k) {
             int entries = 0, dof = -1;
-            for (size_t l = 0; l < block.support.size(); ++l)
-                if (w.now.A[block.offset + l * n + k] != 0.0) { ++entries; dof = block.support[l]; }
+            for (size_t l = 0; l < block.support().size(); ++l)
+                if (w.now.A[block.offset + l * n + k] != 0.0) { ++entries; dof = block.support()[l]; }
             if (entries == 1 && std::abs(v[dof]) <= immobile_speed) v[dof] = 0.0;
         }
     }

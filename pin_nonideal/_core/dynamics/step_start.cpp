@@ -58,8 +58,8 @@ static int contradicting_block(const Program& p, Workspace& w, const VecX& v, do
             if (!w.now.rows.required[row] || w.now.rows.active[row]) continue;
             double sum = -w.now.b[row], size = std::abs(w.now.b[row]);
             const double* A = w.now.A.data() + block.offset + k;
-            for (size_t l = 0; l < block.support.size(); ++l) {
-                const double term = A[l * n] * w.now.a[block.support[l]];
+            for (size_t l = 0; l < block.support().size(); ++l) {
+                const double term = A[l * n] * w.now.a[block.support()[l]];
                 sum += term;
                 size += std::abs(term);
             }

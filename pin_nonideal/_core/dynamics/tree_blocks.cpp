@@ -61,7 +61,7 @@ bool TreeBlocks::fill(const Program& p, const Workspace& w, const std::vector<St
     for (const ConeElement& cone : cones) {
         int trees[2] = {-1, -1};
         for (int k = 0; k < cone.dim; ++k)
-            for (int dof : p.blocks[rows[at + k].block].support) {
+            for (int dof : p.blocks[rows[at + k].block].support()) {
                 const int root = root_[dof];
                 if (root == trees[0] || root == trees[1]) continue;
                 if (trees[1] >= 0) return false;
@@ -76,7 +76,7 @@ bool TreeBlocks::fill(const Program& p, const Workspace& w, const std::vector<St
         for (int k = 0; k < cone.dim; ++k, ++at) {
             const Block& block = p.blocks[rows[at].block];
             const double* entry = w.now.A.data() + block.offset + rows[at].k;
-            for (int dof : block.support) {
+            for (int dof : block.support()) {
                 problem.jacobian(e, root_[dof] != trees[0])(k, local_[dof]) = *entry;
                 entry += block.kept.size();
             }

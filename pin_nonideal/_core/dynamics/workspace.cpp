@@ -70,7 +70,7 @@ static void size(const Program& p, const Evaluation& now, Scratch& scratch) {
     scratch.unknown = scratch.image = scratch.shifted = VecX::Zero(p.unknowns());
     if (p.loads_are_of_trees) scratch.loaded.sweep.resize(p.mechanism);
     scratch.subtree_force = scratch.body_inertia = scratch.body_residual = now.body_force;
-    scratch.law_force.assign(p.law_names.size(), VecX::Zero(nv));
+    scratch.law_force.resize(p.law_names.size(), nv);
     MotionForces& forces = scratch.forces;
     for (VecX* x : {&forces.given, &forces.magnitude, &scratch.law_weight, &scratch.law_residual, &scratch.law_magnitude})
         *x = VecX::Zero(nv);

@@ -9,6 +9,7 @@
 
 #include "constraints/rank.hpp"
 #include "dynamics/implicit_drives.hpp"
+#include "dynamics/law_force_list.hpp"
 #include "dynamics/motion_forces.hpp"
 #include "dynamics/program.hpp"
 #include "dynamics/slip_forces.hpp"
@@ -179,7 +180,7 @@ struct Scratch {
     MatX jacobian;
     std::vector<Force> subtree_force;
     std::vector<Force> body_inertia, body_residual;  // refinement in deep trees
-    std::vector<VecX> law_force;  // C of each law, for its power
+    LawForceList law_force;       // C of each law, for its power
     MotionForces forces;          // forces of the motion whose laws are checked
     VecX law_weight, law_residual, law_magnitude;  // by dof
 };

@@ -40,8 +40,8 @@ std::vector<int> first_rows(const Program& p) {
 std::vector<int> free_gaps(const Program& p) {
     std::vector<int> free;
     for (int i = p.first_gap; i < p.constraints; ++i) {
-        const std::vector<Block::Entry>& entries = p.blocks[i].entries;
-        const auto floats = [&](const Block::Entry& e) {
+        const std::vector<DofSupport::Entry>& entries = p.blocks[i].entries();
+        const auto floats = [&](const DofSupport::Entry& e) {
             return p.mechanism.joints[p.mechanism.dof_joint[e.dof]].kind == JointKind::free_flyer;
         };
         if (std::any_of(entries.begin(), entries.end(), floats)) free.push_back(i);

@@ -209,10 +209,10 @@ std::tuple<Numbers, Numbers, Numbers, Numbers> Runner::rows(const Array& q_in, c
         evaluate_block(*p, *w, t, v, i);
         const Block& all = with_all_rows(p->blocks[i], copy);
         const RowValues& values = w->now.values[i];
-        local.assign(all.support.size() * all.total, 0.0);
+        local.assign(all.support().size() * all.total, 0.0);
         fill_A(all, m, w->now.terms, values, local.data());
         for (int k = 0; k < all.total; ++k, ++row) {
-            for (size_t l = 0; l < all.support.size(); ++l) A[row * m.nv + all.support[l]] = local[l * all.total + k];
+            for (size_t l = 0; l < all.support().size(); ++l) A[row * m.nv + all.support()[l]] = local[l * all.total + k];
             b[row] = -values.bias[k];
             phi[row] = values.residual[k];
             rate[row] = values.rate[k];
@@ -267,12 +267,12 @@ Numbers Runner::slip_rows(const Array& q_in, const Array& v_in, double t) {
     for (const Friction& f : p->frictions) {
         const Block& block = p->blocks[f.block];
         evaluate_block(*p, *w, t, v, f.block);  // also for open contacts
-        std::vector<double> local(block.support.size() * f.dim);
+        std::vector<double> local(block.support().size() * f.dim);
         fill_A(block, p->mechanism, w->now.terms, w->now.values[f.block], local.data());
         for (int k = 0; k < f.dim; ++k) {
             rows.resize(rows.size() + nv, 0.0);
-            for (size_t l = 0; l < block.support.size(); ++l)
-                rows[rows.size() - nv + block.support[l]] = local[l * f.dim + k];
+            for (size_t l = 0; l < block.support().size(); ++l)
+                rows[rows.size() - nv + block.support()[l]] = local[l * f.dim + k];
         }
     }
     return to_numpy(std::move(rows));

@@ -103,8 +103,8 @@ void Collocation::evaluate_stages(bool first) {
             const Block& block = p.blocks[p.frictions[e.index].block];
             const int n = static_cast<int>(block.kept.size());
             const double* A = w.now.A.data() + block.offset;
-            for (size_t l = 0; l < block.support.size(); ++l)
-                for (int k = 0; k < n; ++k) A_[i](e.row + k, block.support[l]) = A[l * n + k];
+            for (size_t l = 0; l < block.support().size(); ++l)
+                for (int k = 0; k < n; ++k) A_[i](e.row + k, block.support()[l]) = A[l * n + k];
             const Vec3 slip = slip_velocity(w.now, p.frictions[e.index]);
             for (int k = 0; k < e.dim; ++k) u_[i][e.row + k] = slip[k];
             if (first) sigma_(at, i) = u_[i].segment(e.row, e.dim).dot(n_[i].segment(e.row, e.dim));

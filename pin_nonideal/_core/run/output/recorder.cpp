@@ -42,10 +42,10 @@ void Recorder::record_contacts() {
 }
 
 void Recorder::record_laws(double t) {
-    std::vector<VecX>& force = w.scratch.law_force;
+    LawForceList& force = w.scratch.law_force;
     law_forces(p, w, system.v, force);
-    for (size_t l = 0; l < force.size(); ++l)
-        for (int dof : supports_[l]) out.law_forces.push_back(force[l][dof]);
+    for (int law = 0; law < static_cast<int>(supports_.size()); ++law)
+        for (int dof : supports_[law]) out.law_forces.push_back(force.of(law)[dof]);
     for (size_t e = 0; e < p.frictions.size(); ++e)
         out.limits.push_back(current_limit(p, w, static_cast<int>(e), t, system.q, system.v));
 }

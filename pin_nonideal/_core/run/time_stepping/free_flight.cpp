@@ -43,7 +43,7 @@ FreeFlight::FreeFlight(const Program& p, const JointDrives& drives) : flight_(p.
     }
     for (size_t i = 0; i < p.blocks.size(); ++i)
         if (!opens[i])
-            for (int dof : p.blocks[i].support) joined[dof] = 1;
+            for (int dof : p.blocks[i].support()) joined[dof] = 1;
     for (size_t i = 1; i < m.joints.size(); ++i) {
         const Joint& joint = m.joints[i];
         const bool lone = joint.kind == JointKind::free_flyer && joint.parent == 0 && !parents[i] && joint.mass > 0.0;
@@ -61,7 +61,7 @@ void FreeFlight::begin() {
 }
 
 void FreeFlight::touch(const Block& block) {
-    for (int dof : block.support)
+    for (int dof : block.support())
         if (flight_[dof] >= 0) flights_[flight_[dof]].free = false;
 }
 
