@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.actuation import SampledControl
 from pin_nonideal.description.constraints import UserConstraint
-from pin_nonideal.description.contacts.pair_of_shapes import PairOfShapes, point_contacts
+from pin_nonideal.description.contacts.pair_of_shapes import CapsulePairs, PairOfShapes, contact_parts
 from pin_nonideal.description.drive_kinds import delayed_control, switching_drives
 from pin_nonideal.description.scene_spec import SceneSpec
 from pin_nonideal.errors import InputError, RunError
@@ -22,7 +22,7 @@ from pin_nonideal.types import Array, Model
 from .actuation import delayed_torque
 from .analysis import check_user_functions, has_rates, without_functions, zero_rows
 from .constraints import anchor_frames
-from .contact_groups import Groups, contacts_of_points, grouped_rows, points_by_pair
+from .contact_groups import Descriptions, Groups, contacts_of_points, grouped_rows, points_by_pair
 from .delay import DelayedTorque
 from .error_context import Circumstances, named_failure
 from .lowering import lower
@@ -93,9 +93,7 @@ class CompiledScene:
             name: (s.start, s.stop, k >= constraints)
             for k, (name, s) in enumerate(self.multipliers.slices.items())
         }
-        self.described = {
-            name: described[name if name in described else name.rpartition(" ")[0]] for name in self.slices
-        }
+        self.described = Descriptions(described, pairs, self.contact_of, self.slices)
         self.joints = joint_places(model)
         self.block_names = block_names(self.program)
         self.point_names = [self.block_names[block] for block in self.program.contacts]
@@ -233,7 +231,8 @@ class CompiledScene:
 
 def _frames_of(contact: object) -> tuple[str, str]:
     """Return the frames of a contact, empty for the world or if it has none."""
-    contact = point_contacts([contact])[0]
+    contact = contact_parts([contact])[0]
+    contact = contact.like if isinstance(contact, CapsulePairs) else contact
     first = getattr(contact, "frame", None) or getattr(contact, "frame1", None)
     second = getattr(contact, "plane", None) or getattr(contact, "frame2", None)
     return (str(first or ""), str(second or ""))

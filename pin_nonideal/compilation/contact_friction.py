@@ -12,6 +12,7 @@ import pinocchio as pin
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.constraints import Rolling
 from pin_nonideal.description.contacts import Contact, UserContact
+from pin_nonideal.description.contacts.pair_of_shapes import CapsulePairs
 from pin_nonideal.description.contacts.round import BoxContact
 from pin_nonideal.description.contacts.solids import (
     CylinderContact,
@@ -32,7 +33,7 @@ SAMPLE_DISPLACEMENTS = (0.0, 0.1, 1.0)
 
 
 def lower_contact_friction(
-    c: Contact | Rolling,
+    c: Contact | CapsulePairs | Rolling,
     name: str,
     out: core.Builder,
     context: LoweringContext,
@@ -40,12 +41,26 @@ def lower_contact_friction(
     """Add the friction elements of a contact: sliding, spinning about the normal, and rolling resistance.
 
     Args:
-        c: description of a contact or of a rolling constraint.
+        c: description of a contact or of a rolling constraint, or pairs of capsules.
         name: its unique name.
         out: the program under construction.
         context: names of the scene.
     """
     if not (getattr(c, "mu", 0.0) or getattr(c, "torsional", 0.0) or getattr(c, "rolling", 0.0)):
+        return
+    if isinstance(c, CapsulePairs):
+        like = c.like
+        lines1, lines2 = context.resolver.capsule_pairs(c, words(like, name))
+        out.add_capsule_pair_friction(
+            c.name,
+            c.number,
+            lines1=lines1,
+            lines2=lines2,
+            radius1=like.radius1,
+            first=context.reactions.blocks[name],
+            mu=like.mu,
+            static_ratio=like.static_ratio,
+        )
         return
     law = out.add_law(name)
     slip = _user_slip if isinstance(c, UserContact) else _flat_slip if hasattr(c, "plane") else _round_slip

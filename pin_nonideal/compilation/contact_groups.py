@@ -6,7 +6,7 @@ of the core to the contacts of the user.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -101,6 +101,42 @@ class Groups:
         return np.select(found, [SLIP_PLUS, SLIP_MINUS, STICK], OPEN).astype(np.int8)
 
 
+class Descriptions(Mapping[str, object]):
+    """Description of each constraint and contact point by name; both stops of a joint share one.
+
+    Args:
+        described: descriptions that were added one by one.
+        pairs: pairs of shapes, whose points are described on request.
+        contact_of: contact of each point of the pairs with several points.
+        names: names of all constraints and contact points.
+    """
+
+    def __init__(
+        self,
+        described: Mapping[str, object],
+        pairs: Iterable[PairOfShapes],
+        contact_of: Mapping[str, str],
+        names: Collection[str],
+    ) -> None:
+        self._described, self._contact_of, self._names = described, contact_of, names
+        self._pairs = {pair.name: pair for pair in pairs}
+
+    def __getitem__(self, name: str) -> object:
+        """Return the description of a constraint or contact point."""
+        base, _, number = name.rpartition(" ")
+        if name in self._contact_of:
+            return self._pairs[base].points[int(number) - 1]
+        return self._described[name if name in self._described else base]
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the names."""
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        """Return the number of names."""
+        return len(self._names)
+
+
 class RowGroups(NamedTuple):
     """Rows of the core by the rows of the user: a pair of shapes has one, and its multiplier is a sum.
 
@@ -135,8 +171,8 @@ def points_by_pair(contacts: Iterable[object]) -> dict[str, list[str]]:
     Args:
         contacts: descriptions, with pairs of shapes in place of their descriptions.
     """
-    pairs = [c for c in contacts if isinstance(c, PairOfShapes) and len(c.points) > 1]
-    return {pair.name: [str(getattr(point, "name", "")) for point in pair.points] for pair in pairs}
+    named = ((c.name, c.names) for c in contacts if isinstance(c, PairOfShapes))
+    return {pair: names for pair, names in named if len(names) > 1}
 
 
 def contacts_of_points(pairs: Mapping[str, Sequence[str]]) -> dict[str, str]:

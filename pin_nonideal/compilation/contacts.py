@@ -18,6 +18,7 @@ from pin_nonideal.description.contacts import (
     SphereContact,
     UserContact,
 )
+from pin_nonideal.description.contacts.pair_of_shapes import CapsulePairs
 from pin_nonideal.description.contacts.solids import (
     CylinderContact,
     EllipsoidContact,
@@ -39,17 +40,17 @@ NO_LIMIT = np.finfo(float).max
 
 
 def lower_contacts(
-    contacts: Sequence[tuple[str, Contact]],
+    contacts: Sequence[tuple[str, Contact | CapsulePairs]],
     contact_of: Mapping[str, str],
     out: core.Builder,
     resolver: Resolver,
-) -> Iterator[tuple[str, Contact]]:
+) -> Iterator[tuple[str, Contact | CapsulePairs]]:
     """Add the normal rows of all contacts; `lower_contact_friction` adds their friction after all rows.
 
     Bilateral contacts are added before unilateral contacts. Their rows are in the order of the descriptions.
 
     Args:
-        contacts: unique names and descriptions.
+        contacts: unique names and descriptions; `CapsulePairs` have the name of their first contact.
         contact_of: contact of each point of the pairs of shapes with several points.
         out: the program under construction.
         resolver: frames and joints by name.
@@ -60,14 +61,14 @@ def lower_contacts(
     Raises:
         InputError, UnknownNameError: a frame or joint does not exist or does not fit.
     """
-    kinds = get_args(Contact)
+    kinds = (*get_args(Contact), CapsulePairs)
     for name, c in contacts:
         if not isinstance(c, kinds):
             known = ", ".join(kind.__name__ for kind in get_args(Contact))
             raise InputError(f"a contact must be one of {known}; got {short_repr(c)}")
         if isinstance(c, JointLimit):
             _check_limit(c, words(c, name), resolver)
-    blocks: dict[int, list[int]] = {}
+    blocks: dict[int, Sequence[int]] = {}
     for opens in (False, True):
         for i, (name, c) in enumerate(contacts):
             if getattr(c, "unilateral", True) is opens:
@@ -81,15 +82,23 @@ def lower_contacts(
     )
 
 
-def lower_gaps(c: Contact, name: str, out: core.Builder, resolver: Resolver) -> list[int]:
+def lower_gaps(c: Contact | CapsulePairs, name: str, out: core.Builder, resolver: Resolver) -> Sequence[int]:
     """Add the normal rows of one contact and return the indices of its blocks.
 
     Args:
-        c: the description.
+        c: the description, or pairs of capsules.
         name: its unique name.
         out: the program under construction.
         resolver: frames and joints by name.
     """
+    if isinstance(c, CapsulePairs):
+        like = c.like
+        lines1, lines2 = resolver.capsule_pairs(c, words(like, name))
+        radius = like.radius1 + like.radius2
+        first = out.add_capsule_pairs(
+            c.name, c.number, lines1=lines1, lines2=lines2, radius=radius, restitution=like.restitution
+        )
+        return range(first, first + len(c))
     if isinstance(c, JointLimit):
         return _stops(c, name, out, resolver)
     if isinstance(c, PointContact):

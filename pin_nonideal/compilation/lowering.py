@@ -7,9 +7,9 @@ from functools import partial
 from typing import Any, NamedTuple
 
 from pin_nonideal.core_loader import core
-from pin_nonideal.description.constraints import Constraint, Rolling
-from pin_nonideal.description.contacts import Contact, JointLimit
-from pin_nonideal.description.contacts.pair_of_shapes import point_contacts
+from pin_nonideal.description.constraints import Rolling
+from pin_nonideal.description.contacts import JointLimit
+from pin_nonideal.description.contacts.pair_of_shapes import contact_parts
 from pin_nonideal.description.scene_spec import SceneSpec
 from pin_nonideal.states.rows import row_slices
 
@@ -47,11 +47,11 @@ class LoweredScene(NamedTuple):
     """A scene that has been added to the builder.
 
     Attributes:
-        described: constraints and contacts by their unique names.
+        described: constraints and contacts by their unique names, `CapsulePairs` by their first name.
         prepare: functions of drives that runs call before their first step, see `BoundDrive`.
     """
 
-    described: dict[str, Constraint | Contact]
+    described: dict[str, object]
     prepare: list[Callable[[], object]]
 
 
@@ -84,7 +84,7 @@ def lower_stepwise(spec: SceneSpec, builder: core.Builder, resolver: Resolver) -
     used_names: set[str] = set()
     constraint_names = unique_names(spec.constraints, used_names)
     unique_names(spec.contacts, set(used_names))  # contacts, before their points
-    contacts: list[Any] = point_contacts(spec.contacts)
+    contacts: list[Any] = contact_parts(spec.contacts)
     contact_names = unique_names(contacts, used_names)
     law_names = unique_names(spec.laws, set())
     for c, name in zip(spec.constraints, constraint_names, strict=True):

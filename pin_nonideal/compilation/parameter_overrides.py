@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.contacts.base import similar
-from pin_nonideal.description.contacts.pair_of_shapes import PairOfShapes
+from pin_nonideal.description.contacts.pair_of_shapes import PairOfShapes, split
 from pin_nonideal.errors import InputError, UnknownNameError, nearest, short_repr
 from pin_nonideal.geometry.from_model import GeometryContact
 from pin_nonideal.types import Array, Table
@@ -124,6 +124,7 @@ def _parts(compiled: CompiledScene) -> dict[str, list[tuple[LoweredItem, _Relowe
     kinds: dict[str, str] = {}
     begin = 0
     pairs = {c.name: c.given for c in spec.contacts if isinstance(c, PairOfShapes)}
+    spec = spec._replace(contacts=tuple(split(c) for c in spec.contacts))
     for item in lower_stepwise(spec, builder, Resolver(compiled.model, compiled.q0)):
         if item.kind == "contact" and (contact := compiled.contact(item.name)) in pairs:
             item = _of_pair(item, contact, pairs[contact])

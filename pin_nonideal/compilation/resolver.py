@@ -11,6 +11,7 @@ import pinocchio as pin
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.constraints import HingeAnchor, Rolling
 from pin_nonideal.description.contacts import PointContact
+from pin_nonideal.description.contacts.pair_of_shapes import CapsulePairs
 from pin_nonideal.description.contacts.round import (
     BoxContact,
     CapsuleContact,
@@ -145,11 +146,23 @@ class Resolver:
         """Return frames at the segment centers, z along the segments, and the half lengths [m]."""
         self._two_bodies(c, who)
         ends1, ends2 = segments(c)
-        first, half1 = self._segment(c.frame1, ends1, who)
-        second, half2 = self._segment(c.frame2, ends2, who)
+        first, half1 = self.segment(c.frame1, ends1, who)
+        second, half2 = self.segment(c.frame2, ends2, who)
         return first, second, half1, half2
 
-    def _segment(self, frame: str, ends: Segment, who: str) -> tuple[Frame, float]:
+    def capsule_pairs(
+        self, pairs: CapsulePairs, who: str
+    ) -> tuple[list[tuple[Frame, float]], list[tuple[Frame, float]]]:
+        """Return frames at the centers of all segments, z along them, and the half lengths [m]."""
+        c = pairs.like
+        self._two_bodies(c, who)
+        return (
+            [self.segment(c.frame1, ends, who) for ends in pairs.lines1],
+            [self.segment(c.frame2, ends, who) for ends in pairs.lines2],
+        )
+
+    def segment(self, frame: str, ends: Segment, who: str) -> tuple[Frame, float]:
+        """Return the frame at the center of a segment, z along it, and its half length [m]."""
         key = frame, ends
         if key not in self._segments:
             self._segments[key] = along(self.frame(frame, who), np.array(ends), who)
@@ -284,7 +297,7 @@ def unique_names(descriptions: Sequence[object], used_names: set[str]) -> list[s
     """Return a unique name for each description: the user's name, or the kind with its frames or joints.
 
     Args:
-        descriptions: constraints, laws or contacts.
+        descriptions: constraints, laws or contacts; `CapsulePairs` get the name of their first contact.
         used_names: names in use; extended by this function.
 
     Raises:
@@ -292,6 +305,12 @@ def unique_names(descriptions: Sequence[object], used_names: set[str]) -> list[s
     """
     names = []
     for d in descriptions:
+        if isinstance(d, CapsulePairs):
+            if taken := used_names.intersection(d.names):
+                raise InputError(f'names must be unique in a scene; "{min(taken)}" is used twice')
+            used_names.update(d.names)
+            names.append(d.names[0])
+            continue
         own = getattr(d, "name", None)
         if own:
             if own in used_names:

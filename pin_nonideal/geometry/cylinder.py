@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 import pinocchio as pin
 
 from pin_nonideal.description.contacts.base import similar
+from pin_nonideal.description.contacts.pair_of_shapes import CapsulePairs
 from pin_nonideal.description.contacts.round import CapsuleContact, Segment
 from pin_nonideal.description.contacts.solids import CylinderContact
 from pin_nonideal.errors import InputError
@@ -119,12 +119,12 @@ def capsule_pairs(
     radius1: float,
     radius2: float,
     options: Table,
-) -> list[CapsuleContact]:
+) -> list[CapsulePairs]:
     """Return the contacts of each of some capsules with each of other capsules."""
     if not (lines1 and lines2):
         return []
     first = CapsuleContact(frame1, frame2, lines1[0], lines2[0], radius1, radius2, **options)
-    return [similar(first, segment1=one, segment2=other) for one, other in product(lines1, lines2)]
+    return [CapsulePairs(first, tuple(lines1), tuple(lines2))]
 
 
 def end_coordinates(solid: Shape, inset: float) -> tuple[float, float]:

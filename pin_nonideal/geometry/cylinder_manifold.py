@@ -13,7 +13,8 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 
-from pin_nonideal.description.contacts.round import CapsuleContact, Segment
+from pin_nonideal.description.contacts.pair_of_shapes import CapsulePairs
+from pin_nonideal.description.contacts.round import Segment
 from pin_nonideal.description.contacts.solids import CylinderContact, RevolvedContact
 from pin_nonideal.errors import InputError
 from pin_nonideal.types import Table
@@ -43,7 +44,7 @@ MIN_RIM_DISTANCE = 2.0
 
 def cylinder_contacts(
     who: str, first: Shape, second: Shape, rounding: float | None, options: Table
-) -> list[CylinderContact | CapsuleContact | RevolvedContact]:
+) -> list[CylinderContact | CapsulePairs | RevolvedContact]:
     """Return the contacts of two cylinders or cones.
 
     Args:
@@ -63,7 +64,7 @@ def cylinder_contacts(
             f"{who}: rounding must be less than {MAX_ROUNDING:g} of the largest ball inside both, of radius "
             f"{ball:g} m; got {inset:g} m"
         )
-    contacts: list[CylinderContact | CapsuleContact | RevolvedContact] = []
+    contacts: list[CylinderContact | CapsulePairs | RevolvedContact] = []
     core, other_core = (
         _core(inset_side(solid, inset, SIDE_INSET * inset), inset) for solid in (first, second)
     )

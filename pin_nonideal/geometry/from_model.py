@@ -311,8 +311,8 @@ def _manifold(
     ground, thing = (first, second) if first.normal is not None else (second, first)
     base = c.name or f"{thing.name} on {ground.name}"
     options = {"mu": c.mu, "static_ratio": c.static_ratio, "restitution": c.restitution}
-    points = manifold(who, first, second, c.rounding, base, options)
-    return PairOfShapes(c, base, (first.name, second.name), tuple(points))
+    parts = manifold(who, first, second, c.rounding, base, options)
+    return PairOfShapes(c, base, (first.name, second.name), parts)
 
 
 def _shape(

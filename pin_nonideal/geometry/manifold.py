@@ -12,6 +12,7 @@ import pinocchio as pin
 from pin_nonideal.description.contacts import PointContact
 from pin_nonideal.description.contacts.base import similar
 from pin_nonideal.description.contacts.convex_hull import convex_hull, shrunk
+from pin_nonideal.description.contacts.pair_of_shapes import CapsulePairs, numbered
 from pin_nonideal.description.contacts.round import BoxContact, CapsuleContact, Segment
 from pin_nonideal.description.contacts.solids import (
     CylinderContact,
@@ -45,6 +46,7 @@ from .shapes import CORNERS, Shape
 ManifoldContact = (
     PointContact
     | CapsuleContact
+    | CapsulePairs
     | BoxContact
     | CylinderContact
     | EllipsoidContact
@@ -60,8 +62,8 @@ MAX_CONTACTS = 1000
 
 def manifold(
     who: str, first: Shape, second: Shape, rounding: float | None, base: str, options: Table
-) -> list[ManifoldContact]:
-    """Return the contacts of one pair of shapes.
+) -> tuple[object, ...]:
+    """Return the parts of the manifold of one pair of shapes: contacts, and contacts of all their edges.
 
     Args:
         who: prefix of error messages.
@@ -101,9 +103,7 @@ def manifold(
                 "a half-space with any other shape is one, and so are spheres, capsules, boxes, convex "
                 "meshes, cylinders and cones with each other: use PointContact for the places that touch"
             )
-    return [
-        similar(c, name=base if len(contacts) == 1 else f"{base} {k + 1}") for k, c in enumerate(contacts)
-    ]
+    return numbered(contacts, base)
 
 
 def _half_space_contacts(

@@ -41,7 +41,7 @@ MatX dependence(const std::vector<Block>& blocks, const std::vector<double>& B, 
         weights.noalias() = used.transpose() * rest;
         for (Eigen::Index k = 0; k < rest.cols(); ++k) {
             for (size_t l = 0; l < rows.size(); ++l) product[rows[l]] = weights(l, k);
-            solve_rows(s, product, weight);
+            solve_active_rows(s, product, weight);
             for (size_t l = 0; l < rows.size(); ++l) weights(l, k) = weight[rows[l]];
         }
         W += weights.transpose();

@@ -135,8 +135,12 @@ PN_WIDE void factor_rows(const std::vector<Block>& blocks, const std::vector<dou
     if (s.orthogonal) factor_orthogonally(blocks, B, s);
 }
 
-PN_WIDE void solve_rows(RowSystem& s, const VecX& r, VecX& lam) {
+void solve_rows(RowSystem& s, const VecX& r, VecX& lam) {
     lam.setZero();
+    solve_active_rows(s, r, lam);
+}
+
+PN_WIDE void solve_active_rows(RowSystem& s, const VecX& r, VecX& lam) {
     if (s.orthogonal) return solve_orthogonally(s, r, lam);
     const Envelope& envelope = s.envelope;
     const double* L = s.factor.data();

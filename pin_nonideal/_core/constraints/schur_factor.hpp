@@ -9,6 +9,8 @@ namespace pn {
 void factor_rows(const std::vector<Block>& blocks, const std::vector<double>& B, RowSystem& s);
 // Solve (B B^T) lam = r on the active rows (zero on the others). r and lam are by kept row.
 void solve_rows(RowSystem& s, const VecX& r, VecX& lam);
+// Compute the entries of the active rows only. The other entries of lam must be zero.
+void solve_active_rows(RowSystem& s, const VecX& r, VecX& lam);
 
 // Steps before a factorization: compute G = B B^T, and the inverse lengths of its rows.
 void delassus(const std::vector<Block>& blocks, const std::vector<double>& B, RowSystem& s);

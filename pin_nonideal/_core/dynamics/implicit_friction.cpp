@@ -231,7 +231,7 @@ struct Implicit : Unknowns {
 
     void solve() {
         VecX &kept = w.state.unknown, &y = w.scratch.unknown;
-        y.setZero();
+        y.head(n).setZero();
         const bool is_warm = w.state.warm;
         if (is_warm)
             exchange([&](int k, int place, int count) { y.segment(k, count) = kept.segment(place, count); });
@@ -256,13 +256,11 @@ struct Implicit : Unknowns {
 
 // Compute loads from the ideal motion, as in Example (c) of the paper. The laws with these loads are then known.
 static void ideal_loads(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
-    bool has_ideal_reaction = false;
-    for (const Friction& f : p.frictions) has_ideal_reaction |= f.reaction == Reaction::ideal;
+    bool has_ideal_reaction = !p.elements_of_ideal_loads.empty();
     each_law<UserLaw>(p.laws, [&](const UserLaw& law) { has_ideal_reaction |= law.reaction == Reaction::ideal; });
     if (!has_ideal_reaction) return;
     const IdealMotion motion(p, w);
-    for (size_t e = 0; e < p.frictions.size(); ++e)
-        if (p.frictions[e].reaction == Reaction::ideal) update_limit(p, w, e, t, q, v);
+    for (int e : p.elements_of_ideal_loads) update_limit(p, w, e, t, q, v);
     each_law<UserLaw>(p.laws, [&](const UserLaw& law) {
         if (law.reaction == Reaction::ideal) w.now.base_C += user_law_force(p, law, w, t, q, v);
     });
@@ -271,8 +269,7 @@ static void ideal_loads(const Program& p, Workspace& w, double t, const VecX& q,
 void find_known_forces(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
     w.now.C_smooth.setZero();
     add_smooth_forces(p, w, t, q, v, w.now.C_smooth);
-    for (size_t e = 0; e < p.frictions.size(); ++e)
-        if (p.frictions[e].reaction == Reaction::none) update_limit(p, w, e, t, q, v);
+    for (int e : p.elements_without_reaction) update_limit(p, w, e, t, q, v);
     add_slip_forces(p, w, false, w.now.C_smooth);
 }
 

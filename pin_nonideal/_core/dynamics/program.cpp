@@ -198,7 +198,14 @@ void Program::finish() {
         f.row = blocks[f.anchor].user_row + f.anchor_row;
         if (described.rows[f.row].kept < 0) f.load = Friction::Load::none;
     }
-    for (const Friction& f : frictions) needs_reactions |= f.reaction != Reaction::none;
+    elements_without_reaction.clear();
+    elements_of_ideal_loads.clear();
+    for (int e = 0; e < static_cast<int>(frictions.size()); ++e) {
+        const Reaction reaction = frictions[e].reaction;
+        needs_reactions |= reaction != Reaction::none;
+        if (reaction == Reaction::none) elements_without_reaction.push_back(e);
+        if (reaction == Reaction::ideal) elements_of_ideal_loads.push_back(e);
+    }
     has_contact_friction_only = laws.empty() && std::all_of(frictions.begin(), frictions.end(),
                                                     [](const Friction& f) { return f.gap >= 0; });
     // Group laws by kind, so that the order of their descriptions does not affect rounding.

@@ -55,6 +55,7 @@ struct Program {
 
     std::vector<std::string> law_names;
     std::vector<Friction> frictions;
+    std::vector<int> elements_without_reaction, elements_of_ideal_loads;  // friction elements by their reaction
     std::vector<Law> laws;
     int user_laws = 0;
     int states = 0;  // number of states of all laws

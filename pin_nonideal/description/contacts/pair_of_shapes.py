@@ -2,8 +2,53 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
+from typing import TypeVar
+
+from .base import similar
+from .round import CapsuleContact, Segment
+
+C = TypeVar("C")
+
+
+@dataclass(frozen=True)
+class CapsulePairs:
+    """Contacts of each of some capsules of a body with each of other capsules of another body.
+
+    Attributes:
+        like: the contact of the first two capsules, whose fields the other contacts share.
+        lines1: segments of the first capsules in the axes of frame1 [m].
+        lines2: segments of the second capsules in the axes of frame2 [m].
+        name: name of the pair of shapes.
+        number: number of the first contact among the points of the pair of shapes.
+    """
+
+    like: CapsuleContact
+    lines1: tuple[Segment, ...]
+    lines2: tuple[Segment, ...]
+    name: str = ""
+    number: int = 1
+
+    def __len__(self) -> int:
+        return len(self.lines1) * len(self.lines2)
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the contacts: of the pair of shapes and a number."""
+        return [f"{self.name} {number}" for number in range(self.number, self.number + len(self))]
+
+    @property
+    def mu(self) -> float:
+        """Coefficient of friction."""
+        return self.like.mu
+
+    def contacts(self) -> Iterator[CapsuleContact]:
+        """Yield the description of each contact."""
+        for name, (one, other) in zip(self.names, product(self.lines1, self.lines2), strict=True):
+            yield similar(self.like, segment1=one, segment2=other, name=name)
 
 
 @dataclass(frozen=True)
@@ -14,14 +59,51 @@ class PairOfShapes:
         given: description of the pair by the user.
         name: name of the pair.
         shapes: names of both shapes.
-        points: contacts of the manifold. If there are several, their names are the name of the pair and a
-            number.
+        parts: contacts of the manifold, or `CapsulePairs`. If there are several contacts, their names are the
+            name of the pair and a number.
     """
 
     given: object
     name: str
     shapes: tuple[str, str]
-    points: tuple[object, ...]
+    parts: tuple[object, ...]
+
+    @cached_property
+    def points(self) -> tuple[object, ...]:
+        """Contacts of the manifold."""
+        return tuple(point for part in self.parts for point in _contacts(part))
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the contacts of the manifold."""
+        parts = (
+            p.names if isinstance(p, CapsulePairs) else [str(getattr(p, "name", ""))] for p in self.parts
+        )
+        return [name for names in parts for name in names]
+
+
+def _contacts(part: object) -> Iterable[object]:
+    return part.contacts() if isinstance(part, CapsulePairs) else (part,)
+
+
+def numbered(parts: Iterable[object], name: str) -> tuple[object, ...]:
+    """Return the parts of a manifold with names: the name of the pair, and a number if there are several.
+
+    Args:
+        parts: contacts without names, or `CapsulePairs`.
+        name: name of the pair.
+    """
+    named: list[object] = []
+    number, given = 1, list(parts)
+    count = sum(len(part) if isinstance(part, CapsulePairs) else 1 for part in given)
+    for part in given:
+        if isinstance(part, CapsulePairs):
+            named.append(replace(part, name=name, number=number))
+            number += len(part)
+        else:
+            named.append(similar(part, name=name if count == 1 else f"{name} {number}"))
+            number += 1
+    return tuple(named)
 
 
 def given_contacts(contacts: Iterable[object]) -> tuple[object, ...]:
@@ -33,10 +115,28 @@ def given_contacts(contacts: Iterable[object]) -> tuple[object, ...]:
     return tuple(c.given if isinstance(c, PairOfShapes) else c for c in contacts)
 
 
+def contact_parts(contacts: Iterable[object]) -> list[object]:
+    """Return contacts, with the parts of pairs of shapes in place of the pairs.
+
+    Args:
+        contacts: descriptions, with pairs of shapes in place of their descriptions.
+    """
+    return [each for c in contacts for each in (c.parts if isinstance(c, PairOfShapes) else (c,))]
+
+
 def point_contacts(contacts: Iterable[object]) -> list[object]:
     """Return contacts, with the points of pairs of shapes in place of the pairs.
 
     Args:
         contacts: descriptions, with pairs of shapes in place of their descriptions.
     """
-    return [each for c in contacts for each in (c.points if isinstance(c, PairOfShapes) else (c,))]
+    return [each for part in contact_parts(contacts) for each in _contacts(part)]
+
+
+def split(contact: C) -> C:
+    """Return a contact; each point of a pair of shapes is then a part of its own.
+
+    Args:
+        contact: a description, or a pair of shapes.
+    """
+    return replace(contact, parts=contact.points) if isinstance(contact, PairOfShapes) else contact

@@ -1,0 +1,63 @@
+#include "python/capsule_pairs.hpp"
+
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
+
+using namespace nanobind::literals;
+
+namespace pn {
+
+namespace {
+
+using Line = std::tuple<FrameTuple, double>;  // frame at the center, z along the line, and half the length
+
+// Call `add` with the name and both lines of each pair. Names are numbered from `number` on.
+template <class Add>
+void each_pair(const std::string& name, int number, const std::vector<Line>& lines1, const std::vector<Line>& lines2,
+               const Add& add) {
+    std::vector<std::pair<Frame, double>> others;
+    for (const auto& [frame, half] : lines2) others.emplace_back(frame_of(frame), half);
+    for (const auto& [tuple, half1] : lines1) {
+        const Frame frame1 = frame_of(tuple);
+        for (const auto& [frame2, half2] : others)
+            add(name + " " + std::to_string(number++), frame1, frame2, half1, half2);
+    }
+}
+
+}  // namespace
+
+void bind_capsule_pairs(nb::class_<Builder>& builder) {
+    builder
+        .def("add_capsule_pairs", [](Builder& b, const std::string& name, int number, const std::vector<Line>& lines1,
+                                     const std::vector<Line>& lines2, double radius, double restitution) {
+            const int first = static_cast<int>(b.p->blocks.size());
+            each_pair(name, number, lines1, lines2,
+                      [&](const std::string& own, const Frame& f1, const Frame& f2, double half1, double half2) {
+                b.add(own, CapsuleCapsuleRow{{}, f1, f2, half1, half2, radius}, Role::contact);
+                b.set_unilateral(restitution);
+            });
+            return first;
+        }, "name"_a, "number"_a, "lines1"_a, "lines2"_a, "radius"_a, "restitution"_a)
+        .def("add_capsule_pair_friction", [](Builder& b, const std::string& name, int number,
+                                             const std::vector<Line>& lines1, const std::vector<Line>& lines2,
+                                             double radius1, int first, double mu, double static_ratio) {
+            int anchor = first;
+            each_pair(name, number, lines1, lines2,
+                      [&](const std::string& own, const Frame& f1, const Frame& f2, double half1, double half2) {
+                Friction f;
+                f.name = own;
+                f.law = b.add_law(own);
+                f.block = b.add(own, CapsuleCapsuleSlipRows{{}, f1, f2, half1, half2, radius1}, Role::direction);
+                f.dim = b.p->blocks[f.block].total;
+                f.load = Friction::Load::multiplier;
+                f.reaction = Reaction::total;
+                f.anchor = anchor++;
+                f.mu = mu;
+                f.static_ratio = static_ratio;
+                b.p->frictions.push_back(std::move(f));
+            });
+        }, "name"_a, "number"_a, "lines1"_a, "lines2"_a, "radius1"_a, "first"_a, "mu"_a, "static_ratio"_a);
+}
+
+}  // namespace pn
