@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pin_nonideal.core_loader import core
-from pin_nonideal.description.contacts.pair_of_shapes import PairOfShapes
+from pin_nonideal.description.contacts.pair_of_shapes import CapsulePairs, PairOfShapes
 from pin_nonideal.types import Array
 
 # Modes of friction elements.
@@ -127,6 +127,15 @@ class Descriptions(Mapping[str, object]):
         if name in self._contact_of:
             return self._pairs[base].points[int(number) - 1]
         return self._described[name if name in self._described else base]
+
+    def single(self) -> Iterator[tuple[str, object]]:
+        """Yield names and descriptions, without contacts of `CapsulePairs`."""
+        for name in self._names:
+            if name in self._described:
+                if not isinstance(self._described[name], CapsulePairs):
+                    yield name, self._described[name]
+            elif name not in self._contact_of:
+                yield name, self[name]
 
     def __iter__(self) -> Iterator[str]:
         """Iterate over the names."""

@@ -51,8 +51,11 @@ def loads_on_bodies(run: RunFields) -> Iterator[Load]:
     """
     compiled = compiled_scene(run.scene)
     resolver = Resolver(compiled.model, compiled.q0)
-    for name, c in compiled.described.items():
-        if name in reactions_of(run) and (frames := _frames(c, name, resolver)):
+    for name in compiled.described:
+        if name not in reactions_of(run):
+            continue
+        c = compiled.described[name]
+        if frames := _frames(c, name, resolver):
             yield from _pair(run, name, c, *frames)
     for name in compiled.points:
         if name in reactions_of(run):

@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 
 import pin_nonideal as pn
-from pin_nonideal.description.contacts.pair_of_shapes import point_contacts
+from pin_nonideal.description.contacts.pair_of_shapes import PairOfShapes
 from pin_nonideal.scene.scene import compiled_scene
 
 
 def points_of(scene: pn.Scene) -> list[Any]:
     """Return the descriptions of all contacts of the core, in the order of their rows."""
-    return point_contacts(compiled_scene(scene).spec.contacts)
+    contacts = compiled_scene(scene).spec.contacts
+    return [point for c in contacts for point in (c.points if isinstance(c, PairOfShapes) else (c,))]
 
 
 def point_loads(run: pn.Trajectory) -> np.ndarray:

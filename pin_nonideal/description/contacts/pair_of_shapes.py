@@ -45,6 +45,11 @@ class CapsulePairs:
         """Coefficient of friction."""
         return self.like.mu
 
+    def sides(self) -> tuple[tuple[str, tuple[Segment, ...], float], tuple[str, tuple[Segment, ...], float]]:
+        """Return frame, segments and radius of the capsules of each body."""
+        c = self.like
+        return (c.frame1, self.lines1, c.radius1), (c.frame2, self.lines2, c.radius2)
+
     def contacts(self) -> Iterator[CapsuleContact]:
         """Yield the description of each contact."""
         for name, (one, other) in zip(self.names, product(self.lines1, self.lines2), strict=True):
@@ -122,15 +127,6 @@ def contact_parts(contacts: Iterable[object]) -> list[object]:
         contacts: descriptions, with pairs of shapes in place of their descriptions.
     """
     return [each for c in contacts for each in (c.parts if isinstance(c, PairOfShapes) else (c,))]
-
-
-def point_contacts(contacts: Iterable[object]) -> list[object]:
-    """Return contacts, with the points of pairs of shapes in place of the pairs.
-
-    Args:
-        contacts: descriptions, with pairs of shapes in place of their descriptions.
-    """
-    return [each for part in contact_parts(contacts) for each in _contacts(part)]
 
 
 def split(contact: C) -> C:

@@ -65,9 +65,8 @@ def contact_points(run: Trajectory, motion: Motion) -> list[ContactPoint]:
     struck, points = {str(event.element) for event in run.events}, getattr(run, "points", None)
     touched = set() if points is None else set(points.names)
     touched |= set(names) - set(compiled.contact_of) - (open_contacts(run) - struck)
-    chosen = [
-        k for k, name in enumerate(names) if hasattr(compiled.described[name], "plane") or name in touched
-    ]
+    on_planes = {name for name, item in compiled.described.single() if hasattr(item, "plane")}
+    chosen = [k for k, name in enumerate(names) if name in on_planes or name in touched]
     chosen_names = [names[k] for k in chosen]
     places, normals = contact_lines(compiled, motion.q, motion.times, chosen_names)
     closed = _closed_mask(run, chosen_names)

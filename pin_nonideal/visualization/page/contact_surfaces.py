@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.description.contacts import JointLimit
-from pin_nonideal.description.contacts.pair_of_shapes import point_contacts
+from pin_nonideal.description.contacts.pair_of_shapes import CapsulePairs, contact_parts
 from pin_nonideal.description.contacts.round import CapsuleContact, SphereContact
 from pin_nonideal.scene.scene import compiled_scene
 from pin_nonideal.states.kinematics import frame_on_joint
@@ -58,7 +58,7 @@ class Plane:
 def planes_of(compiled: CompiledScene) -> list[Plane]:
     """Return the planes of all contacts and rolling bodies, without duplicates."""
     model, planes = compiled.model, list[Plane]()
-    for item in [*point_contacts(compiled.spec.contacts), *compiled.spec.constraints]:
+    for item in [*contact_parts(compiled.spec.contacts), *compiled.spec.constraints]:
         name = getattr(item, "plane", "")
         if not hasattr(item, "normal") or (name is not None and not (name and model.existFrame(name))):
             continue
@@ -113,12 +113,15 @@ def contact_surfaces(
 def _round_bodies(compiled: CompiledScene) -> list[Visual]:
     """Return the spheres and capsules in contact with each other, for a scene without shapes."""
     sides: dict[tuple[Any, ...], None] = {}  # ordered set, since many contacts share a shape
-    for item in point_contacts(compiled.spec.contacts):
+    for item in contact_parts(compiled.spec.contacts):
         if isinstance(item, SphereContact):
             sides[item.frame1, CENTER, item.radius1] = sides[item.frame2, CENTER, item.radius2] = None
         elif isinstance(item, CapsuleContact):
             sides[item.frame1, item.segment1, item.radius1] = None
             sides[item.frame2, item.segment2, item.radius2] = None
+        elif isinstance(item, CapsulePairs):
+            for frame, lines, radius in item.sides():
+                sides |= {(frame, line, radius): None for line in lines}
     bodies: dict[tuple[str, bytes], Visual] = {}
     for frame, segment, radius in sides:
         start, end = np.array(segment)
@@ -161,7 +164,7 @@ def _stops(run: Trajectory, motion: Motion) -> list[Visual]:
     stops = []
     model = run.scene.model
     limits = {"lower": model.lowerPositionLimit, "upper": model.upperPositionLimit}
-    for name, item in compiled_scene(run.scene).described.items():
+    for name, item in compiled_scene(run.scene).described.single():
         if isinstance(item, JointLimit) and name in struck:
             joint, end = model.getJointId(item.joint), name.rpartition(" ")[2]
             stated = getattr(item, end)

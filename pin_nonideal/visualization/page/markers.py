@@ -94,7 +94,7 @@ def marks_of(compiled: CompiledScene, held: Sequence[Constraint] | None = None) 
         for name, item, shown in (constraints_of(compiled) if held is None else held)
         if shown in (core.DisplayKind.anchor, core.DisplayKind.rod)
     ]
-    for name, item in compiled.described.items():
+    for name, item in compiled.described.single():
         if isinstance(item, PointContact):
             side = side_of(compiled.model, item.frame)
             point, contact = side.placement.act(np.array(item.offset)), compiled.contact_of.get(name, name)
