@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from pin_nonideal.compilation.constraints import lower_constraint
+from pin_nonideal.compilation.contact_groups import Descriptions
 from pin_nonideal.compilation.contacts import lower_contacts
 from pin_nonideal.compilation.resolver import Resolver
 from pin_nonideal.core_loader import core
@@ -62,7 +63,7 @@ def run_of(model: pin.Model, t: Any, q: Callable[[float], Any], **fields: Any) -
         model=model,
         q0=scene.q0,
         program=_program(scene, names),
-        described=dict(zip(names, held, strict=True)),
+        described=described(names, held),
         slices=scene.constraint_slices,
         rows=scene.constraint_slices,
         multipliers=SimpleNamespace(slices=scene.constraint_slices),
@@ -92,6 +93,11 @@ def run_of(model: pin.Model, t: Any, q: Callable[[float], Any], **fields: Any) -
     values["joints"] = joint_places(model)
     values["rows"] = {name: (s.start, s.stop, False) for name, s in scene.constraint_slices.items()}
     return KnownRun(**values | fields)
+
+
+def described(names: list[str], held: list[Any]) -> Descriptions:
+    """Return descriptions by name, without pairs of shapes."""
+    return Descriptions(dict(zip(names, held, strict=True)), (), {}, names)
 
 
 def _program(scene: Any, names: list[str]) -> Any:

@@ -25,7 +25,7 @@ from pin_nonideal.visualization.page.force_arrows import arrows_of
 from pin_nonideal.visualization.page.frames import sample
 from pin_nonideal.visualization.page.markers import marks_of
 
-from ..support.replay_runs import add_frame, four_bar, jointed, run_of
+from ..support.replay_runs import add_frame, described, four_bar, jointed, run_of
 
 ROUNDING = 1e-12
 # Closure of the four-bar in closed form: a few roundings of 1 m through an arc cosine.
@@ -208,7 +208,7 @@ def test_constraints_of_pinocchio_are_drawn_like_anchors() -> None:
             pin.ReferenceFrame.LOCAL,
         )
     ]
-    run.scene._compiled.described = dict(zip(["loop"], run.scene.constraints, strict=True))
+    run.scene._compiled.described = described(["loop"], run.scene.constraints)
     found = arrows(run)
     assert [(arrow.name, arrow.kind) for arrow in found] == [(arrow.name, arrow.kind) for arrow in expected]
     np.testing.assert_allclose(found[0].values, expected[0].values, atol=ROUNDING)
