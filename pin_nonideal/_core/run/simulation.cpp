@@ -317,7 +317,7 @@ bool Simulation::recover(const Failure& failure) {
     const bool of_hand_over =
         (at_hand_over && ModeChanges::is_of_closed_contacts(failure)) || modes.is_of_contradicting_contacts(failure);
     const bool of_drive = modes.contradicts_drive(failure);
-    const bool is_recoverable = of_hand_over || ModeChanges::is_recoverable(failure);
+    const bool is_recoverable = of_hand_over || ModeChanges::is_recoverable(failure) || modes.takes_any_motion(failure);
     if (!can_switch_modes && !is_recoverable && !of_drive) return false;
     bool has_switched = false;
     attempt([&] {  // a failure means that the current modes have no motion at the step's start

@@ -81,6 +81,11 @@ bool ModeChanges::is_recoverable(const Failure& failure) {
     return failure.kind == Failure::Kind::step_size || (is_of_modes(failure) && !shown);
 }
 
+bool ModeChanges::takes_any_motion(const Failure& failure) const {
+    return w.continues && system_.ng > 0 && failure.kind == Failure::Kind::paradox &&
+           failure.solutions != Failure::Solutions::none;
+}
+
 bool ModeChanges::can_switch_modes(const Failure& failure) const {
     const double spacing = mode_change_parameters.forced_switch_spacing * tiny_step_at(progress_.t);
     return is_of_modes(failure) && options_.method.adaptive() && system_.ng > 0 &&
@@ -173,7 +178,8 @@ bool ModeChanges::is_of_contradicting_contacts(const Failure& failure) const {
 }
 
 bool ModeChanges::bridge_with_time_stepping(const Failure& failure, bool of_hand_over) {
-    if (!of_hand_over && !is_recoverable(failure)) return false;
+    const bool takes_any = takes_any_motion(failure);
+    if (!of_hand_over && !takes_any && !is_recoverable(failure)) return false;
     if (options_.method.outside() || !(system_.ne > 0 || system_.ng > 0)) return false;
     const bool of_elements = system_.ne > 0 && is_of_modes(failure) && failure.kind != Failure::Kind::unmet_law &&
                              !failure.elements.empty();
@@ -181,7 +187,7 @@ bool ModeChanges::bridge_with_time_stepping(const Failure& failure, bool of_hand
     const bool creeps = is_creeping();
     const double spacing = mode_change_parameters.forced_switch_spacing * tiny_step_at(progress_.t);
     if (creeps && p.gaps.empty() && progress_.t > progress_.rest_time + spacing && come_to_rest()) return true;
-    if (!(of_hand_over || is_undecided(failure) || chatter_.is_zeno() || creeps)) return false;
+    if (!(of_hand_over || is_undecided(failure) || takes_any || chatter_.is_zeno() || creeps)) return false;
     bridge(element);
     return true;
 }
@@ -198,7 +204,8 @@ void ModeChanges::bridge(int element) {
         chatter_.bridge_stretch(element, options_.end());
         const auto again = attempt([&] { select_new_modes(); });
         if (!again) return;
-        const bool goes_on = (is_of_modes(*again) && is_recoverable(*again)) || is_of_contradicting_contacts(*again);
+        const bool goes_on = (is_of_modes(*again) && is_recoverable(*again)) || takes_any_motion(*again) ||
+                             is_of_contradicting_contacts(*again);
         if (system_.ng == 0 || !goes_on) throw *again;
     } while (progress_.t < options_.end());
 }
