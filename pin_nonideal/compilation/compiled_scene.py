@@ -178,7 +178,7 @@ class CompiledScene:
         """
         if not self.unchecked:
             return
-        check_user_functions(self.model, q, v, t, self.described, self.program)
+        check_user_functions(self.model, q, v, t, dict(self.described.single()), self.program)
         self.unchecked = False
 
     def project(

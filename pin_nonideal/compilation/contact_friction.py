@@ -32,6 +32,15 @@ from .resolver import Frame, Resolver, rotated_frame, words
 SAMPLE_DISPLACEMENTS = (0.0, 0.1, 1.0)
 
 
+def has_friction(c: object) -> bool:
+    """Check if a contact has sliding friction, or resists spinning or rolling.
+
+    Args:
+        c: description of a contact or of a rolling constraint.
+    """
+    return any(getattr(c, key, 0.0) > 0.0 for key in ("mu", "torsional", "rolling"))
+
+
 def lower_contact_friction(
     c: Contact | CapsulePairs | Rolling,
     name: str,
@@ -46,7 +55,7 @@ def lower_contact_friction(
         out: the program under construction.
         context: names of the scene.
     """
-    if not (getattr(c, "mu", 0.0) or getattr(c, "torsional", 0.0) or getattr(c, "rolling", 0.0)):
+    if not has_friction(c):
         return
     if isinstance(c, CapsulePairs):
         like = c.like

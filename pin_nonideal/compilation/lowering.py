@@ -9,14 +9,14 @@ from typing import Any, NamedTuple
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.constraints import Rolling
 from pin_nonideal.description.contacts import JointLimit
-from pin_nonideal.description.contacts.pair_of_shapes import contact_parts
+from pin_nonideal.description.contacts.pair_of_shapes import contact_parts, given_contacts
 from pin_nonideal.description.scene_spec import SceneSpec
 from pin_nonideal.states.rows import row_slices
 
 from .actuation import lower_actuation
 from .callbacks import ReactionNames
 from .constraints import lower_constraint
-from .contact_friction import lower_contact_friction
+from .contact_friction import has_friction, lower_contact_friction
 from .contact_groups import contacts_of_points, grouped_rows, points_by_pair
 from .contacts import lower_contacts, lower_gaps
 from .forces import lower_force
@@ -83,10 +83,12 @@ def lower_stepwise(spec: SceneSpec, builder: core.Builder, resolver: Resolver) -
     """
     used_names: set[str] = set()
     constraint_names = unique_names(spec.constraints, used_names)
-    unique_names(spec.contacts, set(used_names))  # contacts, before their points
+    own_names = unique_names(spec.contacts, set(used_names))  # of contacts, before their points
     contacts: list[Any] = contact_parts(spec.contacts)
     contact_names = unique_names(contacts, used_names)
-    law_names = unique_names(spec.laws, set())
+    given = given_contacts(spec.contacts)
+    rubbing_names = {name for name, c in zip(own_names, given, strict=True) if has_friction(c)}
+    law_names = unique_names(spec.laws, rubbing_names)  # a contact with friction has a law of its name
     for c, name in zip(spec.constraints, constraint_names, strict=True):
         lower_constraint(c, name, builder, resolver)
         yield LoweredItem("constraint", name, c, partial(_relower, lower_constraint, name, resolver))

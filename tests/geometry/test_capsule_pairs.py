@@ -11,11 +11,12 @@ import pin_nonideal as pn
 from pin_nonideal.compilation.lowering import lower
 from pin_nonideal.compilation.resolver import Resolver
 from pin_nonideal.core_loader import core
-from pin_nonideal.description.contacts.pair_of_shapes import CapsulePairs, split
+from pin_nonideal.description.contacts.pair_of_shapes import CapsulePairs, numbered, split
 from pin_nonideal.scene.scene import compiled_scene
 
 EDGES = 12
 CORNERS = 8
+LINE = ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 
 
 def boxes(count: int = 3, mu: float = 0.4) -> pn.Scene:
@@ -76,6 +77,26 @@ def test_a_name_of_a_point_is_refused_twice() -> None:
     own = pn.PointContact("box 0", radius=0.01, name=f"{compiled_scene(scene).spec.contacts[-1].name} 40")
     with pytest.raises(pn.InputError, match='40" is used twice'):
         pn.Scene(scene.model, contacts=[own, pair], collision_model=scene.collision_model)
+
+
+def test_a_law_with_the_name_of_a_contact_with_friction_is_refused() -> None:
+    """The friction of the contact is a law of this name."""
+    scene = boxes(2)
+    law = pn.JointFriction("box 0", viscous=0.1, name=scene.contact_names[-1])
+    with pytest.raises(pn.InputError, match="names must be unique"):
+        pn.Scene(scene.model, contacts=scene.contacts, laws=[law], collision_model=scene.collision_model)
+    smooth = boxes(2, mu=0.0)
+    again = pn.Scene(
+        smooth.model, contacts=smooth.contacts, laws=[law], collision_model=smooth.collision_model
+    )
+    assert again.law_names == [law.name]
+
+
+def test_one_pair_of_capsules_has_no_number() -> None:
+    pairs = CapsulePairs(pn.CapsuleContact("a", "b", LINE, LINE, 0.1), (LINE,), (LINE,))
+    (single,) = numbered([pairs], "pair")
+    assert single.name == "pair"
+    assert [part.name for part in numbered([pairs.like, pairs], "pair")] == ["pair 1", "pair 2"]
 
 
 def test_the_violation_of_a_sample_is_that_of_all_contacts() -> None:

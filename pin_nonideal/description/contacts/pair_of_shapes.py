@@ -99,7 +99,8 @@ def numbered(parts: Iterable[object], name: str) -> tuple[object, ...]:
         name: name of the pair.
     """
     named: list[object] = []
-    number, given = 1, list(parts)
+    number = 1
+    given = [part.like if isinstance(part, CapsulePairs) and len(part) == 1 else part for part in parts]
     count = sum(len(part) if isinstance(part, CapsulePairs) else 1 for part in given)
     for part in given:
         if isinstance(part, CapsulePairs):

@@ -42,8 +42,7 @@ struct GapState {
     explicit GapState(size_t gaps = 0, size_t groups = 0, bool round = false)
         : width(gaps, 0.0), rate(gaps, 0.0), separation(round ? gaps : 0), monitored(gaps, 0), skipped(gaps, 0),
           path_length(gaps, 0.0), turn(gaps, 0.0), distance(gaps, 0.0), group_recheck(groups, 0.0),
-          blocked_since(gaps, 0.0),
-          retry_time(gaps, -HUGE_VAL) {}
+          blocked_since(gaps, 0.0), retry_time(gaps, -HUGE_VAL) {}
     void keep(int gap, const GapSample& sample);
     void list_monitored();
     // Recheck a group at this travel of the scene, or before.
@@ -123,8 +122,8 @@ private:
     const Program& p;
     Workspace& w;
     std::vector<int> unsampled_;
-    // Groups of gaps between the same two bodies that follow each other: group of each gap, and first gap of each group
-    // with the number of gaps at the end.
+    // Groups of gaps between the same two bodies that follow each other: group of each gap, and first gap of each group,
+    // then the number of gaps.
     std::vector<int> group_, first_of_group_;
     TravelState ahead_;
     std::vector<char> open_;
