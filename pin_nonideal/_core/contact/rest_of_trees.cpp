@@ -13,7 +13,7 @@ bool rest_on_trees(const Program& p, Workspace& w, const std::vector<int>& gaps,
     TreeBlocks blocks(p);
     const std::vector<char>& locked = w.now.terms.locked;
     const bool separate = w.now.rows.blocks.empty() && std::find(locked.begin(), locked.end(), char(1)) == locked.end();
-    if (!separate || !blocks.applies(p)) return false;
+    if (!separate || !blocks.applies()) return false;
     std::vector<StepRow> rows;
     for (size_t i = 0; i < cones.size(); ++i) {
         int k = 0;

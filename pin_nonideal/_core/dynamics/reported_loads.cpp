@@ -71,7 +71,7 @@ bool share_tree_by_tree(const Program& p, const Workspace& w, const StickingShar
                         VecX& f) {
     TreeBlocks trees(p);
     BlockSolver solver;
-    const bool fits = trees.applies(p) && trees.fill(p, w, shares.of_blocks, shares.cones, solver.problem);
+    const bool fits = trees.applies() && trees.fill(p, w, shares.of_blocks, shares.cones, solver.problem);
     if (!fits || !solver.pose()) return false;
     solver.problem.offset.setZero(solver.problem.rows);
     solver.release(VecX::Zero(p.mechanism.nv), -of_rows);

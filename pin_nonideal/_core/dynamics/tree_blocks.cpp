@@ -3,10 +3,15 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tree/articulated.hpp"
+
 namespace pn {
 
 // Ratio of the pivots of one tree beyond which the forces on its bodies lose too many digits.
 constexpr double max_pivot_ratio = 1e6;
+// Largest number of dofs of a deep tree whose inertia becomes a matrix. The cost of its factor grows by the cube of the
+// number, and rounding by the fourth power of the depth.
+constexpr int max_deep_dofs = 200;
 
 TreeBlocks::TreeBlocks(const Program& p) : size_(p.mechanism.nv, 0), node_(p.mechanism.nv, -1) {
     const Mechanism& m = p.mechanism;
@@ -14,7 +19,7 @@ TreeBlocks::TreeBlocks(const Program& p) : size_(p.mechanism.nv, 0), node_(p.mec
         const int root = m.dof_parent[dof] < 0 ? dof : root_[m.dof_parent[dof]];
         root_.push_back(root);
         local_.push_back(size_[root]++);
-        contiguous_ = contiguous_ && root + local_[dof] == dof;
+        applies_ = applies_ && root + local_[dof] == dof && (!m.is_deep[dof] || size_[root] <= max_deep_dofs);
     }
 }
 
@@ -43,6 +48,10 @@ int TreeBlocks::node_of(const Program& p, const Workspace& w, int root, BlockPro
     if (node >= 0) return node;
     node = static_cast<int>(problem.nodes.size());
     BlockMap M = problem.add_node(size_[root], root);
+    if (p.mechanism.is_deep[root]) {
+        mass_matrix_articulated(p.mechanism, w.now.terms, root, size_[root], composite_, M.data());
+        return node;
+    }
     for (int dof = root; dof < root + size_[root]; ++dof) {
         const int begin = p.mechanism.row_offset[dof];
         for (int s = 0; s <= p.mechanism.depth[dof]; ++s) {

@@ -15,8 +15,8 @@ class TreeBlocks {
 public:
     explicit TreeBlocks(const Program& p);
 
-    // Check if the inertia of every tree is a matrix, in which its dofs follow one another.
-    bool applies(const Program& p) const { return contiguous_ && p.mechanism.deep_dofs.empty(); }
+    // Check if the dofs of every tree follow one another, and no tree is too deep for a matrix of its inertia.
+    bool applies() const { return applies_; }
     // Set the nodes, elements and blocks of a problem in a workspace with M and the rows A. `rows`: rows of the
     // elements, in sequence. Return false if an element moves more than two trees, or if a tree is ill-conditioned.
     bool fill(const Program& p, const Workspace& w, const std::vector<StepRow>& rows,
@@ -29,8 +29,9 @@ private:
     int node_of(const Program& p, const Workspace& w, int root, BlockProblem& problem);
 
     std::vector<int> root_, local_, size_;  // by dof: first dof of its tree, index in it; by first dof: dofs of the tree
-    bool contiguous_ = true;                // the dofs of every tree follow one another
+    bool applies_ = true;
     std::vector<int> node_;                 // node of a tree by first dof, -1 if it takes no part
+    std::vector<ArticulatedInertia> composite_;
 };
 
 }  // namespace pn

@@ -99,4 +99,23 @@ PN_WIDE void multiply_M_articulated(const Mechanism& m, BodyTerms& terms, const 
     }
 }
 
+PN_WIDE void mass_matrix_articulated(const Mechanism& m, const BodyTerms& terms, int first, int size,
+                                     std::vector<ArticulatedInertia>& composite, double* M) {
+    composite.resize(m.joints.size());
+    for (int dof = first; dof < first + size; ++dof)
+        composite[m.dof_joint[dof]] = articulated(terms.body[m.dof_joint[dof]].inertia);
+    for (int dof = first + size - 1; dof >= first; --dof) {
+        int i = m.dof_joint[dof];
+        Force f = composite[i] * terms.J[dof];
+        double* row = M + (dof - first) * size;
+        row[dof - first] = dot(terms.J[dof], f) + m.armature[dof];
+        for (int above = m.dof_parent[dof]; above >= 0; above = m.dof_parent[above]) {
+            for (; i != m.dof_joint[above]; i = m.joints[i].parent) f = before(f, terms.deep.shift[i]);
+            row[above - first] = M[(above - first) * size + dof - first] = dot(terms.J[above], f);
+        }
+        const int own = m.dof_joint[dof], parent = m.joints[own].parent;
+        if (dof == m.joints[own].iv && parent != 0) composite[parent] += before(composite[own], terms.deep.shift[own]);
+    }
+}
+
 }  // namespace pn

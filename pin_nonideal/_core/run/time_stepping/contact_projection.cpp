@@ -203,7 +203,7 @@ bool ContactProjection::project(const Program& p, Workspace& w, double t, double
                                 VecX& v) {
     moved_energy_ = 0.0;
     penetrating_.clear();
-    if (!blocks_.applies(p) || !p.affine_rates) return false;
+    if (!blocks_.applies() || !p.affine_rates) return false;
     w.now.renew();
     place_bodies(p.mechanism, w.now.terms, q);
     place_rows(p, w, t, v);

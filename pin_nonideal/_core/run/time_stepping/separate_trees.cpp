@@ -11,7 +11,7 @@ SeparateTrees::SeparateTrees(const Program& p) : blocks_(p) {}
 // Check if the scene can be solved tree by tree now: no constraints act, and the inertia of every tree is a matrix.
 bool SeparateTrees::applies(const Program& p, const Workspace& w) const {
     const std::vector<char>& locked = w.now.terms.locked;
-    return blocks_.applies(p) && w.now.rows.blocks.empty() &&
+    return blocks_.applies() && w.now.rows.blocks.empty() &&
            std::find(locked.begin(), locked.end(), char(1)) == locked.end();
 }
 
