@@ -140,8 +140,8 @@ void BoxProgram::descend(const MatX& W, const VecX& alpha0, const VecX& s) {
     }
 }
 
-// Sweeps over the elements: each takes the best force within its limits for the forces of the others. The elements at their
-// limits after a few sweeps are a better set to pivot from than the ones among which pivoting makes no progress.
+// Sweeps over the elements: each takes the best force within its limits for the forces of the others. If block pivoting
+// makes no progress, the elements that are at their limits after a few sweeps are a better start for it.
 void BoxProgram::relax(const MatX& W, const VecX& alpha0, const VecX& s) {
     const int n = static_cast<int>(s.size());
     f_ = f_.cwiseMin(s).cwiseMax(-s);
@@ -152,8 +152,9 @@ void BoxProgram::relax(const MatX& W, const VecX& alpha0, const VecX& s) {
     for (int i = 0; i < n; ++i) is_free_[i] = std::abs(f_[i]) < s[i];
 }
 
-// Block principal pivoting. Once it makes no progress, it starts again from relaxed forces, and at last pivots one element
-// (largest index). Return false if the free elements cannot all stick, or if pivoting does not end.
+// Block principal pivoting. If the pivoting makes no progress, it starts again from relaxed forces. After the last of
+// these starts it exchanges one element at a time (largest index). Return false if the free elements cannot all stick,
+// or if pivoting does not end.
 bool BoxProgram::pivot_blocks(const MatX& W, const VecX& alpha0, const VecX& s) {
     const int n = static_cast<int>(s.size());
     int fewest = n + 1, patience = parameters.max_stalled_rounds, relaxations = parameters.max_relaxations;

@@ -33,8 +33,8 @@ public:
     // Solve for f. `initial` holds the forces of a similar program (warm start), and its set of forces at their limits is
     // tried first. f may be the same vector as `initial`.
     void solve(const MatX& W, const VecX& alpha0, const VecX& s, const VecX* initial, VecX& f);
-    // Compute the minimum-norm x with W x = r, for a symmetric positive semidefinite W. If no x gives all of r, x gives
-    // a part of it.
+    // Compute the minimum-norm x with W x = r, for a symmetric positive semidefinite W. If this equation has no
+    // solution, the residual of x is not zero.
     void solve_all(const MatX& W, const VecX& r, VecX& x);
 
 private:

@@ -9,8 +9,9 @@
 namespace pn {
 
 struct LoadSharing {
-    long long factorization = 0;         // RowSystem::factorization for which the matrices hold
-    std::vector<char> active, required;  // rows for which they hold
+    // Number of the factorization (RowSystem::factorization) for which the matrices are valid.
+    long long factorization = 0;
+    std::vector<char> active, required;  // rows for which the matrices are valid
 
     std::vector<int> dependent;  // required rows that depend on the active rows
     MatX W;                      // their coefficients: A_dependent = W A_active

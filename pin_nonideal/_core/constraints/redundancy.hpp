@@ -29,7 +29,7 @@ struct DescribedRows {
     };
     std::vector<Row> rows;     // constraints and contacts in their order, then directions of friction
     VecX weight;               // by kept row: sum of the squared factors of the rows that it represents
-    std::vector<char> yields;  // by kept row: belongs to friction that carries only loads that constraints cannot
+    std::vector<char> yields;  // by kept row: belongs to friction that carries only loads that constraints cannot carry
     bool copied = false;       // some kept row represents several rows
 
     // Compute parts and weights once all rows are known.
@@ -54,7 +54,7 @@ void share_multipliers(const std::vector<Block>& blocks, const std::vector<doubl
                        const DescribedRows& all, RowSystem& s, const VecX& lam, VecX& shared);
 
 // Basis of the multipliers by kept row that together exert no force. The basis is orthonormal in the norm of the described
-// rows. It has entries for the rows in use only, which may be a small part of all rows.
+// rows. The basis has entries for the rows in use only, which may be a small part of all rows.
 class FreeMultipliers {
 public:
     FreeMultipliers(const Envelope& envelope, const MatX& basis) : envelope_(envelope), basis_(basis) {}

@@ -31,8 +31,8 @@ enum class DisplayKind {
     gear      // the generalized forces on two joints
 };
 
-// Bases of kinds. They hold what their kinds share by definition, and the properties that are safe to assume: other kinds
-// declare these again.
+// Bases of kinds. A base holds the properties that its kinds share by definition, and safe defaults of other
+// properties. A kind with another value declares the property again.
 
 // Base of constraints.
 struct ConstraintKind {

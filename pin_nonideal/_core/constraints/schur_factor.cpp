@@ -62,7 +62,7 @@ void scale_to_unit_length(const std::vector<char>& use, RowSystem& s) {
 }
 
 // Return the least square of a row's length over that of the longest row of its block, among blocks with comparable
-// rows. Sets `vanishes` if a row of any block is rounding beside another row.
+// rows. Set `vanishes` if a row of any block is so much shorter than another row that it is rounding.
 static PN_INLINE double shortest_row(const std::vector<Block>& blocks, const RowSystem& s, bool& vanishes) {
     double shortest = 1.0;
     for (int index : s.blocks) {

@@ -227,7 +227,8 @@ void select_active_contacts(const Program& p, Workspace& w, double t, const VecX
         if (joint_motion && joint_motion->closed == query.rest && !joint_motion->slides())
             return close(joint_motion->closed, &*joint_motion);
         if (joint_motion && joint_motion->shared) {
-            // Load shares of slipping contacts follow friction, unlike shares of the cone problem.
+            // The friction of sliding contacts follows loads of minimum norm. The cone problem has other shares, so its
+            // motion is then only a guess.
             joint_motion->is_initial_guess = joint_motion->slides();
             return close(joint_motion->closed, &*joint_motion);
         }
@@ -246,7 +247,8 @@ void select_active_contacts(const Program& p, Workspace& w, double t, const VecX
     const bool undecided = unsolved->kind == Failure::Kind::not_converged;
     if (!undecided && !many) throw *unsolved;
     joint_motion = solve_jointly();
-    // Modes with a negative determinant are those of one motion of several. The joint motion is another one.
+    // Modes with a negative determinant belong to one of several motions. The cone problem of all contacts gives
+    // another motion.
     const bool one_of_several = unsolved->solutions == Failure::Solutions::unproven && !unsolved->accelerations.empty();
     if (!joint_motion || !(undecided || one_of_several || joint_motion->shared)) throw *unsolved;
     if (one_of_several) {

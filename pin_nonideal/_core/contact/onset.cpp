@@ -27,7 +27,8 @@ bool fits(const Program& p) {
     return known;
 }
 
-// Check if all contacts rest, and forces of the laws at rest hold them. Small problems need no help of this kind.
+// Check if all contacts rest, and forces of the laws at rest hold them. Small problems are not tested, because the cone
+// problem decides them fast enough.
 bool rests_at_once(const Program& p, Workspace& w, const VecX& v, const OnsetQuery& query,
                    const std::vector<int>& gaps, const std::vector<int>& others) {
     if (static_cast<int>(gaps.size()) < many || !query.at_limit.empty() || p.moves_in_time) return false;

@@ -1,5 +1,5 @@
 // Onset of motion of contacts at rest, for all contacts together, by the cone problem of resting_problem.hpp. If all
-// contacts rest, forces of the laws on separate trees may show it sooner.
+// contacts rest and no constraint joins the trees, the faster solver of rest_of_trees.hpp may show that rest lasts.
 #pragma once
 
 #include <optional>

@@ -46,7 +46,7 @@ bool rubs_the_same(const Friction& a, const Friction& b) {
            a.stribeck_velocity == b.stribeck_velocity && a.dim == b.dim && !a.user_limit && !b.user_limit;
 }
 
-// Check if friction and restitution are equal. Parameters of a program may differ between runs.
+// Check if two contacts have equal friction and restitution. The runs of a batch may have other values than the scene.
 bool rub_and_bounce_the_same(const Program& p, const Gap& a, const Gap& b) {
     return a.restitution == b.restitution && (a.sliding < 0) == (b.sliding < 0) &&
            std::equal(a.elements.begin(), a.elements.end(), b.elements.begin(), b.elements.end(), [&](int e, int other) {

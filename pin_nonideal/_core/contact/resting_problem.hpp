@@ -54,7 +54,8 @@ public:
     using Parameters = RestingProblemParameters;
     static constexpr Parameters parameters{};
 
-    bool several = false;  // another motion was found too: from rest that holds, or from a motion with several solutions
+    // Another motion was found too: motion where rest is possible, or a further solution of the problem.
+    bool several = false;
 
     // Set up the problem of the closed contacts `gaps` and of other friction elements at rest. The workspace must hold
     // the motion without their forces.

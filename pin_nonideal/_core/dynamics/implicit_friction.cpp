@@ -26,8 +26,8 @@ struct Implicit : Unknowns {
                                          : 1);
     }
 
-    // Check if the equation contracts for any limits, which proves that its solution y is unique. The motion in the
-    // workspace stays that of y.
+    // Check if the equation contracts for any limits, which proves that its solution y is unique. The workspace keeps
+    // the motion for y.
     bool contracts(const VecX& y, bool by_trees) {
         MatX& L = w.scratch.jacobian;
         if (by_trees) bound_loads_of_trees(*this, L);

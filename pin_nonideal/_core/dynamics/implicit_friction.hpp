@@ -17,8 +17,9 @@ struct ImplicitFrictionParameters {
     double slow_change = 1e-13;         // slowly contracting changes above this are iterated further
     double max_contraction = 0.25;      // slower fixed-point iterations switch to Newton's method
     int fixed_point_limit = 30;         // maximum fixed-point iterations: 27 contract by 0.25 to rounding
-    // Growth of the equation below which a uniqueness proof stays valid for max(n, kept_steps) steps. The proof then
-    // costs about one motion per step. The growth does not rise from this value to one in so short a time.
+    // Bound on the largest eigenvalue of |dg/dy|, the growth, below which a uniqueness proof stays valid for max(n,
+    // kept_steps) steps. The proof then costs about one motion per step. The growth does not rise from this value to
+    // one in so short a time.
     double safe_growth = 0.5;
     int kept_steps = 4;                   // minimum number of steps for which a uniqueness proof stays valid
     double min_zero_load_step = 0x1p-10;  // smallest fraction of the step to a solution of another zero-load set

@@ -152,8 +152,8 @@ struct LoadedTrees {
         w.counters.iterations += u.n;
     }
 
-    // Set the motion of the last step for the limits y. Its acceleration has the accuracy of the sweep, which in shallow
-    // trees is below that of the factor of M.
+    // Set the motion of the last step for the limits y. This acceleration has the accuracy of the sweep. In shallow
+    // trees the factor of M is more accurate.
     void accept(const VecX& y) {
         u.set(y);
         int k = 0;

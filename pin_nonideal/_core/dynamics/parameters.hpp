@@ -8,8 +8,9 @@
 
 namespace pn {
 
-// Name of a number: call of the builder that made its owner, index of this call, and argument. A "body" is named by its
-// joint, with "mass", "com" and the columns "inertia x", "inertia y" and "inertia z". "gravity" has no owner.
+// Name of a number: call of the builder that added the law, force, contact or actuation with this number, index of this
+// call, and argument. The call "body" has the index of a joint and the arguments "mass", "com" and the columns "inertia
+// x", "inertia y" and "inertia z". The call "gravity" needs no index.
 struct NumberName {
     std::string call;
     int index;

@@ -35,7 +35,7 @@ double row_size(const Program& p, const Workspace& w, const Block& block, size_t
     return size;
 }
 
-// Factor that gives residuals of a user's row in other units about the size of those in meters.
+// Factor that scales the residual of a user's row in other units to about the size of a residual in meters.
 double unit_factor(const Program& p, const Workspace& w, const Block& block, size_t k) {
     const double size = row_size(p, w, block, k), small = projection_parameters.small_row;
     if (size == 0.0) return 1.0;

@@ -28,8 +28,8 @@ bool project(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
 void project_and_evaluate(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
 
 // Close the gaps of rows that count as dependent. Active rows that become short over a step magnify the residuals of
-// other rows. Project onto the longest rows at this position. Their number is kept, because off the constraints dependent
-// rows appear independent.
+// other rows. Project onto the longest rows at this position. The number of rows is kept, because off the constraints
+// dependent rows appear independent.
 bool project_onto_dependent(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
 // Close the gaps of rows that count as dependent while elements stick. Sticking elements hold these rows with parts of
 // their forces below rank_tolerance_sticking, and creep by the same ratio.

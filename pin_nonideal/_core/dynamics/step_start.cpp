@@ -43,7 +43,7 @@ static double unseen(const Program& p, Workspace& w, const VecX& v) {
                          (scaled_length(p, w, w.now.a) + speed * v.cwiseAbs().maxCoeff());
 }
 
-// Find the block with the largest residual of its dependent rows. Return -1 if all dependent rows are met.
+// Find the block with the largest residual of its dependent rows. Return -1 if the motion satisfies all dependent rows.
 static int contradicting_block(const Program& p, Workspace& w, const VecX& v, double& worst) {
     int worst_block = -1;
     double excess = 1.0;

@@ -35,7 +35,7 @@ double determinant_at(const ReactionEquation& equation, const VecX& y) {
     return ReactionNewton().factorize(equation, y);
 }
 
-// Sort solutions: least sensitive to the loads first (regular determinant), then by distance to `start`.
+// Sort solutions by their distance to `start`. Solutions with a negative or vanishing determinant come last.
 void sort_by_distance(const ReactionEquation& equation, const VecX& start, std::vector<VecX>& roots) {
     VecX size = start;
     for (const VecX& y : roots) size = size.cwiseMax(y);

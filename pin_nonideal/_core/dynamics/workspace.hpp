@@ -69,7 +69,8 @@ struct RunState {
     VecX third_order_gap;         // third-order part of the gaps that a step closes, divided by its cubed length
     bool has_ideal_row_choice = false;   // rows that are independent without sticking elements are chosen for this step
     Uniqueness unique = Uniqueness::shown;  // uniqueness of the motion in these modes, as last decided
-    double spectral_bound = 0.0;            // bound on the growth of the implicit reaction equation at that decision
+    // Bound on the largest eigenvalue of |dg/dy| of the implicit reaction equation at that decision.
+    double spectral_bound = 0.0;
     int steps_since = undecided_steps;        // steps since that decision
 
     bool sticks_anywhere() const { return std::find(mode.begin(), mode.end(), sticking) != mode.end(); }
@@ -110,7 +111,7 @@ struct Evaluation {
     std::vector<int> loaded_elements, slipping;  // elements with load (sticking or slipping), and slipping elements
     std::vector<double> A, B;
     // Number of rows of constraints that depend on others, at the start of the last time step whose rows were chosen. A
-    // negative number is not known.
+    // negative value means that the number is not known.
     int dependent_at_start = -1;
     RowSystem rows, ideal_rows;  // ideal: of the constraints without sticking elements (see IdealMotion)
     VecX b, lam;  // by kept row

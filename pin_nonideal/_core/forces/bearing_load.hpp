@@ -33,7 +33,8 @@ struct BearingLoad {
             if (coefficients[k] != 0.0) sum += vectors[k].norm();
         return sum;
     }
-    // Derivative of the size by the wrench. The size is homogeneous: its derivative times the wrench is the size.
+    // Derivative by the wrench of the size, the sum of coefficients times lengths. The size is homogeneous: its
+    // derivative times the wrench is the size.
     PN_INLINE Motion gradient() const {
         Vec3 along[3];
         for (int k = 0; k < 3; ++k) {

@@ -165,9 +165,10 @@ struct Search {
         return size <= noise || along >= (1.0 - stick_slip_parameters.max_direction_deviation) * size;
     }
 
-    // Solve for the directions of elements that begin to slip in several directions, from nearby ones: each is that of the
-    // slip acceleration under the friction along all of them. Accelerations at an onset exactly at the limits define no
-    // direction, which then stays. Return false if the iteration does not converge.
+    // Solve for the slip directions of elements that begin to slip in several directions, from nearby directions. Each
+    // direction equals the direction of the slip acceleration under the friction along all directions. An acceleration
+    // of zero, at an onset exactly at the limits, leaves the direction unchanged. Return false if the iteration does
+    // not converge.
     bool settle_directions() {
         std::vector<int> turning;
         for (int e : list)

@@ -1,6 +1,7 @@
 // Acceleration of a fixed-point iteration x := g(x) by its last residuals (D. G. Anderson, "Iterative procedures for
 // nonlinear integral equations", J. ACM 12, 1965; H. F. Walker, P. Ni, SIAM J. Numer. Anal. 49, 2011). With one unknown
-// this is the secant method. If g moves further than x, the fixed point is unstable, and plain iterations leave it.
+// this is the secant method. If the change of g(x) exceeds the change of x, the fixed point is unstable, and iterations
+// without acceleration move away from it.
 #pragma once
 
 #include "math/spatial.hpp"

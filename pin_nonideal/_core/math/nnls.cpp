@@ -130,7 +130,7 @@ VecX nonnegative_least_squares(const MatX& A, const VecX& b) {
 VecX min_violation(const MatX& Z, const VecX& N) {
     if (N.size() == 0 || N.minCoeff() >= 0.0) return VecX::Zero(N.size());
     const MatX P = complement_of(Z);
-    const VecX off = P * (N - nonnegative_least_squares(P, P * N));  // Z z takes up the rest
+    const VecX off = P * (N - nonnegative_least_squares(P, P * N));  // the rest of N lies in the range of Z
     const double noise = nnls_parameters.rounding * static_cast<double>(N.size()) * largest(N);
     return off.unaryExpr([noise](double x) { return x < -noise ? -x : 0.0; });
 }

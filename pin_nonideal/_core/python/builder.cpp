@@ -63,7 +63,7 @@ std::shared_ptr<const Program> Builder::finish() const {
 
 namespace {
 
-// User function of t, q, v and the reactions. It returns the limits (forward, backward).
+// User function of t, q, v and the reactions. The function returns the limits (forward, backward).
 using UserLimit = Function<std::pair<double, double>(double, Numbers, Numbers, ReactionView)>;
 
 // Bind friction elements, which act along their directions of slip.

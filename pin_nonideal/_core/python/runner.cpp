@@ -318,8 +318,8 @@ Options& Runner::read(const nb::object& run_options) {
     return options;
 }
 
-// Check if a run records only samples of states. Such a run is kept for the next call, because very many short calls
-// are alike.
+// Check if a run records only samples of states. The object of such a run is kept for the next call, because programs
+// often make very many short runs with the same options.
 static bool is_plain(const Options& o) {
     return !o.record.evaluates() && !o.record.dense && o.max_wall == 0.0 && o.events.empty() &&
            !o.callback && !o.save;

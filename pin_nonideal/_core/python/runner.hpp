@@ -39,8 +39,8 @@ struct Runner {
 
     explicit Runner(std::shared_ptr<const Program> program);
 
-    // Return the converted options of a run. They are converted again only if the object differs from that of the last
-    // run.
+    // Return the converted options of a run. The options are converted again only if the object differs from the object
+    // of the last run.
     Options& read(const nb::object& run_options);
 
     // Write the acceleration into `out`, an array of nv numbers. Uses plain buffers, for calls in tight loops.

@@ -122,7 +122,7 @@ protected:
     RunState before_step;      // run state at the step's start, set if `watched`
     VecX guess;                // loads at the step's start, the initial guess of its first stage
     std::vector<Force> guessed_wrench;  // wrenches of these loads
-    bool has_guessed_wrench = false;    // true if they belong to these loads
+    bool has_guessed_wrench = false;    // true if `guessed_wrench` belongs to the loads in `guess`
     bool has_guess = false;    // true if the loads at the step's start are known
     bool watched = false;      // a contact was closed or an element active at the step's start
     bool hand_over_ahead = false;  // the step ends before a hand-over

@@ -21,7 +21,7 @@ struct Joint {
     bool unbounded = false;  // configuration is (cos, sin) of the angle
     int parent = 0, root = 0;
     bool deep = false;       // belongs to a deep tree: its body has its own reference point at the joint
-    int reference = 0;       // joint of the tree's reference point: the first that turns, or the root
+    int reference = 0;       // joint of the tree's reference point: the first joint that rotates, or the root
     bool recenters = false;  // the reference point moves to this joint, which is not the root
     int iq = 0, iv = 0, nv = 0;
     Mat3 R0 = Mat3::Identity();  // placement in the parent joint's frame

@@ -5,12 +5,12 @@
 
 namespace pn {
 
-// Nodes that elements connect, directly or through others, and these elements.
+// Island: nodes that elements connect, directly or through other nodes, and these elements.
 struct Island {
     std::vector<int> nodes, elements;
 };
 
-// The islands of a problem. Nodes without elements belong to none.
+// The islands of a problem. Nodes without elements belong to no island.
 class Islands {
 public:
     void find(const BlockProblem& p);
@@ -20,7 +20,7 @@ public:
 private:
     Island& of_node(int node);
 
-    std::vector<Island> islands_;  // storage of more islands may remain
+    std::vector<Island> islands_;  // the first size_ islands, and unused storage
     std::vector<int> parent_, number_;
     int size_ = 0;
 };

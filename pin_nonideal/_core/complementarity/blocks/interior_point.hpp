@@ -12,8 +12,8 @@ namespace pn {
 // Numbers are in the problem's units, in which the largest free velocity and the responses are about 1.
 struct BlockInteriorPointParameters {
     int max_steps = 40;              // maximum steps along the path
-    double gap_tolerance = 1e-9;     // mean z . u of the elements at the end, from which Newton's method continues
-    double residual_tolerance = 1e-6;  // largest residual at the end
+    double gap_tolerance = 1e-9;     // mean of force times velocity, z . u, of the elements at the end of the path
+    double residual_tolerance = 1e-6;  // largest residual at the end of the path
     double min_step = 1e-5;          // part of a step below which rounding allows no further progress
     double smooth_speed = 1e-12;     // slip speed below which the direction is undefined
     double proximal = 1e-8;          // weight of the proximal term of elements without a cone
@@ -26,7 +26,8 @@ public:
 
     // follows: the slip speeds mu |w_t| of the correction enter the equations with their derivatives.
     // lags: each step has the slip speeds of the last one. Its equations are symmetric.
-    // none: without the correction, the laws are a convex problem. Its solution rests if any forces hold the bodies.
+    // none: without the correction, the laws are a convex problem. The bodies rest in its solution if any forces within
+    // the cones hold them.
     enum class Slip { follows, lags, none };
 
     // Compute forces f near the end of the path, with their motion x, w. `factor` keeps the order of elimination.
@@ -36,7 +37,7 @@ public:
 
 private:
     struct Point : PathPoint {
-        int row = 0, dim = 0, heads = 0, tails = 0;  // rows: first one, number, of the normal, tangential
+        int row = 0, dim = 0, heads = 0, tails = 0;  // first row, and numbers of all, of normal and of tangential rows
         bool in_path = true;
         double mu = 0.0, root = 1.0;
         double unit[3] = {1.0, 1.0, 1.0};                 // unit of forces, inverse unit of velocities

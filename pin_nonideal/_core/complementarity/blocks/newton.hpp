@@ -3,8 +3,9 @@
 // With y = f - rho w and the projection P of each element (for a contact, P_n = max(0, y_n) and P_T the projection of
 // y_T on the disk of radius mu P_n), the laws hold exactly if
 //     e(f) = P(f - rho w) - f = 0.
-// A step has a proximal term d (f - f_now) / rho. It is exact at a solution, and regular for any redundancy of the rows.
-// With A = dP/dy, S = I - (1 - d) A, z = S^-1 e and G = S^-1 A diag(rho):
+// A step has a proximal term d (f - f_now) / rho. Steps with this term end at a solution of the laws, and their
+// equations are regular for any redundancy of the rows. With A = dP/dy, S = I - (1 - d) A, z = S^-1 e and G = S^-1 A
+// diag(rho):
 //     (M + J^T G J) dx = J^T z,   df = z - G J dx.
 // rho is the inverse of an element's own response. (P. Alart, A. Curnier, "A mixed formulation for frictional contact
 // problems prone to Newton like solution methods", Comput. Methods Appl. Mech. Engrg. 92, 1991.)

@@ -44,7 +44,8 @@ double BlockSolver::newton(int island, BlockNewton::Search search, double compli
     return newton_.solve(problem, islands_[island], factors_[island], search, compliance, f, x_, w_);
 }
 
-// Solve from forces that are close to a solution, which f becomes. Return true if it is one.
+// Solve from forces f that are close to a solution, and keep the best forces so far. Return true if these solve the
+// laws.
 bool BlockSolver::attempt(int island, VecX& f) {
     const double error = newton(island, BlockNewton::Search::patient, 0.0, f);
     if (error < least_) {
@@ -54,8 +55,9 @@ bool BlockSolver::attempt(int island, VecX& f) {
     return least_ <= parameters.tolerance;
 }
 
-// Follow the central path from no forces, and solve from its end. Near the laws of friction the path may break off. With
-// slip speeds that lag it breaks off elsewhere. Return true if f solves the laws.
+// Follow the central path from no forces, and solve from its end. The path may end before the laws of friction hold.
+// Paths with slip speeds of the same step and of the last step fail in different problems. Return true if f solves the
+// laws.
 bool BlockSolver::search_from_path(int island, BlockInteriorPoint::Slip slip, VecX& f) {
     if (steps() > last_step_) return false;
     path_.follow(problem, newton_, islands_[island], factors_[island], slip, f, x_, w_);
@@ -63,7 +65,8 @@ bool BlockSolver::search_from_path(int island, BlockInteriorPoint::Slip slip, Ve
     return attempt(island, f) || least_ <= parameters.near_tolerance;
 }
 
-// Alternate sweeps and Newton's method. Newton's method may cycle between sets of sliding elements, which sweeps leave.
+// Alternate sweeps and Newton's method. Newton's method may cycle between sets of sliding elements, and sweeps break
+// such a cycle.
 bool BlockSolver::settle(int island, VecX& f) {
     swept_ = best_;
     for (int round = 0; round < parameters.max_sweep_rounds && steps() <= last_step_; ++round) {

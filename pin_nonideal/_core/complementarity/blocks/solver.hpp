@@ -7,11 +7,12 @@
 namespace pn {
 
 struct BlockSolverParameters {
-    double tolerance = 1e-9;  // error of a solution. Newton stops at rounding, far below in most problems
-    double near_tolerance = 1e-8;     // error up to which no search starts from no forces, which costs twenty factors
-    double shared_tolerance = 1e-6;   // error of a solution with the compliance that decides shares
-    double shared_compliance = 1e-4;  // compliance that decides shares of a load, relative to an element's own response
-    int min_sharing = 4;              // least number of elements on a single node whose shares are decided
+    double tolerance = 1e-9;  // error of a solution; in most problems Newton's method reaches rounding, which is far smaller
+    // Error that is accepted without a search from zero forces, which would cost twenty factorizations.
+    double near_tolerance = 1e-8;
+    double shared_tolerance = 1e-6;   // error of a solution with `shared_compliance`
+    double shared_compliance = 1e-4;  // compliance that makes shares of a load unique, relative to an element's own response
+    int min_sharing = 4;              // least number of elements of an island whose shares are made unique
     // Maximum rounds of sweeps, and sweeps of a round.
     int max_sweep_rounds = 2, sweeps_per_round = 50;
     double min_swept_error = 1e-2;  // error from which sweeps from no forces replace the best forces found
@@ -42,7 +43,7 @@ public:
     // Hold the islands at rest that forces within the cones can hold, from the forces f of `solve`. Newton's method may
     // find a motion where rest is possible as well. Return false if an island moves.
     bool hold(VecX& f);
-    // Compute the motion under the forces f. `solve` ends with that of its forces.
+    // Compute the motion under the forces f. After `solve` the motion under its forces is known already.
     void move(const VecX& f);
     // Errors of the laws at the last motion. Velocities are relative to those without forces, or to an element's own
     // response to its forces if that is larger.

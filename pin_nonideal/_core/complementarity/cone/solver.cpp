@@ -186,7 +186,8 @@ bool ConeComplementarity::proximal_point(Eigen::Ref<VecX> f) {
     return true;
 }
 
-// Random starts with a fixed seed. Each one gives slip speeds, and the path for fixed slip speeds the next start.
+// Random starts with a fixed seed. Newton's method runs from each start, then from the end of the central path for the
+// slip speeds of its result.
 template <class Accept>
 bool ConeComplementarity::random_restarts(Eigen::Ref<VecX> f, const Accept& accept) {
     std::minstd_rand lot(1);

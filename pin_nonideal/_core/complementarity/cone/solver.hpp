@@ -14,7 +14,7 @@ namespace pn {
 
 struct ConeComplementarityParameters {
     double tolerance = 1e-11;               // error of a solution
-    double no_force = 1e10;                 // larger forces, in the problem's units, only squeeze
+    double no_force = 1e10;                 // larger forces, in the problem's units, squeeze bodies without moving them
     double path_rest_velocity = 1e-7;       // velocity of rest at the end of the central path, relative to the largest w0
     double rest_velocity = 1e-12;           // velocity of rest of a solution, relative to its terms
     double velocity_rounding = 1e-14;       // rounding relative to the largest velocity
@@ -53,8 +53,8 @@ public:
     // negative determinant is therefore one of at least three, and the others are sought from random starts.
     bool replace_reversed(Eigen::Ref<VecX> f);
 
-    // Accept a relative residual up to `max_residual` if no forces meet the laws to rounding. The caller then reports the
-    // residual. By default no residual is accepted.
+    // Accept a relative residual up to `max_residual` if no forces satisfy the laws to rounding. The caller then
+    // reports the residual. By default no residual is accepted.
     void accept_residual(double max_residual) { max_residual_ = max_residual; }
 
     // Use a uniform compliance. If friction depends on shares of a load that W does not determine, several motions may

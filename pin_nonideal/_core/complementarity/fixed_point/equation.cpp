@@ -79,7 +79,7 @@ bool ReactionNewton::solve(const ReactionEquation& equation, VecX& y) {
     return false;
 }
 
-// For any positive u, max (L u)_i / u_i is such a bound (Collatz and Wielandt).
+// For any positive u, max (L u)_i / u_i is an upper bound of the largest eigenvalue (Collatz and Wielandt).
 double spectral_bound(const MatX& L) {
     double best = L.rowwise().sum().maxCoeff();
     if (best <= spectral_bound_parameters.min_improved) return best;

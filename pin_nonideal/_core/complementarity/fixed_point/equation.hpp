@@ -65,8 +65,9 @@ struct ReactionNewton {
     bool solve(const ReactionEquation& equation, VecX& y);
 };
 
-// Return a bound on the largest eigenvalue of a nonnegative matrix, exact in the limit. If it is below 1 for L, g
-// contracts in lengths with positive weights. Then there is one solution.
+// Return an upper bound on the largest eigenvalue of a nonnegative matrix. Passes of the power iteration lower the
+// bound to this eigenvalue. If the bound is below 1 for L, g contracts in lengths with positive weights. Then there is
+// one solution.
 double spectral_bound(const MatX& L);
 
 }  // namespace pn

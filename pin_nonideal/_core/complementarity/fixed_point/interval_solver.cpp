@@ -40,7 +40,7 @@ private:
     ReactionEquation eq_;
     int n_;
     VecX scale_, in_s_;
-    MatX L_, spread_;  // spread: (1 - L)^-1 of the following unknowns
+    MatX L_, spread_;  // spread: (1 - L)^-1 of the unknowns that are not bisected
     std::vector<int> halved_, following_;
     std::vector<Part> parts_;
     ReactionRoots found_;
@@ -91,7 +91,8 @@ void Search::divide() {
     spread_ = pn::inverse(MatX::Identity(m, m) - among(L_, following_, following_));
 }
 
-// Compute the other unknowns from the bisected unknowns in z, starting at z. Return false without convergence.
+// Compute the unknowns that are not bisected from the bisected unknowns in z, starting at z. Return false without
+// convergence.
 bool Search::follow(VecX& z, double s) const {
     const int m = static_cast<int>(following_.size());
     if (m == 0) return true;

@@ -10,7 +10,7 @@ namespace pn {
 struct IntervalSolverParameters {
     int max_bisected = 3;               // bisected unknowns
     double max_work = 20000.0;          // maximum number of parts of the box, weighted by the size of the matrices
-    double max_followed_growth = 0.9;   // largest growth of the unknowns that follow
+    double max_followed_growth = 0.9;   // largest spectral bound of the unknowns that are not bisected
     double min_box_part = 1e-7;         // smallest part of the box (its square is rounding, where two solutions merge)
     double alone = 0.9;                 // size to which Newton's interval form must shrink a part, relative to it
     double margin = 1e-9;               // relative enlargement of a part and its bounds
@@ -19,7 +19,8 @@ struct IntervalSolverParameters {
     double min_determinant = 1e-8;      // smaller determinants count as zero
     double infinite_solution_scale = 1e-9;  // s below which a solution counts as infinite
     double far_newton_start = 100.0;  // start of Newton's method beyond the bends of g
-    int max_follow_passes = 1000;     // maximum passes for the other unknowns: 350 passes with a factor 0.9 reach rounding
+    // Maximum passes for the unknowns that are not bisected: 350 passes with a factor 0.9 reach rounding.
+    int max_follow_passes = 1000;
 };
 
 struct ReactionRoots {
@@ -29,8 +30,9 @@ struct ReactionRoots {
 };
 
 // Compute all solutions. The unit box of all y >= 0, finite or not, is bisected until interval forms of Newton's method
-// prove that each part holds one solution or none. Unknowns among which the image contracts follow the others, so that
-// only a few are bisected. The result is not complete if these unknowns, or the parts, are too many.
+// prove that each part holds one solution or none. Unknowns among which the image contracts are computed from the
+// others, so that only a few unknowns are bisected. The result is not complete if too many unknowns are bisected, or if
+// too many parts remain.
 ReactionRoots all_roots(const ReactionEquation& equation);
 
 }  // namespace pn

@@ -1,6 +1,6 @@
-// All solutions of the rest equation of a few forces, by intervals. Boxes without a solution are dropped, boxes with
-// one solution are recognized by Krawczyk's test, and other boxes are bisected. Unbounded forces need no special case:
-// in (x, tau), with the forces x / tau, the equation is homogeneous.
+// All solutions of the rest equation (equation.hpp) of a few friction forces, by intervals. Boxes without a solution
+// are dropped, boxes with one solution are recognized by Krawczyk's test, and other boxes are bisected. Unbounded
+// forces need no special case: in (x, tau), with the forces x / tau, the equation is homogeneous.
 #pragma once
 
 #include "complementarity/load_dependent/equation.hpp"

@@ -1,6 +1,6 @@
-// Rest equation. The unknowns are the friction forces x of all elements at rest. Slip accelerations are
-// alpha = alpha0 + W x, and limits come from lengths of vectors that are linear in x. An element sticks (alpha = 0,
-// |x| <= limit) or begins to slip (x = -limit alpha / |alpha|). In both cases
+// Rest equation: the equation of friction at rest. The unknowns are the friction forces x of all elements at rest. Slip
+// accelerations are alpha = alpha0 + W x, and limits come from lengths of vectors that are linear in x. An element
+// sticks (alpha = 0, |x| <= limit) or begins to slip (x = -limit alpha / |alpha|). In both cases
 //     x = P(x - rho alpha),    P the projection on the ball of radius limit, any rho > 0.
 // If the slip of an element is known (the element slips already, or is driven), x = -limit times its direction. If the
 // limits differ forward and backward, the ball is centered at their middle. Pure functions on arrays.

@@ -1,5 +1,5 @@
-// One solution of the rest equation, from a first guess. The methods are an alternation of limits and forces, then
-// Newton's method, then a path from fixed limits to the limits of the loads.
+// One solution of the equation of friction at rest (equation.hpp), from a first guess. The methods are an alternation
+// of limits and forces, then Newton's method, then a path from fixed limits to the limits of the loads.
 #pragma once
 
 #include "complementarity/load_dependent/equation.hpp"
@@ -27,8 +27,8 @@ bool solve_rest(const RestEquation& equation, VecX& x);
 // Refine x near a solution by Newton's method alone.
 bool refine_rest(const RestEquation& equation, VecX& x);
 
-// Compute forces x within all limits that keep all elements at rest, from a first guess. Return false if none were found. x
-// is then the nearest point found.
+// Compute forces x within all limits that keep all elements at rest, from a first guess. Return false if none were
+// found. In this case x has the smallest residual found.
 bool hold_at_rest(const RestEquation& equation, VecX& x);
 
 // Return slip accelerations slightly beyond the load of a solution x, with the limits at x.

@@ -76,7 +76,8 @@ inline double rounded_by(const Kind& kind) {
     return depth;
 }
 
-// Check if a gap is between lines, such as edges and rims. Its rounding alone bounds its penetration.
+// Check if a gap is between lines, such as edges and rims. The radius of the rounded edges bounds the penetration of
+// such a gap.
 inline bool is_between_lines(const Kind& kind) {
     bool is_line = false;
     visit_as<ShapeGap>(kind, [&](const auto& k) { is_line = k.max_depth() <= k.radius; });

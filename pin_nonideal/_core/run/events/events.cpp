@@ -266,7 +266,8 @@ std::vector<Event> switch_modes(System& system, double t, VecX& y, VecX& dy, con
     LawResiduals laws;
     const std::vector<Event> changes = select_modes(system, t, y, dy, event, released, laws);
     if (laws.are_small()) return changes;
-    // As at the start of a run, where no mode is known: from the velocities before the projection, then after it.
+    // Select all modes from the velocities, as at the start of a run: from the velocities before the projection, then
+    // from those after it.
     const VecX projected = y;
     for (const VecX* from : {&at_event, &projected}) {
         if (!event && from == &at_event) continue;

@@ -34,7 +34,7 @@ std::vector<Event> changes_since(const System& system, double t, const std::vect
 
 // Check if contacts strike at (t, y): they touch and approach each other.
 bool contacts_strike(System& system, double t, const VecX& y, bool starts);
-// Check if a contact that is still open would strike at (t, y), as at events of another kind.
+// Check if an open contact touches and approaches at (t, y), for events other than touches.
 bool contacts_land(System& system, double t, const VecX& y);
 // Impact of contacts, which changes the velocity: one event per contact with an impulse, work of the contacts [J], and
 // work of moving constraints [J].

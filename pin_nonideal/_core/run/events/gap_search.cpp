@@ -142,7 +142,7 @@ GapSample GapSearch::sample(int gap, double part) {
     return above(out, level_here(gap, part));
 }
 
-// Return the root between a sample with the gap open or just closed and a sample with penetration.
+// Return the instant at which a gap closes, between a sample without penetration and a sample with penetration.
 GapSearch::Touch GapSearch::between(int gap, const GapSample& a, const GapSample& b) {
     const double part =
         root_between(a.part, a.width, b.part, b.width, [&](double at) { return sample(gap, at).width; });
@@ -166,7 +166,8 @@ std::optional<GapSearch::Touch> GapSearch::search(int gap, const GapSample& a, c
         if (b.width < -rounding_ || has_closed) return Touch{b.part, b.rate * stepper_.h};
         return std::nullopt;
     }
-    // A gap that leaves its plane is open for at least half of the time that the bound gives.
+    // A gap that leaves its plane stays open until rate / bound, with the bound on its second derivative: the parabola
+    // of this curvature closes at twice this time.
     if (a.width <= rounding_ && a.rate > 0.0 && !a.separation && !has_lowest_point(p, gap)) {
         const double open_until = a.part + a.rate / (bound * stepper_.h);
         if (open_until < 0.5 * (a.part + b.part) && open_until > a.part) {

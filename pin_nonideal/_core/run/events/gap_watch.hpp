@@ -98,7 +98,7 @@ public:
     // Check if a monitored gap was wider at its sample than its bodies can close by the end of this step of time stepping.
     bool stays_open_in_step(int gap) const;
     // Return the gaps that stay open while the dofs travel `path_length` from the state of the last call of `advance`, by
-    // gap. Their width is positive there without a measurement.
+    // gap. The width of these gaps is positive there, although it is not measured.
     const std::vector<char>& open_after(const VecX& path_length);
     // Begin time stepping: all gaps are monitored, except skipped gaps wider than `least`.
     void begin_time_steps(double least);

@@ -128,8 +128,8 @@ bool ModeChanges::follow_drive() {
     return true;
 }
 
-// A motion that starts smoothly has no acceleration at first. Its speed shows which elements slip, once it is above the
-// rounding of the time step. `before`: modes after the time steps, which record their own events.
+// A motion that starts smoothly has no acceleration at first. Once the speed is above the rounding of a time step, the
+// speed shows which elements slip. `before`: modes after the time steps, which record their own events.
 bool ModeChanges::step_with_drive(RunState& before) {
     const double last = progress_.t - progress_.drive_end < progress_.drive_length ? progress_.drive_length : 0.0;
     const double first = options_.method.adaptive() ? mode_change_parameters.drive_step
@@ -172,7 +172,8 @@ bool ModeChanges::is_of_closed_contacts(const Failure& failure) {
 }
 
 bool ModeChanges::is_of_contradicting_contacts(const Failure& failure) const {
-    // The residual of rows has either sign, and the failure of an impact has none.
+    // The failure of contradicting rows has their residual as value, of either sign. The failure of an impact has the
+    // value zero.
     return failure.kind == Failure::Kind::inconsistent && failure.value != 0.0 &&
            std::all_of(failure.elements.begin(), failure.elements.end(), [&](int block) { return block >= p.first_gap; });
 }

@@ -41,7 +41,7 @@ public:
     bool force_switch();
     // Check if the failure only means that no motion or no step was found, which proves nothing.
     static bool is_recoverable(const Failure& failure);
-    // Check if a run that continues with one of several motions can go on by time stepping, which finds one.
+    // Check if a run that continues with one of several motions can continue by time stepping, which finds a motion.
     bool takes_any_motion(const Failure& failure) const;
     // Bridge by time stepping if no motion or no short enough step was found. Applies to an accumulation of events, to
     // creeping slip, to unilateral contacts without a solution, and beside a hand-over. Return false if it does not apply.

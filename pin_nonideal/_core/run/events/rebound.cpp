@@ -22,8 +22,9 @@ struct Bouncing {
     System& system;
     double lowest;
 
-    // Times until the first low gap lands, until the first other gap lands, and until a slip rests (infinite if none).
-    // `leaves`: time until the last leaving gap is no longer low.
+    // Times until the first contact lands from a low flight, until the first contact lands from a higher flight, and
+    // until a slip comes to rest (infinite if none). A flight is low if its height is at most `lowest`. `leaves`: time
+    // until the last contact in a higher flight has risen above `lowest`.
     struct Next {
         double low = no_landing, high = no_landing, rest = no_landing, leaves = 0.0;
         int element = -1;  // element that comes to rest
@@ -109,7 +110,7 @@ std::optional<Rest> bounce_to_rest(System& system, double t, double stop, VecX& 
         else if (contacts_strike(system, out.time, y, false)) strike_contacts(system, out.time, y, false, dies_out);
         switch_modes(system, out.time, y, dy, event);
         system.read(y);
-        // An approach that other contacts do not let an impact end would repeat.
+        // If other contacts keep an impact from ending an approach, the same impact would repeat at this instant.
         const double change = (y - from).cwiseAbs().maxCoeff(), rounding = rebound_parameters.state_rounding;
         if (time == 0.0 && change <= rounding * (1.0 + y.cwiseAbs().maxCoeff()) &&
             same_bytes(w.state.closed, kept.closed) && same_bytes<Mode>(w.state.mode, kept.mode))

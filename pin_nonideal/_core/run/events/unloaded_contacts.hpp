@@ -19,10 +19,10 @@ struct UnloadedContactsParameters {
 
 inline constexpr UnloadedContactsParameters unloaded_contacts_parameters{};
 
-// Check if the two bodies of a gap move the same without their contacts, at the state last read.
+// Check if the two bodies of a gap have the same motion without their contacts, at the state last read.
 bool is_unloaded(System& system, double t, int gap);
 
-// Open the contacts of all pairs of bodies that move the same without them. Return these contacts.
+// Open the contacts of all pairs of bodies that have the same motion without their contacts. Return these contacts.
 std::vector<int> open_unloaded_contacts(System& system, double t);
 
 }  // namespace pn

@@ -1,7 +1,7 @@
 // Springs, dampers, smooth friction and position control of single dofs, which time steps take implicitly.
 //
-// Bristles of a LuGre law follow the exact solution for a constant velocity. Their mean deflection over the step, or the
-// deflection at its end, replaces that at its start.
+// Bristles of a LuGre law follow the exact solution for a constant velocity. The mean deflection over the step, or the
+// deflection at its end, replaces the deflection at its start.
 #pragma once
 
 #include "dynamics/workspace.hpp"

@@ -24,7 +24,7 @@ struct CollocationParameters {
     double diverging = 0.9, diverging_first = 3.0;  // ratio of two changes at which the iteration stops
     double rounding_part = 0.5;    // relative to the tolerance: smaller changes that no longer shrink are rounding
     double perturbation = 1e-6;    // step of a direction for its response: above the root of the rounding
-    double rank_threshold = 1e-5;  // relative: for turns that slip at rest leaves open, and slip at rest itself
+    double rank_threshold = 1e-5;  // relative rank threshold: slip at rest does not determine the turn of its direction
 };
 
 class Collocation {

@@ -11,8 +11,8 @@ namespace pn {
 
 namespace {
 
-// Generator of changes of the last digits. The sequence is fixed, so that runs repeat. `max_spacings`: maximum change
-// in floating-point spacings.
+// Generator of random changes of the last digits of a state. The sequence is fixed, so that runs repeat.
+// `max_spacings`: maximum change in floating-point spacings.
 constexpr unsigned long long multiplier = 6364136223846793005ULL, increment = 1442695040888963407ULL;
 const double second_difference = std::sqrt(6.0);  // standard deviation of its rounding, relative to that of a rate
 

@@ -14,7 +14,7 @@ constexpr double failed_error = 1e4;
 struct StepControlParameters {
     // The next step aims at error = safety^order. The change of the error from step to step then seldom rejects a step.
     // With 0.9 a third of the steps fails, and smooth motions need a sixth more evaluations for the same error. The
-    // error of a retried step is given, so it aims closer.
+    // error of a rejected step is known, so the factor `retry_safety` of the next trial is closer to one.
     double safety = 0.65, retry_safety = 0.9;
     double min_step_ratio = 0.2, max_step_ratio = 10.0;  // least and largest ratio of two successive steps
     // A step is shortened by `detour` if an evaluation is nearer to a singular position than `clearance` times the

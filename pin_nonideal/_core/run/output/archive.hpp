@@ -1,5 +1,6 @@
-// Bytes of a state, written and read by one list of fields. The state read is bitwise identical to the state written. A
-// buffer keeps its size, so bytes of another scene and damaged bytes are rejected.
+// Bytes of a state, written and read by one list of fields. The state read is bitwise identical to the state written.
+// The scene determines the size of each buffer, so that bytes of another scene are rejected. A checksum rejects damaged
+// bytes.
 #pragma once
 
 #include <cstdint>

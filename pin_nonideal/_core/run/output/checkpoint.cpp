@@ -130,8 +130,8 @@ std::string to_bytes(Workspace& w, Progress& progress, Recording& out) {
     return a.bytes;
 }
 
-// Recompute the factors and rows that the last step left. The next step reads no other data of an evaluation before it
-// makes its own.
+// Recompute the factors and rows that the last step left. The next step reads no other data of this evaluation before
+// its own first evaluation.
 static void evaluate_anew(System& system, const Progress& progress) {
     const Program& p = system.p;
     Workspace& w = system.w;

@@ -72,7 +72,7 @@ bool TimeStepping::needs_forces(double end, double t_end) const {
 }
 
 // Take as much of a step to `end` as approaching edges allow, in a scene with unilateral contacts. If an edge passes
-// another, half of it is taken instead.
+// another edge in this part, half of the part is taken instead.
 void TimeStepping::step_part(double end, double t_end, double least) {
     const double from = progress_.t, numerical = progress_.numerical_energy, impacts = progress_.impact_energy;
     double h = std::max(moreau_contacts_.allowed(from, end - from, progress_.y), least);

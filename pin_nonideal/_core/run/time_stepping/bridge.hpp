@@ -52,9 +52,10 @@ private:
     Moreau moreau_;
     MoreauContacts moreau_contacts_;
     const bool is_autonomous_;  // a state that a step leaves unchanged stays unchanged
-    double rounding_ = 0.0;  // difference of two times that are one end of a step
+    double rounding_ = 0.0;  // difference of two times that count as the same end of a step
     const bool samples_every_step_;  // every step's end is a sample, or user code reads it
-    // Something reads accelerations and forces. If nothing does, steps of separate trees evaluate none.
+    // True if records or user code read accelerations and forces. Otherwise steps of separate trees do not evaluate
+    // them.
     const bool reads_forces_;
     VecX y_from_;
     Modes before_, before_step_;

@@ -25,8 +25,9 @@ struct MeanVelocityParameters {
 // its error in the last step.
 //
 // The linear velocity v of a free flyer is given in axes that turn with it. Inside a step it is given in the axes at the
-// middle of the step, so that the velocity u = v + w x c of its center of mass c keeps its direction in space. Its rate
-// there is the acceleration plus w x u: a body that rolls or flies keeps its speed and momentum while it turns.
+// middle of the step, so that the velocity u = v + w x c of its center of mass c keeps its direction in space. In these
+// axes the rate of v is the acceleration plus w x u: a body that rolls or flies keeps its speed and momentum while it
+// turns.
 class MeanVelocity {
 public:
     using Parameters = MeanVelocityParameters;

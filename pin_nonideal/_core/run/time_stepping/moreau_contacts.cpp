@@ -154,7 +154,7 @@ void MoreauContacts::sweep(double t, JointDrives::Step& drives, bool first) {
 }
 
 // Solve the step again with the forces at the mean velocity. If no motion is found, or only a relaxed one, return false
-// with that of the first sweep.
+// with the motion of the first sweep.
 bool MoreauContacts::correct(double t, JointDrives::Step& drives) {
     const bool relaxed_before = forces_.law_miss().block >= 0;
     const bool is_solved = !attempt({Failure::Kind::not_converged}, [&] { sweep(t, drives, false); });
@@ -188,8 +188,8 @@ void MoreauContacts::solve_free(double t) {
     solve_motion(p, w, p.has_laws(), b_, a_free_, lam_free_);
 }
 
-// Return the travel of each dof since the last sample of the gaps, including projections. It is at least that of the
-// velocity, because angles wrap around.
+// Return the travel of each dof since the last sample of the gaps, including projections. The integral of the velocity
+// is a lower bound of the travel, because differences of angles omit full turns.
 const VecX& MoreauContacts::path_since_last() {
     q_sampled_ -= q_mid_;
     ambient_to_tangent(p.mechanism, q_mid_.data(), q_sampled_.data(), v1_.data());
@@ -350,8 +350,8 @@ void MoreauContacts::keep_percussions() {
 }
 
 // Compute the velocity, the closed contacts and the modes at the step's end. A force below
-// its limit holds an element whose slip stops. If a solution meets neither condition, the one with the smaller miss
-// decides.
+// its limit holds an element whose slip stops. If a solution satisfies neither condition, the condition with the
+// smaller error decides.
 void MoreauContacts::end_velocity() {
     const auto& parts = elements_.parts;
     const auto& cones = elements_.cones;

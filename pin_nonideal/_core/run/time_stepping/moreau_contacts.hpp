@@ -47,8 +47,8 @@ public:
     void step(double t, double h, VecX& y, double& numerical_energy, double& impact_energy);
     // The next step is another attempt from the state of the last step: the loads before the first attempt count.
     void repeat() { repeats_ = true; }
-    // Project the end y of the last step, at t, tree by tree. Return false if constraints join the trees: the rows of
-    // the scene must project it then.
+    // Project the end y of the last step, at t, tree by tree. Return false if constraints join the trees: the caller
+    // must then project the end onto all rows of the scene.
     bool project(double t, VecX& y, double& numerical_energy);
 
     // Return the gaps that are open at the end y of the last step, by gap. Narrow open gaps may be missing.

@@ -16,8 +16,8 @@ public:
               const std::vector<ConeElement>& cones, const VecX& a_free, const VecX& offset);
     // Set other accelerations and offsets for the same rows.
     void release(const VecX& a_free, const VecX& offset);
-    // Solve the laws for the forces f, from a guess. `middle` are forces around which the boxes are centered. Return the
-    // largest error of an element, relative to its forces.
+    // Solve the laws for the forces f, from a guess. The limits of an element without a cone bound its force about
+    // `middle`. Return the largest error of an element, relative to its forces.
     double solve(const std::vector<ConeElement>& cones, const VecX& middle, VecX& f);
     // Change the forces f of the last call of `solve` where others hold trees at rest that move.
     void hold(const VecX& middle, VecX& f);

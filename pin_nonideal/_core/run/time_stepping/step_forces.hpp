@@ -56,7 +56,7 @@ public:
     void drop_prevented_slip();
     // Compute the rows at the step's end under the forces.
     void measure_end();
-    // Error of the rows at, ..., at + dim - 1 of an element at the step's end, if the laws are met.
+    // Error of the rows at, ..., at + dim - 1 of an element at the step's end, if the forces satisfy the laws.
     double row_error(int at, int dim) const;
     // Errors of the laws for the forces.
     ConeResiduals residuals();
