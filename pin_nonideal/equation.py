@@ -38,7 +38,8 @@ ZERO_ROW = 1e-14
 # Redundant rows are inconsistent if their residual exceeds this part of the acceleration scale. The tolerance
 # is a hundred times the largest remainder of a redundant row, so rounding alone never raises.
 RESIDUAL_TOLERANCE = 1e-8
-# Number of refinements. Each refinement adds the correct digits of one response, few if M has condition 1e12.
+# Number of refinements: repeated solutions for the remaining residual. Each refinement adds the correct
+# digits of one solution, which are few if M has condition 1e12.
 REFINEMENTS = 2
 # M[i, j] and M[j, i] may differ by this part of sqrt(M[i, i] M[j, j]); sums in another order differ by 1e-15.
 SYMMETRY_TOLERANCE = 1e-10

@@ -105,7 +105,8 @@ def solve_details(
     B_pinv = np.zeros(B.T.shape)
     if k:
         B_pinv = Q[:, :k] @ np.linalg.solve(T[:k].T, np.linalg.pinv(E))  # Eqs. (41)-(46)
-    J = B_pinv @ B_pinv.T + V @ V.T  # Eq. (33): the inverse of B^T B on the rows, of V V^T beside them
+    # Eq. (33): inverse of B^T B on its range, of V V^T on the null space of B.
+    J = B_pinv @ B_pinv.T + V @ V.T
     return SolutionDetails(
         a_free=np.linalg.solve(R.T, np.linalg.solve(R, F)),  # Eq. (1)
         M_root=M_root,

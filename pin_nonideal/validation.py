@@ -91,8 +91,8 @@ def positive(what: str, value: object) -> float:
     return result
 
 
-# Bounds of relative tolerances: no step meets one below rounding, and a step that changes a coordinate by
-# more than a tenth of it follows nothing.
+# Bounds of relative tolerances: no step satisfies a tolerance below rounding, and an error of more than a
+# tenth of a coordinate is no approximation.
 MIN_RTOL, MAX_RTOL = 1e-14, 0.1
 
 

@@ -57,7 +57,7 @@ class CompiledScene:
         points: names of the contact points of each pair of shapes with several points.
         contact_of: contact of each of these points.
         point_names: names of all contacts of the core, in the order of their descriptions.
-        contacts: contacts of the user, as groups of `point_names`; each stop is one contact.
+        contacts: contacts of the user, as groups of `point_names`; each stop of a joint is one contact.
         multipliers: rows of `lam`, as groups of the rows of the core.
         element_names: names of the friction elements of the core.
         elements: friction elements of the user, as groups of elements of the core.

@@ -54,7 +54,8 @@ def lower_constraint(c: PinocchioConstraint, name: str, out: core.Builder, resol
         resolver: frames and joints by name.
 
     Raises:
-        InputError, UnknownNameError: a frame or joint does not exist or does not fit.
+        InputError, UnknownNameError: a frame or joint does not exist, or the description does not fit the
+        model.
     """
     kind = type(c).__name__
     known = ("RigidConstraintModel", "PointAnchorConstraintModel", "FrameAnchorConstraintModel")

@@ -159,7 +159,7 @@ class RowGroups(NamedTuple):
 
 
 def grouped_rows(slices: Mapping[str, slice], contact_of: Mapping[str, str]) -> RowGroups:
-    """Return the rows of the user.
+    """Return the rows of `lam` of each constraint and contact of the user, as groups of rows of the core.
 
     Args:
         slices: rows of the core of each constraint and contact point, by name and in order.

@@ -59,7 +59,8 @@ def lower_contacts(
         Name and description of each added contact.
 
     Raises:
-        InputError, UnknownNameError: a frame or joint does not exist or does not fit.
+        InputError, UnknownNameError: a frame or joint does not exist, or the description does not fit the
+        model.
     """
     kinds = (*get_args(Contact), CapsulePairs)
     for name, c in contacts:

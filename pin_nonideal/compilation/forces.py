@@ -22,7 +22,8 @@ def lower_force(f: object, out: core.Builder, resolver: Resolver) -> None:
         resolver: frames and joints by name.
 
     Raises:
-        InputError, UnknownNameError: a frame or joint does not exist or does not fit.
+        InputError, UnknownNameError: a frame or joint does not exist, or the description does not fit the
+        model.
     """
     raise InputError(f"a force must be SpringDamper, JointSpring, Wrench or UserForce; got {short_repr(f)}")
 

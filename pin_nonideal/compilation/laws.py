@@ -25,7 +25,8 @@ def lower_law(law: object, name: str, out: core.Builder, context: LoweringContex
         context: names that the law may use.
 
     Raises:
-        InputError, UnknownNameError: a frame or joint does not exist or does not fit.
+        InputError, UnknownNameError: a frame or joint does not exist, or the description does not fit the
+        model.
     """
     raise InputError(
         f"a law must be JointFriction, SigmoidFriction, LuGre, Drag, UserLaw or UserFriction; "

@@ -64,7 +64,8 @@ def lower(spec: SceneSpec, builder: core.Builder, resolver: Resolver) -> Lowered
         resolver: frames and joints by name.
 
     Raises:
-        InputError, UnknownNameError: a frame, joint or constraint does not exist or does not fit.
+        InputError, UnknownNameError: a frame, joint or constraint does not exist, or a description does not
+        fit the model.
     """
     items = list(lower_stepwise(spec, builder, resolver))
     described = {each.name: each.description for each in items if each.kind in ("constraint", "contact")}

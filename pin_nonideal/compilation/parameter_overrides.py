@@ -287,7 +287,7 @@ class _Relower:
         self._differs = False
 
     def arguments(self, item: LoweredItem, other: object, name: str) -> list[Table]:
-        """Return the keyword arguments of the calls of another description.
+        """Return the keyword arguments of the builder's calls that another description needs.
 
         Raises:
             InputError: the calls differ in more than numbers.

@@ -58,7 +58,8 @@ class SampledControl:
 
     A control with `joints` may stand in a list of drives. The other drives are constant torques, controls and
     `TrackTrajectory` drives of the same period, and tables. A `Table` with interpolation "hold" has times t0
-    + k period. A linear one has any times. One control of a list may have a delay.
+    + k period. A `Table` with linear interpolation may have any times. At most one control of a list may have
+    a delay.
 
     Args:
         function: (t, q, v) -> tau, shape (nv,) or by joint name, called once per period.

@@ -211,7 +211,7 @@ def with_origin(
         scene: as made.
         table: name and parameters for `load`, or None if a file cannot hold them.
         shapes: functions that read its shapes again.
-        friction: coefficients of the file's collision geometry.
+        friction: friction coefficients of the file's collision geometry, by name.
         held: entries of the initial state that were named.
     """
     scene._origin = Origin(table, shapes, scene._origin.assembly_tolerance)

@@ -56,15 +56,17 @@ class EditableScene(SceneBase):
             add_forces: forces in addition.
             remove: names of present constraints, laws, contacts and forces to leave out.
             actuation: actuation of the new scene, None for no actuation; unchanged if left out.
-            q0: initial configuration, (nq,) or by joint name (the others as now); the present one when None.
-            v0: initial velocity, (nv,) or by joint name (the others as now); the present one when None.
+            q0: initial configuration, (nq,) or by joint name (other joints as now); the present one when
+                None.
+            v0: initial velocity, (nv,) or by joint name (other joints as now); the present one when None.
             name: name of the new scene; the present name when None.
 
         Returns:
             The new Scene.
 
         Raises:
-            InputError, UnknownNameError: something does not fit the model, or nothing has a name in `remove`.
+            InputError, UnknownNameError: a description or state does not fit the model, or no description has
+            a name in `remove`.
         """
         lists = {"constraints": constraints, "laws": laws, "contacts": contacts, "forces": forces}
         added = {

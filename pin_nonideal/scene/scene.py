@@ -130,9 +130,10 @@ class Scene(EditableScene):
 
         Args:
             q: configuration, (nq,) or by joint name; the scene's initial configuration when None.
-            v: velocity, (nv,) or by joint name; the scene's initial velocity when None. Named entries of q
-                and v are held, and the others follow. If the constraints do not admit the named entries of q,
-                these are treated as rounded: they may move by 1e-3 rad, or by 1e-3 of the mechanism's length.
+            v: velocity, (nv,) or by joint name; the scene's initial velocity when None. The projection holds
+                named entries of q and v, and changes the other entries as little as possible. If the
+                constraints do not admit the named entries of q, these are treated as rounded: they may move
+                by 1e-3 rad, or by 1e-3 of the mechanism's length.
             t: time [s].
             report: whether to return a `ProjectionReport` as well, with the displacements of q and v.
 

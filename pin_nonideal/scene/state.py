@@ -172,7 +172,7 @@ class SceneStates:
         return self._compiled.project(q, v, t, held)
 
     def velocity_notes(self, v: State | None, on: Array) -> list[str]:
-        """Note on velocities that follow named ones, or that were changed to meet the constraints.
+        """Return notes on velocities that the named velocities determine, or that the projection has changed.
 
         Args:
             v: velocity before the projection, as given.

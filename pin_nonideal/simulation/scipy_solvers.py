@@ -31,7 +31,7 @@ Tick = Callable[[float], None]  # function of the time [s]
 # Smallest relative tolerance that SciPy's methods accept and reach.
 MIN_RTOL = 1e-13
 # Distance of a state of BDF or LSODA to its projection at which the method restarts, in tolerances.
-# Velocities off the rows of wheels displace them for good.
+# A velocity that violates the rows of a wheel displaces the wheel permanently.
 MAX_DRIFT = 10.0
 # Absolute tolerance of work: excludes work from step size control.
 WORK_ATOL = 1e100

@@ -32,8 +32,8 @@ class Held(NamedTuple):
     Attributes:
         q: mask of held tangent coordinates of the configuration, (nv,), or None.
         v: mask of held entries of the velocity, (nv,), or None.
-        firm_q: whether an error is raised if coordinates cannot be held. Otherwise all are projected, as for
-            entries named for another time.
+        firm_q: whether an error is raised if coordinates cannot be held. Otherwise, if the coordinates cannot
+            be held, all coordinates are projected, for example because the entries hold at another time.
         firm_v: whether an error is raised if velocities cannot be held.
     """
 

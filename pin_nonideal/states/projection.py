@@ -303,7 +303,8 @@ class Projection:
     def _length_at(self, q: Array) -> float:
         """Return the length of a mechanism without lengths: its largest sliding coordinate, residual or body.
 
-        The depth of a contact is no length. A start in contact may have no other residual.
+        The depth of a penetration is not a length of the mechanism, although it may be the only residual of a
+        start in contact.
         """
         away = pin.difference(self.model, pin.neutral(self.model), q)[self._slides]
         phi = residuals_at(self.program.runner(), q, np.zeros(self.model.nv), 0.0)

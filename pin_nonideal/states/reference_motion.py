@@ -30,8 +30,8 @@ class ReferenceMotion:
         times: increasing sample times [s], (nt,) with nt >= 1.
         q: configurations, (nt, nq).
         v: velocities, (nt, nv), or None.
-        rounding: distance of times outside the samples that count as an end, relative and in seconds below
-            1 s.
+        rounding: distance from the first or last sample at which a time counts as the time of this sample,
+            relative, and in seconds below 1 s.
     """
 
     def __init__(

@@ -30,12 +30,12 @@ SLIP_VELOCITY = 1e-8
 class HoldingTorque:
     """Torques of one joint at rest, with the torques of all other joints unchanged.
 
-    The drive of the joint may have any torque of the band [low, high], and everything stays at rest. A torque
-    beyond the band moves something. The ends belong to the static limits of friction. Slow motion is the
-    motion of least norm that the constraints admit, with vanishing speed, without acceleration and with
-    sliding friction. The torque of slow motion differs from the end of the band by the static ratio only, if
-    nothing else limits the band. A joint locks itself if its band contains the torque zero. Effort limits of
-    the drive do not count.
+    For any torque of the drive within the band [low, high] the whole scene stays at rest. A torque beyond the
+    band moves some body. The ends belong to the static limits of friction. Slow motion is the motion of least
+    norm that the constraints admit, with vanishing speed, without acceleration and with sliding friction. The
+    torque of slow motion differs from the end of the band by the static ratio only, if nothing else limits
+    the band. A joint locks itself if its band contains the torque zero. Effort limits of the drive do not
+    count.
 
     Attributes:
         low: smallest torque that holds [N m or N]; -inf without bound, and NaN if no torque of this joint
@@ -243,7 +243,8 @@ class _Joint:
     def way(self, sign: float) -> tuple[Array, bool] | None:
         """Return the motion of least norm with unit rate of the joint, and whether it opens a contact.
 
-        Contacts stay closed if the joint can move so. None if the constraints admit no motion.
+        Contacts stay closed if the joint can move with closed contacts. The result is None if the constraints
+        admit no motion.
         """
         way = self._way(sign)
         if way is not None or not self.rest.gaps.any():

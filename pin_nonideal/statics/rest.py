@@ -54,8 +54,8 @@ class Rest:
         """Torques that friction holds and torques of slow motion, by joint name, computed on first access.
 
         The table has the joints of one degree of freedom on which a law of dry friction acts. The other
-        joints keep their torques. The torque of a joint is the whole torque of its drive, with that of the
-        scene's actuation.
+        joints keep their torques. The torque of a joint is the whole torque of its drive, including the
+        torque of the scene's actuation.
         """
         return self._holding()
 

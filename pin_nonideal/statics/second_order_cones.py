@@ -11,8 +11,8 @@ from scipy.sparse import csc_matrix
 from pin_nonideal.errors import FrictionConvergenceError
 from pin_nonideal.types import Array
 
-# Tolerance of feasibility and duality gap for unknowns of order 1, and that of a program that ends early.
-# Rounding in Clarabel, which regularizes by 1e-8, ends one in ten programs before 1e-10.
+# Tolerance of feasibility and duality gap for unknowns of order 1, and tolerance of a program that ends
+# early. Rounding in Clarabel, which regularizes by 1e-8, ends one in ten programs before 1e-10.
 SOLVER_TOL, REDUCED_TOL = 1e-9, 1e-7
 
 

@@ -240,7 +240,7 @@ class Trajectory(RunFields):
         """Return the `columns` as a pandas.DataFrame, with a row for each sample and the time as index.
 
         Returns:
-            The frame; `frame.attrs["units"]` has the unit of each column and of the index, such as "rad/s".
+            The DataFrame; its `attrs["units"]` has the unit of each column and of the index, such as "rad/s".
             A unit is "1" for numbers without one, as in quaternions, and empty if it is unknown.
 
         Raises:

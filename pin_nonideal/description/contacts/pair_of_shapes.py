@@ -131,7 +131,7 @@ def contact_parts(contacts: Iterable[object]) -> list[object]:
 
 
 def split(contact: C) -> C:
-    """Return a contact; each point of a pair of shapes is then a part of its own.
+    """Return a contact; for a pair of shapes, each contact point becomes a separate part.
 
     Args:
         contact: a description, or a pair of shapes.

@@ -23,8 +23,8 @@ class FoundMesh(NamedTuple):
 
     Attributes:
         path: absolute path.
-        broken: whether the path of the robot's file is invalid, and the mesh was found by the end of its
-            path.
+        broken: whether the path in the robot's file is invalid, and a search for the last parts of this path
+            found the mesh.
     """
 
     path: Path
