@@ -24,9 +24,11 @@ bool LeastMove::pose() {
 
 bool LeastMove::factor(int i) {
     if (factored_[i]) return factored_[i] > 0;
+    responses_.resize(problem.elements.size());
+    problem.own_responses(islands_[i].elements, responses_);
     for (int k : islands_[i].elements) {
         const BlockElement& e = problem.elements[k];
-        const Mat3 W = problem.own_response(e);
+        const Mat3& W = responses_[k];
         double most = 0.0;
         for (int r = 0; r < e.dim(); ++r) most = std::max(most, W.c[r][r]);
         for (int r = 0; r < e.dim(); ++r) {

@@ -52,6 +52,7 @@ private:
     std::vector<int> island_of_;          // by node
     std::vector<char> immobile_;  // by node of a probed island
     std::vector<double> weight_;          // by island
+    std::vector<Mat3> responses_;           // by element
     std::vector<double> own_response_, G_;  // own response of each row, and weights, nine numbers an element
     VecX probe_, scaled_, single_;
 };

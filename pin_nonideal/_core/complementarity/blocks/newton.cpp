@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace pn {
 
@@ -17,8 +18,13 @@ void BlockNewton::pose(const BlockProblem& p) {
     for (const BlockNode& node : p.nodes) unknowns = std::max(unknowns, node.first + node.size);
     dx_.resize(unknowns);
     x_full_.resize(unknowns);
-    for (const BlockElement& e : p.elements) {
-        const Mat3 W = p.own_response(e);
+    listed_.resize(p.elements.size());
+    std::iota(listed_.begin(), listed_.end(), 0);
+    responses_.resize(p.elements.size());
+    p.own_responses(listed_, responses_);
+    for (size_t i = 0; i < p.elements.size(); ++i) {
+        const BlockElement& e = p.elements[i];
+        const Mat3& W = responses_[i];
         const int head = e.head(), tail = e.dim() - head;
         const double normal = head ? W.c[0][0] : 0.0;
         double across = 0.0;

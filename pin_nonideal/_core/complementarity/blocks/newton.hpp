@@ -99,6 +99,8 @@ private:
     void take(const BlockProblem& p, const Island& island, double length, VecX& f, VecX& x, VecX& w);
 
     std::vector<double> rho_, root_rho_, G_;
+    std::vector<int> listed_;      // all elements
+    std::vector<Mat3> responses_;  // by element
     std::vector<double> unit_force_;  // inverse of root_rho_: forces in units of the root of an energy
     std::vector<Piece> piece_;
     std::vector<Projection> there_;  // at the last evaluation

@@ -1,5 +1,6 @@
 #include "complementarity/blocks/problem.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "complementarity/blocks/kernels.hpp"
@@ -125,26 +126,59 @@ PN_WIDE void BlockProblem::push(const std::vector<int>& list, const VecX& f, Vec
     for (const int i : list) push_inline(elements[i], f, x);
 }
 
-Mat3 BlockProblem::own_response(const BlockElement& e) const {
-    Mat3 W;
-    for (Vec3& column : W.c) column = Vec3::Zero();
-    for (int side = 0; side < 2 && e.node[side] >= 0; ++side) {
-        const BlockNode& node = nodes[e.node[side]];
-        const int n = node.size, d = e.dim();
-        const double* rows = J.data() + e.J[side];  // J L^-T
-        if (!node.normalized) {
-            work_.assign(rows, rows + d * n);
-            for (int k = 0; k < d; ++k) solve_lower(L_.data() + node.M, n, work_.data() + k * n);
-            rows = work_.data();
+// Add J J^T to W, for rows J of a node with mass-normalized unknowns.
+static PN_INLINE void add_response_of_rows(const double* J, int n, int dim, Mat3& W) {
+    for (int i = 0; i < dim; ++i)
+        for (int j = 0; j < dim; ++j) {
+            double sum = 0.0;
+            for (int k = 0; k < n; ++k) sum += J[i * n + k] * J[j * n + k];
+            W.c[j][i] += sum;
         }
-        for (int i = 0; i < d; ++i)
-            for (int j = 0; j < d; ++j) {
-                double sum = 0.0;
-                for (int k = 0; k < n; ++k) sum += rows[i * n + k] * rows[j * n + k];
-                W.c[j][i] += sum;
-            }
+}
+
+// Add X^T X to W, for the columns X = L^-1 J^T of an element. Row k of X begins at X + k * stride.
+static PN_INLINE void add_response_of_columns(const double* X, int n, int stride, int dim, Mat3& W) {
+    for (int i = 0; i < dim; ++i)
+        for (int j = 0; j < dim; ++j) {
+            double sum = 0.0;
+            for (int k = 0; k < n; ++k) sum += X[k * stride + i] * X[k * stride + j];
+            W.c[j][i] += sum;
+        }
+}
+
+// On nodes with other unknowns the rows of all elements enter the substitution together.
+PN_WIDE void BlockProblem::own_responses(const std::vector<int>& list, std::vector<Mat3>& W) const {
+    sides_.resize(std::max(sides_.size(), nodes.size()));
+    for (const int i : list) {
+        const BlockElement& e = elements[i];
+        for (Vec3& column : W[i].c) column = Vec3::Zero();
+        for (int side = 0; side < 2 && e.node[side] >= 0; ++side) {
+            const BlockNode& node = nodes[e.node[side]];
+            if (node.normalized) add_response_of_rows(J.data() + e.J[side], node.size, e.dim(), W[i]);
+            else sides_[e.node[side]].push_back(2 * i + side);
+        }
     }
-    return W;
+    for (size_t at = 0; at < nodes.size(); ++at) {
+        if (sides_[at].empty()) continue;
+        const BlockNode& node = nodes[at];
+        int count = 0;
+        for (const int side : sides_[at]) count += elements[side / 2].dim();
+        columns_.resize(std::max(columns_.size(), static_cast<size_t>(count) * node.size));
+        int column = 0;
+        for (const int side : sides_[at]) {
+            const BlockElement& e = elements[side / 2];
+            const double* rows = J.data() + e.J[side % 2];
+            for (int k = 0; k < e.dim(); ++k, ++column)
+                for (int r = 0; r < node.size; ++r) columns_[r * count + column] = rows[k * node.size + r];
+        }
+        solve_lower_columns(L_.data() + node.M, node.size, columns_.data(), count);
+        column = 0;
+        for (const int side : sides_[at]) {
+            add_response_of_columns(columns_.data() + column, node.size, count, elements[side / 2].dim(), W[side / 2]);
+            column += elements[side / 2].dim();
+        }
+        sides_[at].clear();
+    }
 }
 
 }  // namespace pn

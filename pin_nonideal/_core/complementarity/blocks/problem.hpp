@@ -72,15 +72,17 @@ public:
     // x += J^T f of an element or of several.
     void push(const BlockElement& e, const VecX& f, VecX& x) const;
     void push(const std::vector<int>& elements, const VecX& f, VecX& x) const;
-    // Response of an element's own rows to its own forces, J M^-1 J^T.
-    Mat3 own_response(const BlockElement& e) const;
+    // Compute the responses of the rows of listed elements to the element's own forces, J M^-1 J^T, by element.
+    void own_responses(const std::vector<int>& elements, std::vector<Mat3>& W) const;
 
 private:
     void respond_inline(const BlockElement& e, const VecX& x, VecX& w) const;
     void push_inline(const BlockElement& e, const VecX& f, VecX& x) const;
 
     std::vector<double> L_;  // lower Cholesky factors of the blocks of M
-    mutable std::vector<double> work_;
+    // By node whose unknowns are not normalized: sides of elements, as twice the element plus the side. Their rows as columns.
+    mutable std::vector<std::vector<int>> sides_;
+    mutable std::vector<double> columns_;
 };
 
 }  // namespace pn
