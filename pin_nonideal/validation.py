@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
 from numbers import Real
 from typing import Any
 
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from .errors import InputError, nearest, short_repr
 
 MAX_PYTHON_SUM = 100  # up to this size a Python sum is faster than NumPy; a finite sum implies finite numbers
+MAX_CACHED_AXES = 1024  # number of axes whose triads are kept: contacts of a scene share few of them
 
 Vector3 = tuple[float, float, float]
 
@@ -286,15 +288,22 @@ def unit_axis(what: str, value: object) -> Vector3:
         if value not in AXES:
             raise InputError(f'{what} must be "x", "y", "z" or three numbers; got {short_repr(value)}')
         return AXES[value]
-    vector = array(what, value, (3,))
-    largest = float(np.abs(vector).max())
-    if largest == 0.0:
+    x, y, z = array(what, value, (3,)).tolist()
+    if not (x or y or z):
         raise InputError(f"{what} must have a direction; got three zeros")
-    scaled = vector / largest
-    x, y, z = (float(c) for c in scaled / math.sqrt(float(scaled @ scaled)))
+    return _unit_vector((x, y, z))
+
+
+@lru_cache(maxsize=MAX_CACHED_AXES)
+def _unit_vector(vector: Vector3) -> Vector3:
+    """Return a vector of three numbers, not all zero, divided by its length."""
+    scaled = np.array(vector)
+    scaled /= np.abs(scaled).max()
+    x, y, z = (scaled / math.sqrt(float(scaled @ scaled))).tolist()
     return (x, y, z)
 
 
+@lru_cache(maxsize=MAX_CACHED_AXES)
 def axis_triad(axis: Vector3) -> tuple[Vector3, Vector3, Vector3]:
     """Return right-handed unit vectors (t1, t2, axis), the basis of all rows across an axis.
 

@@ -34,6 +34,8 @@ from pin_nonideal.validation import Vector3, axis_triad, unit_axis
 
 # A frame in the form of the core: joint index, rotation matrix by rows, translation [m].
 Frame = tuple[int, list[float], list[float]]
+# Right-handed unit vectors (tangent, tangent, normal).
+Axes = tuple[Vector3, Vector3, Vector3]
 
 WORLD: Frame = (0, [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0])
 
@@ -62,6 +64,7 @@ class Resolver:
         self._frames: dict[str, Frame] = {}
         self._placed_frames: dict[tuple[str, Vector3, Vector3], Frame] = {}  # shared by contacts
         self._segments: dict[tuple[str, Segment], tuple[Frame, float]] = {}
+        self._planes: dict[tuple[str | None, float, Vector3], tuple[Frame, Axes]] = {}
 
     def frame_id(self, name: str, who: str) -> int:
         """Return the index of a frame; a joint's name selects the frame of the joint."""
@@ -127,20 +130,17 @@ class Resolver:
         x, y, z = (float(x) for x in self.in_world(self.frame(hinge.frame1, who)).rotation @ np.array(axis))
         return (x, y, z)
 
-    def contact(
-        self, c: PointContact | EllipsoidContact | Rolling, who: str
-    ) -> tuple[Frame, Frame, tuple[Vector3, Vector3, Vector3]]:
+    def contact(self, c: PointContact | EllipsoidContact | Rolling, who: str) -> tuple[Frame, Frame, Axes]:
         """Return frame, plane, and right-handed (tangent, tangent, normal) in the axes of the plane."""
-        plane, axes = self.plane(c.plane, who), axis_triad(unit_axis(who, c.normal))
-        level = np.array(axes[2]) * getattr(c, "height", 0.0)
-        frame = self.frame(c.frame, who)
+        key = c.plane, getattr(c, "height", 0.0), unit_axis(who, c.normal)
+        if key not in self._planes:
+            axes = axis_triad(key[2])
+            self._planes[key] = translated_frame(self.plane(c.plane, who), np.array(axes[2]) * key[1]), axes
+        plane, axes = self._planes[key]
+        frame = self._placed(c.frame, getattr(c, "offset", (0.0, 0.0, 0.0)), who)
         if frame[0] == plane[0]:
             raise InputError(f"{who}: frame and plane are on the same body, which cannot touch itself")
-        return (
-            translated_frame(frame, getattr(c, "offset", (0.0, 0.0, 0.0))),
-            translated_frame(plane, level),
-            axes,
-        )
+        return frame, plane, axes
 
     def capsules(self, c: SphereContact | CapsuleContact, who: str) -> tuple[Frame, Frame, float, float]:
         """Return frames at the segment centers, z along the segments, and the half lengths [m]."""
@@ -262,7 +262,7 @@ def translated_frame(frame: Frame, by: Sequence[float] | Array) -> Frame:
         by: translation in the axes of the frame [m], (3,).
     """
     joint, R, p = frame
-    return (joint, R, (np.array(p) + np.reshape(R, (3, 3)) @ np.array(by)).tolist()) if np.any(by) else frame
+    return (joint, R, (np.array(p) + np.reshape(R, (3, 3)) @ np.array(by)).tolist()) if any(by) else frame
 
 
 def along(frame: Frame, ends: Array, who: str) -> tuple[Frame, float]:
