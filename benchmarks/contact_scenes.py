@@ -23,10 +23,10 @@ DENSITY = 1000.0  # [kg/m^3]
 
 @dataclass(frozen=True)
 class Body:
-    """A box or ball.
+    """A box, a ball or a capsule.
 
     Attributes:
-        size: edges of a box or radius of a ball [m].
+        size: edges of a box, radius of a ball, or radius of a capsule and length of its center line [m].
         at: position of the center [m], (3,).
         turn: roll, pitch and yaw [rad], (3,).
         v0: linear and angular velocity in the axes of the body [m/s, rad/s], (6,).
@@ -40,14 +40,19 @@ class Body:
     density: float = DENSITY
 
     @property
-    def is_ball(self) -> bool:
-        """Whether the body is a ball."""
-        return len(self.size) == 1
+    def kind(self) -> str:
+        """Kind of the shape."""
+        return ("sphere", "capsule", "box")[len(self.size) - 1]
+
+    @property
+    def shape(self) -> Any:
+        """Shape of Coal; the axis of a capsule is z."""
+        return {"sphere": coal.Sphere, "capsule": coal.Capsule, "box": coal.Box}[self.kind](*self.size)
 
 
 @dataclass(frozen=True)
 class ContactScene:
-    """Bodies on the ground.
+    """Bodies on the ground, free or linked to a rope.
 
     Attributes:
         title: title in tables.
@@ -55,6 +60,7 @@ class ContactScene:
         mu: coefficient of friction of all contacts.
         pairs: indices of bodies that may touch; None for all pairs.
         walls: distance of four walls from the middle [m], 0 for none.
+        damping: damping of the ball joints between capsules of a rope [N m s/rad]; None for free bodies.
         duration: duration of the run [s].
         rests: whether the bodies must not move.
     """
@@ -64,6 +70,7 @@ class ContactScene:
     mu: float = 0.5
     pairs: Sequence[tuple[int, int]] | None = None
     walls: float = 0.0
+    damping: float | None = None
     duration: float = 1.0
     rests: bool = False
     planes: list[tuple[tuple[float, float, float], float]] = field(init=False)
@@ -75,10 +82,14 @@ class ContactScene:
             planes += [(side, -self.walls) for side in sides]
         object.__setattr__(self, "planes", planes)
 
+    def free(self) -> Sequence[Body]:
+        """Return the bodies with a free joint: all, or the first link of a rope."""
+        return self.bodies if self.damping is None else self.bodies[:1]
+
     def touching(self) -> list[tuple[int, int]]:
         """Return the pairs of bodies that may touch."""
         count = len(self.bodies)
-        return list(self.pairs or ((j, i) for i in range(count) for j in range(i)))
+        return list(((j, i) for i in range(count) for j in range(i)) if self.pairs is None else self.pairs)
 
 
 def ours(given: ContactScene) -> pn.Scene:
@@ -86,11 +97,23 @@ def ours(given: ContactScene) -> pn.Scene:
     model, shapes = pin.Model(), pin.GeometryModel()
     q: list[float] = []
     v: list[float] = []
-    for k, body in enumerate(given.bodies):
-        shape = coal.Sphere(body.size[0]) if body.is_ball else coal.Box(*body.size)
-        pn.free_body(model, f"body{k}", shape, body.density, collision_model=shapes)
+    for k, body in enumerate(given.free()):
+        pn.free_body(model, f"body{k}", body.shape, body.density, collision_model=shapes)
         q += [*body.at, *pin.Quaternion(pin.rpy.rpyToMatrix(*body.turn)).coeffs()]
         v += body.v0
+    laws = []
+    for k in range(len(given.free()), len(given.bodies)):
+        link = given.bodies[k]
+        to_next = pin.SE3(np.eye(3), np.array([0.0, 0.0, link.size[1] * (0.5 if k == 1 else 1.0)]))
+        center = pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.5 * link.size[1]]))
+        joint = model.addJoint(k, pin.JointModelSpherical(), to_next, f"joint{k}")
+        radius, length = link.size
+        mass = link.density * np.pi * radius**2 * (length + 4.0 / 3.0 * radius)
+        model.appendBodyToJoint(joint, pin.Inertia.FromCapsule(mass, radius, length), center)
+        shapes.addGeometryObject(pin.GeometryObject(f"body{k}", joint, center, link.shape))
+        laws.append(pn.JointFriction(f"joint{k}", viscous=given.damping))
+        q += [0.0, 0.0, 0.0, 1.0]
+        v += [0.0] * 3
     contacts = []
     for k, (normal, height) in enumerate(given.planes):
         plane = coal.Halfspace(np.array(normal), height)
@@ -99,7 +122,8 @@ def ours(given: ContactScene) -> pn.Scene:
             pn.GeometryContact(f"body{i}", f"plane{k}", mu=given.mu) for i in range(len(given.bodies))
         ]
     contacts += [pn.GeometryContact(f"body{j}", f"body{i}", mu=given.mu) for j, i in given.touching()]
-    return pn.Scene(model, contacts=contacts, collision_model=shapes, q0=np.array(q), v0=np.array(v))
+    start = {"q0": np.array(q), "v0": np.array(v)}
+    return pn.Scene(model, contacts=contacts, collision_model=shapes, laws=laws, **start)
 
 
 def mujocos(given: ContactScene, h: float) -> tuple[Any, Any]:
@@ -113,17 +137,31 @@ def mujocos(given: ContactScene, h: float) -> tuple[Any, Any]:
     for normal, height in given.planes:
         at = numbers([height * x for x in normal])
         ET.SubElement(world, "geom", type="plane", size="9 9 1", pos=at, zaxis=numbers(normal))
-    for body in given.bodies:
-        turn = pin.Quaternion(pin.rpy.rpyToMatrix(*body.turn))
-        item = ET.SubElement(
-            world, "body", pos=numbers(body.at), quat=numbers([turn.w, turn.x, turn.y, turn.z])
-        )
-        ET.SubElement(item, "freejoint")
-        kind, size = ("sphere", body.size) if body.is_ball else ("box", [0.5 * x for x in body.size])
-        ET.SubElement(item, "geom", type=kind, size=numbers(size), density=repr(body.density))
+    parent = world
+    for k, body in enumerate(given.bodies):
+        if given.damping is None or k == 0:
+            turn = pin.Quaternion(pin.rpy.rpyToMatrix(*body.turn))
+            place = {"pos": numbers(body.at), "quat": numbers([turn.w, turn.x, turn.y, turn.z])}
+            item, center = ET.SubElement(world, "body", place), 0.0
+            ET.SubElement(item, "freejoint")
+        else:
+            end = body.size[1] * (0.5 if k == 1 else 1.0)
+            item, center = ET.SubElement(parent, "body", pos=numbers([0.0, 0.0, end])), 0.5 * body.size[1]
+            ET.SubElement(item, "joint", type="ball", damping=repr(given.damping))
+        parent = item
+        size = {"box": [0.5 * x for x in body.size], "capsule": [body.size[0], 0.5 * body.size[-1]]}
+        geom = {
+            "type": body.kind,
+            "size": numbers(size.get(body.kind, body.size)),
+            "pos": numbers([0.0, 0.0, center]),
+        }
+        touches = (
+            {} if given.damping is None else {"contype": "0"}
+        )  # the links of a rope touch the ground only
+        ET.SubElement(item, "geom", geom, density=repr(body.density), **touches)
     model = mujoco.MjModel.from_xml_string(ET.tostring(root, encoding="unicode"))
     data = mujoco.MjData(model)
-    for k, body in enumerate(given.bodies):
+    for k, body in enumerate(given.free()):
         axes = pin.rpy.rpyToMatrix(*body.turn)
         data.qvel[6 * k : 6 * k + 3] = axes @ body.v0[:3]
         data.qvel[6 * k + 3 : 6 * k + 6] = body.v0[3:]
@@ -204,3 +242,9 @@ def wall(rows: int, columns: int) -> ContactScene:
         if below == row - 1 and abs(x - other) < 0.9 * size[0]
     ]
     return ContactScene(f"a wall of {rows * columns} bricks", bodies, pairs=pairs)
+
+
+def rope(count: int) -> ContactScene:
+    """Return a rope of capsules that falls on the ground, one end first."""
+    link = Body((0.01, 0.04), (0.0, 0.0, 0.05), (0.0, 0.5 * np.pi - 0.2, 0.0))
+    return ContactScene(f"a rope of {count} links", [link] * count, pairs=[], damping=1e-3)
