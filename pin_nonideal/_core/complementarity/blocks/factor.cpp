@@ -7,6 +7,9 @@
 
 namespace pn {
 
+// Number of unknowns from which pivots are eliminated in panels.
+constexpr int min_panel_size = 40;
+
 static int root(std::vector<int>& parent, int i) {
     while (parent[i] != i) i = parent[i] = parent[parent[i]];
     return i;
@@ -202,7 +205,8 @@ PN_WIDE bool BlockFactor::eliminate_general() {
     for (const Position& k : positions_) {
         double* D = &H_[k.diagonal];
         int* exchanges = &exchanges_[k.exchanges];
-        if (!eliminate(D, exchanges, k.size)) return false;
+        const bool regular = k.size < min_panel_size ? eliminate(D, exchanges, k.size) : eliminate<panel>(D, exchanges, k.size);
+        if (!regular) return false;
         for (size_t j = 0; j < k.later.size(); ++j) {
             const int m = positions_[k.later[j]].size;
             if (k.size == 6 && m == 6) substitute_six(D, exchanges, &H_[k.above[j]]);

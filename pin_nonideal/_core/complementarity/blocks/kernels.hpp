@@ -1,6 +1,7 @@
 // Dense kernels on small matrices stored by rows. Blocks of six, the free bodies, have loops of fixed length.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -8,18 +9,30 @@
 
 namespace pn {
 
-// A := its lower Cholesky factor, with inverses on the diagonal. Returns false if a pivot is not positive.
+// Pivots whose multiples leave the remaining rows of a large matrix together. A row is then read once for all of them.
+constexpr int panel = 4;
+
+// Subtract multiples f[0] ... f[3] of the first `n` numbers of four rows, `stride` apart, from x.
+PN_INLINE void subtract_panel(double* __restrict x, const double* f, const double* __restrict rows, int stride, int n) {
+    const double *__restrict a = rows, *__restrict b = a + stride, *__restrict c = b + stride, *__restrict d = c + stride;
+    const double fa = f[0], fb = f[1], fc = f[2], fd = f[3];
+    for (int j = 0; j < n; ++j) x[j] = (((x[j] - fa * a[j]) - fb * b[j]) - fc * c[j]) - fd * d[j];
+}
+
+// A := its lower Cholesky factor, with inverses on the diagonal. The upper triangle takes the transpose of the factor.
+// Returns false if a pivot is not positive.
 PN_INLINE bool cholesky(double* A, int n) {
-    for (int j = 0; j < n; ++j) {
-        double pivot = A[j * n + j];
-        for (int k = 0; k < j; ++k) pivot -= A[j * n + k] * A[j * n + k];
-        if (!(pivot > 0.0) || !(pivot < HUGE_VAL)) return false;
-        const double inverse = A[j * n + j] = 1.0 / std::sqrt(pivot);
-        for (int i = j + 1; i < n; ++i) {
-            double sum = A[i * n + j];
-            for (int k = 0; k < j; ++k) sum -= A[i * n + k] * A[j * n + k];
-            A[i * n + j] = sum * inverse;
+    for (int first = 0; first < n; first += panel) {
+        const int end = std::min(first + panel, n);
+        for (int p = first; p < end; ++p) {
+            double* __restrict row = A + p * n;
+            if (!(row[p] > 0.0) || !(row[p] < HUGE_VAL)) return false;
+            const double inverse = row[p] = 1.0 / std::sqrt(row[p]);
+            for (int i = p + 1; i < n; ++i) row[i] = A[i * n + p] *= inverse;
+            for (int q = p + 1; q < end; ++q)
+                for (int i = q; i < n; ++i) A[i * n + q] -= row[q] * row[i];
         }
+        for (int i = end; i < n; ++i) subtract_panel(A + i * n + end, A + i * n + first, A + first * n + end, n, i - end + 1);
     }
     return true;
 }
@@ -97,16 +110,19 @@ PN_INLINE void multiply_three(const double* G, const double* J, double* K) {
             K[r * N + k] = G[3 * r] * J[k] + G[3 * r + 1] * J[N + k] + G[3 * r + 2] * J[2 * N + k];
 }
 
-// C += A^T B, with A (k, m) and B (k, n).
+// C += A^T B, with A (k, m) and B (k, n). Rows of contacts on a long tree end with zeros, for the links beyond the contact.
 template <int N = 0>
 PN_INLINE void add_transpose_product(double* C, const double* A, const double* B, int k, int m, int n) {
     if (N) m = n = N;
-    for (int l = 0; l < k; ++l)
+    for (int l = 0; l < k; ++l) {
+        int end = n;
+        while (!N && end > 0 && B[l * n + end - 1] == 0.0) --end;
         for (int i = 0; i < m; ++i) {
             const double a = A[l * m + i];
             if (!N && a == 0.0) continue;
-            for (int j = 0; j < n; ++j) C[i * n + j] += a * B[l * n + j];
+            for (int j = 0; j < end; ++j) C[i * n + j] += a * B[l * n + j];
         }
+    }
 }
 
 // A row of six numbers.
@@ -159,21 +175,30 @@ PN_INLINE void subtract_six(double* C, const double* A, const double* B) {
     }
 }
 
-// Factor A = P L U in place with exchanges of rows. Returns false if a pivot is zero.
+// Factor A = P L U in place with exchanges of rows. Returns false if a pivot is zero. `many`: pivots of a panel.
+template <int many = 1>
 PN_INLINE bool eliminate(double* A, int* exchanges, int n) {
-    for (int c = 0; c < n; ++c) {
-        int best = c;
-        for (int i = c + 1; i < n; ++i)
-            if (std::abs(A[i * n + c]) > std::abs(A[best * n + c])) best = i;
-        exchanges[c] = best;
-        if (best != c)
-            for (int j = 0; j < n; ++j) std::swap(A[best * n + j], A[c * n + j]);
-        if (!(std::abs(A[c * n + c]) > 0.0) || !(std::abs(A[c * n + c]) < HUGE_VAL)) return false;
-        const double inverse = 1.0 / A[c * n + c];
-        for (int i = c + 1; i < n; ++i) {
-            const double factor = A[i * n + c] *= inverse;
-            for (int j = c + 1; j < n; ++j) A[i * n + j] -= factor * A[c * n + j];
+    for (int first = 0; first < n; first += many) {
+        const int end = std::min(first + many, n);
+        for (int c = first; c < end; ++c) {
+            int best = c;
+            for (int i = c + 1; i < n; ++i)
+                if (std::abs(A[i * n + c]) > std::abs(A[best * n + c])) best = i;
+            exchanges[c] = best;
+            if (best != c)
+                for (int j = 0; j < n; ++j) std::swap(A[best * n + j], A[c * n + j]);
+            if (!(std::abs(A[c * n + c]) > 0.0) || !(std::abs(A[c * n + c]) < HUGE_VAL)) return false;
+            const double inverse = 1.0 / A[c * n + c];
+            for (int i = c + 1; i < n; ++i) {
+                const double factor = A[i * n + c] *= inverse;
+                for (int j = c + 1; j < (many == 1 ? n : end); ++j) A[i * n + j] -= factor * A[c * n + j];
+            }
         }
+        if (many == 1) continue;
+        for (int i = first + 1; i < end; ++i)
+            for (int l = first; l < i; ++l)
+                for (int j = end; j < n; ++j) A[i * n + j] -= A[i * n + l] * A[l * n + j];
+        for (int i = end; i < n; ++i) subtract_panel(A + i * n + end, A + i * n + first, A + first * n + end, n, n - end);
     }
     return true;
 }
