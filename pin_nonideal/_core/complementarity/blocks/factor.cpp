@@ -205,8 +205,8 @@ PN_WIDE bool BlockFactor::eliminate_general() {
     for (const Position& k : positions_) {
         double* D = &H_[k.diagonal];
         int* exchanges = &exchanges_[k.exchanges];
-        const bool regular = k.size < min_panel_size ? eliminate(D, exchanges, k.size) : eliminate<panel>(D, exchanges, k.size);
-        if (!regular) return false;
+        const bool is_large = k.size >= min_panel_size;
+        if (!(is_large ? eliminate<panel>(D, exchanges, k.size) : eliminate(D, exchanges, k.size))) return false;
         for (size_t j = 0; j < k.later.size(); ++j) {
             const int m = positions_[k.later[j]].size;
             if (k.size == 6 && m == 6) substitute_six(D, exchanges, &H_[k.above[j]]);

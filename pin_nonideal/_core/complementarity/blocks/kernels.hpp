@@ -32,7 +32,8 @@ PN_INLINE bool cholesky(double* A, int n) {
             for (int q = p + 1; q < end; ++q)
                 for (int i = q; i < n; ++i) A[i * n + q] -= row[q] * row[i];
         }
-        for (int i = end; i < n; ++i) subtract_panel(A + i * n + end, A + i * n + first, A + first * n + end, n, i - end + 1);
+        for (int i = end; i < n; ++i)
+            subtract_panel(A + i * n + end, A + i * n + first, A + first * n + end, n, i - end + 1);
     }
     return true;
 }

@@ -80,7 +80,8 @@ private:
     void push_inline(const BlockElement& e, const VecX& f, VecX& x) const;
 
     std::vector<double> L_;  // lower Cholesky factors of the blocks of M
-    // By node whose unknowns are not normalized: sides of elements, as twice the element plus the side. Their rows as columns.
+    // Sides of elements by node whose unknowns are not normalized, as twice the element plus the side, and their rows as
+    // columns.
     mutable std::vector<std::vector<int>> sides_;
     mutable std::vector<double> columns_;
 };
