@@ -155,9 +155,7 @@ def mujocos(given: ContactScene, h: float) -> tuple[Any, Any]:
             "size": numbers(size.get(body.kind, body.size)),
             "pos": numbers([0.0, 0.0, center]),
         }
-        touches = (
-            {} if given.damping is None else {"contype": "0"}
-        )  # the links of a rope touch the ground only
+        touches = {} if given.damping is None else {"contype": "0"}  # links of a rope touch the ground alone
         ET.SubElement(item, "geom", geom, density=repr(body.density), **touches)
     model = mujoco.MjModel.from_xml_string(ET.tostring(root, encoding="unicode"))
     data = mujoco.MjData(model)

@@ -299,8 +299,7 @@ def _unit_vector(vector: Vector3) -> Vector3:
     """Return a vector of three numbers, not all zero, divided by its length."""
     scaled = np.array(vector)
     scaled /= np.abs(scaled).max()
-    x, y, z = (scaled / math.sqrt(float(scaled @ scaled))).tolist()
-    return (x, y, z)
+    return _triple(scaled / math.sqrt(float(scaled @ scaled)))
 
 
 @lru_cache(maxsize=MAX_CACHED_AXES)
