@@ -9,7 +9,7 @@ namespace pn {
 SeparateTrees::SeparateTrees(const Program& p) : blocks_(p) {}
 
 // Check if the scene can be solved tree by tree now: no constraints act, and the inertia of every tree is a matrix.
-bool SeparateTrees::applies(const Program& p, const Workspace& w) const {
+bool SeparateTrees::applies(const Workspace& w) const {
     const std::vector<char>& locked = w.now.terms.locked;
     return blocks_.applies() && w.now.rows.blocks.empty() &&
            std::find(locked.begin(), locked.end(), char(1)) == locked.end();
@@ -18,7 +18,7 @@ bool SeparateTrees::applies(const Program& p, const Workspace& w) const {
 bool SeparateTrees::pose(const Program& p, const Workspace& w, const std::vector<StepRow>& rows,
                          const std::vector<ConeElement>& cones, const VecX& a_free, const VecX& offset) {
     BlockProblem& problem = solver_.problem;
-    if (!applies(p, w) || !blocks_.fill(p, w, rows, cones, problem)) return false;
+    if (!applies(w) || !blocks_.fill(p, w, rows, cones, problem)) return false;
     problem.offset = offset.head(problem.rows);
     f_.setZero(problem.rows);
     a_free_ = a_free;

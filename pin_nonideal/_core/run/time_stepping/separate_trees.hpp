@@ -33,7 +33,7 @@ public:
     ConeResiduals residuals(const VecX& middle, const VecX& f);
 
 private:
-    bool applies(const Program& p, const Workspace& w) const;
+    bool applies(const Workspace& w) const;
     void exert(const VecX& middle, const VecX& f);
     void measure_balance();
 
