@@ -126,22 +126,12 @@ PN_WIDE void BlockProblem::push(const std::vector<int>& list, const VecX& f, Vec
     for (const int i : list) push_inline(elements[i], f, x);
 }
 
-// Add J J^T to W, for rows J of a node with mass-normalized unknowns.
-static PN_INLINE void add_response_of_rows(const double* J, int n, int dim, Mat3& W) {
+// Add J J^T to W, for the rows J of an element in mass-normalized unknowns. Entry k of row i is J[k * next + i * other].
+static PN_INLINE void add_response(const double* J, int n, int next, int other, int dim, Mat3& W) {
     for (int i = 0; i < dim; ++i)
         for (int j = 0; j < dim; ++j) {
             double sum = 0.0;
-            for (int k = 0; k < n; ++k) sum += J[i * n + k] * J[j * n + k];
-            W.c[j][i] += sum;
-        }
-}
-
-// Add X^T X to W, for the columns X = L^-1 J^T of an element. Row k of X begins at X + k * stride.
-static PN_INLINE void add_response_of_columns(const double* X, int n, int stride, int dim, Mat3& W) {
-    for (int i = 0; i < dim; ++i)
-        for (int j = 0; j < dim; ++j) {
-            double sum = 0.0;
-            for (int k = 0; k < n; ++k) sum += X[k * stride + i] * X[k * stride + j];
+            for (int k = 0; k < n; ++k) sum += J[k * next + i * other] * J[k * next + j * other];
             W.c[j][i] += sum;
         }
 }
@@ -154,12 +144,15 @@ PN_WIDE void BlockProblem::own_responses(const std::vector<int>& list, std::vect
         for (Vec3& column : W[i].c) column = Vec3::Zero();
         for (int side = 0; side < 2 && e.node[side] >= 0; ++side) {
             const BlockNode& node = nodes[e.node[side]];
-            if (node.normalized) add_response_of_rows(J.data() + e.J[side], node.size, e.dim(), W[i]);
-            else sides_[e.node[side]].push_back(2 * i + side);
+            if (node.normalized) {
+                add_response(J.data() + e.J[side], node.size, 1, node.size, e.dim(), W[i]);
+                continue;
+            }
+            if (sides_[e.node[side]].empty()) touched_.push_back(e.node[side]);
+            sides_[e.node[side]].push_back(2 * i + side);
         }
     }
-    for (size_t at = 0; at < nodes.size(); ++at) {
-        if (sides_[at].empty()) continue;
+    for (const int at : touched_) {
         const BlockNode& node = nodes[at];
         int count = 0;
         for (const int side : sides_[at]) count += elements[side / 2].dim();
@@ -174,11 +167,12 @@ PN_WIDE void BlockProblem::own_responses(const std::vector<int>& list, std::vect
         solve_lower_columns(L_.data() + node.M, node.size, columns_.data(), count);
         column = 0;
         for (const int side : sides_[at]) {
-            add_response_of_columns(columns_.data() + column, node.size, count, elements[side / 2].dim(), W[side / 2]);
+            add_response(columns_.data() + column, node.size, count, 1, elements[side / 2].dim(), W[side / 2]);
             column += elements[side / 2].dim();
         }
         sides_[at].clear();
     }
+    touched_.clear();
 }
 
 }  // namespace pn

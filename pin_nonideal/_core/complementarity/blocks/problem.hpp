@@ -80,8 +80,9 @@ private:
     void push_inline(const BlockElement& e, const VecX& f, VecX& x) const;
 
     std::vector<double> L_;  // lower Cholesky factors of the blocks of M
-    // Sides of elements by node whose unknowns are not normalized, as twice the element plus the side, and their rows as
-    // columns.
+    // Nodes whose unknowns are not normalized, sides of elements on each, as twice the element plus the side, and the rows
+    // of these elements as columns.
+    mutable std::vector<int> touched_;
     mutable std::vector<std::vector<int>> sides_;
     mutable std::vector<double> columns_;
 };
