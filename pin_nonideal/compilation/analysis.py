@@ -150,17 +150,16 @@ def zero_rows(
         LoopClosureError: a vanishing row has a residual above the tolerance.
     """
     free_gaps = set(program.free_gaps)
-    chosen = [block for block in range(len(program.block_names)) if block not in free_gaps]
+    chosen = [block for block in range(len(program.first_rows)) if block not in free_gaps]
     if not chosen:
         return [], []
-    described = program.constraints
-    chosen.sort(key=lambda block: described[block].first)
-    blocks = [described[block] for block in chosen]
-    opening = set(program.block_names[program.first_gap :])
+    first_rows = program.first_rows
+    chosen.sort(key=lambda block: first_rows[block])
+    blocks = program.constraint_rows(chosen)
     owners = [(c.name, row) for c in blocks for row in range(c.count)]
     # Rows that move in time may vanish at a few states only, so they stay. Gaps are never duplicates.
     fixed = np.array([c.moves_in_time for c in blocks for _ in range(c.count)], dtype=bool)
-    opens = np.array([c.name in opening for c in blocks for _ in range(c.count)], dtype=bool)
+    opens = np.repeat([block >= program.first_gap for block in chosen], [c.count for c in blocks])
     if fixed.all():
         return [], []
     runner, generator, samples = sampled.runner(), np.random.default_rng(1), []

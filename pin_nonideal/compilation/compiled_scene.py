@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Sequence
+from functools import cached_property
 
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.actuation import SampledControl
 from pin_nonideal.description.constraints import UserConstraint
 from pin_nonideal.description.contacts.pair_of_shapes import CapsulePairs, PairOfShapes, contact_parts
+from pin_nonideal.description.contacts.point_names import ContactOfPoint, UsedNames
 from pin_nonideal.description.drive_kinds import delayed_control, switching_drives
 from pin_nonideal.description.scene_spec import SceneSpec
 from pin_nonideal.errors import InputError, RunError
@@ -16,13 +18,13 @@ from pin_nonideal.states.held_entries import NOTHING_HELD, Held
 from pin_nonideal.states.joint_layout import joint_places
 from pin_nonideal.states.projection import Projection
 from pin_nonideal.states.report import ProjectionReport
-from pin_nonideal.states.rows import block_names, row_slices
+from pin_nonideal.states.rows import row_slices
 from pin_nonideal.types import Array, Model
 
 from .actuation import delayed_torque
 from .analysis import check_user_functions, has_rates, without_functions, zero_rows
 from .constraints import anchor_frames
-from .contact_groups import Descriptions, Groups, contacts_of_points, grouped_rows, points_by_pair
+from .contact_groups import Descriptions, Groups, grouped_rows, points_by_pair
 from .delay import DelayedTorque
 from .error_context import Circumstances, named_failure
 from .lowering import lower
@@ -50,22 +52,17 @@ class CompiledScene:
         q0: see above.
         spec: see above.
         program: the core's program, without the rows that can never act.
-        slices: rows of the core of each constraint and contact point, by name.
-        described: description of each constraint and contact point, by name; both stops of a joint share one.
         joints: layout of the values of each joint in q and v.
         shapes: names of the two shapes of each pair of shapes, by name of the pair.
         points: names of the contact points of each pair of shapes with several points.
         contact_of: contact of each of these points.
-        point_names: names of all contacts of the core, in the order of their descriptions.
         contacts: contacts of the user, as groups of `point_names`; each stop of a joint is one contact.
         multipliers: rows of `lam`, as groups of the rows of the core.
-        element_names: names of the friction elements of the core.
         elements: friction elements of the user, as groups of elements of the core.
         laws: laws of the user and of contacts with friction, as groups of laws of the core.
         works: columns of powers and works, as groups of columns of the core.
         rows: (first row in `lam`, end, whether it is a contact) of each constraint and contact, by name.
-        opening_names: names of the unilateral contacts.
-        block_names: names of all constraints and contacts, by block of the core.
+        has_openings: whether some contact is unilateral.
         anchors: (name, frame id, frame id or None for the world) of constraints between two frames.
         dropped: (name, row, reason) of rows that can never act; the rows of a pair of shapes are its points.
         projection: projection onto the constraints.
@@ -82,28 +79,23 @@ class CompiledScene:
         resolver = Resolver(model, q0)
         described, self._prepare = lower(spec, builder, resolver)
         self.program = builder.finish()
-        self.slices = row_slices(self.program)
         constraints = len(spec.constraints)  # contacts follow
-        pairs = [c for c in spec.contacts if isinstance(c, PairOfShapes)]
-        self.shapes = {pair.name: pair.shapes for pair in pairs}
+        self.shapes = {pair.name: pair.shapes for pair in self._pairs}
         self.points = points_by_pair(spec.contacts)
-        self.contact_of = contacts_of_points(self.points)
-        self.multipliers = grouped_rows(self.slices, self.contact_of)
+        self.contact_of = ContactOfPoint(self.points)
+        self.multipliers = grouped_rows(self.program, self.contact_of)
         self.rows = {
             name: (s.start, s.stop, k >= constraints)
             for k, (name, s) in enumerate(self.multipliers.slices.items())
         }
-        self.described = Descriptions(described, pairs, self.contact_of, self.slices)
+        self._described = described
         self.joints = joint_places(model)
-        self.block_names = block_names(self.program)
-        self.point_names = [self.block_names[block] for block in self.program.contacts]
         self.contacts = Groups(self.point_names, self.contact_of)
-        self.element_names = self.program.element_names
-        self.elements = Groups(self.element_names, self.contact_of)
+        self.elements = Groups(self.program.element_names, self.contact_of)
         self.laws = Groups(self.program.law_names, self.contact_of)
         self.works = Groups(self.program.power_names, self.contact_of)
-        self.opening_names = self.block_names[self.program.first_gap :]
-        named = list(zip(self.slices, spec.constraints, strict=False))  # contacts follow
+        self.has_openings = self.program.first_gap < len(self.program.first_rows)
+        named = list(zip(self.multipliers.slices, spec.constraints, strict=False))  # contacts follow
         self.anchors = anchor_frames(named, resolver)
         self.unprojected = [
             name
@@ -137,6 +129,41 @@ class CompiledScene:
         self._delayed: tuple[SampledControl, Resolver, core.Builder] | None = None
         if control is not None:
             self._delayed, self._building = (control, resolver, builder), threading.Lock()
+
+    @property
+    def _pairs(self) -> list[PairOfShapes]:
+        """Pairs of shapes."""
+        return [c for c in self.spec.contacts if isinstance(c, PairOfShapes)]
+
+    @cached_property
+    def slices(self) -> dict[str, slice]:
+        """Rows of the core of each constraint and contact point, by name."""
+        return row_slices(self.program)
+
+    @cached_property
+    def described(self) -> Descriptions:
+        """Description of each constraint and contact point, by name; both stops of a joint share one."""
+        return Descriptions(self._described, self._pairs, self.contact_of, self.slices)
+
+    @cached_property
+    def block_names(self) -> list[str]:
+        """Names of all constraints and contacts, by block of the core."""
+        return self.program.block_names
+
+    @cached_property
+    def element_names(self) -> list[str]:
+        """Names of the friction elements of the core."""
+        return self.program.element_names
+
+    @property
+    def point_names(self) -> list[str]:
+        """Names of all contacts of the core, in the order of their descriptions."""
+        return [self.block_names[block] for block in self.program.contacts]
+
+    @property
+    def opening_names(self) -> list[str]:
+        """Names of the unilateral contacts of the core."""
+        return self.block_names[self.program.first_gap :]
 
     def program_of_runs(
         self, t0: float, by_thread: bool = False
@@ -197,7 +224,7 @@ class CompiledScene:
     @property
     def explicit_only(self) -> str:
         """Message on a part of the scene that no implicit method supports, or empty."""
-        if self.opening_names:
+        if self.has_openings:
             name = self.contact(self.opening_names[0])
             return f'no implicit method here opens and closes contacts such as "{name}" yet'
         if switching := switching_drives(self.spec.actuation):
@@ -220,7 +247,7 @@ class CompiledScene:
         """Return the names of the parts of the scene that error messages of its runs need."""
         spec = self.spec
         sources = ("the actuation", _quote("force", spec.forces), _quote("law", spec.laws))
-        used_names: set[str] = set()
+        used_names = UsedNames()
         unique_names(spec.constraints, used_names)
         names = unique_names(spec.contacts, used_names)
         pairs = {
@@ -240,7 +267,7 @@ def _frames_of(contact: object) -> tuple[str, str]:
 
 def _quote(kind: str, descriptions: Sequence[object]) -> str:
     """Return the names of descriptions of a kind, at most the first few."""
-    names = unique_names(descriptions, set())
+    names = unique_names(descriptions, UsedNames())
     shown = ", ".join(f'"{name}"' for name in names[:MAX_QUOTED])
     shown += ", ..." if len(names) > MAX_QUOTED else ""
     return f"{kind} {shown}" if len(names) == 1 else f"one of the {kind}s {shown}"

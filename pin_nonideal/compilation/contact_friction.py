@@ -66,7 +66,7 @@ def lower_contact_friction(
             lines1=lines1,
             lines2=lines2,
             radius1=like.radius1,
-            first=context.reactions.blocks[name],
+            first=context.blocks[name],
             mu=like.mu,
             static_ratio=like.static_ratio,
         )
@@ -81,7 +81,7 @@ def lower_contact_friction(
             name=element,
             load=core.Load.multiplier,
             reaction=core.Reaction.total,
-            anchor=context.reactions.blocks[name],
+            anchor=context.blocks[name],
             row=2 if isinstance(c, Rolling) else 0,
             mu=coefficient,
             static_ratio=getattr(c, "static_ratio", 1.0),

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.contacts.pair_of_shapes import CapsulePairs, PairOfShapes
+from pin_nonideal.description.contacts.point_names import ContactOfPoint, split_number
+from pin_nonideal.states.rows import names_by_row
 from pin_nonideal.types import Array
 
 # Modes of friction elements.
@@ -25,7 +27,8 @@ class Groups:
     """Entries of the core by the contacts of the user; the points of a contact follow each other.
 
     Args:
-        names: name of each entry, such as a row, a friction element or a law.
+        names: name of each entry, such as a row, a friction element or a law. All points of a contact have an
+            entry, or none.
         contact_of: contact of each point of the pairs of shapes with several points.
 
     Attributes:
@@ -35,15 +38,14 @@ class Groups:
         single: whether each group has one entry.
     """
 
-    def __init__(self, names: Sequence[str], contact_of: Mapping[str, str]) -> None:
+    def __init__(self, names: Sequence[str], contact_of: ContactOfPoint) -> None:
         self.names: list[str] = []
-        self.count, starts, before = len(names), [], None
-        for k, name in enumerate(names):
-            contact = contact_of.get(name)
-            if contact is None or contact != before:
-                starts.append(k)
-                self.names.append(contact or name)
-            before = contact
+        self.count, starts, k = len(names), [], 0
+        while k < self.count:
+            points = contact_of.following(names[k])
+            starts.append(k)
+            self.names.append(contact_of[names[k]] if points else names[k])
+            k += points or 1
         self.starts = np.array(starts, dtype=np.intp)
         self.single = len(starts) == self.count
 
@@ -123,10 +125,10 @@ class Descriptions(Mapping[str, object]):
 
     def __getitem__(self, name: str) -> object:
         """Return the description of a constraint or contact point."""
-        base, _, number = name.rpartition(" ")
         if name in self._contact_of:
-            return self._pairs[base].points[int(number) - 1]
-        return self._described[name if name in self._described else base]
+            pair, number = split_number(name)
+            return self._pairs[pair].points[number - 1]
+        return self._described[name if name in self._described else name.rpartition(" ")[0]]
 
     def single(self) -> Iterator[tuple[str, object]]:
         """Yield names and descriptions, without contacts of `CapsulePairs`."""
@@ -158,23 +160,24 @@ class RowGroups(NamedTuple):
     slices: dict[str, slice]
 
 
-def grouped_rows(slices: Mapping[str, slice], contact_of: Mapping[str, str]) -> RowGroups:
+def grouped_rows(program: core.Program | core.Builder, contact_of: ContactOfPoint) -> RowGroups:
     """Return the rows of `lam` of each constraint and contact of the user, as groups of rows of the core.
 
     Args:
-        slices: rows of the core of each constraint and contact point, by name and in order.
-        contact_of: contact of each point.
+        program: the core's program, finished or under construction.
+        contact_of: contact of each point; a point has one row.
     """
-    groups = Groups([name for name, s in slices.items() for _ in range(s.stop - s.start)], contact_of)
-    owners, first, shown = Groups(list(slices), contact_of), 0, {}
-    for name in owners.names:
-        own = slices.get(name, slice(0, 1))
-        shown[name] = slice(first, first + own.stop - own.start)
+    names, counts = names_by_row(program)
+    owners = Groups(names, contact_of)
+    row_names = [name for name, count in zip(names, counts, strict=True) for _ in range(count)]
+    first, shown = 0, {}
+    for name, owner in zip(owners.names, owners.starts.tolist(), strict=True):
+        shown[name] = slice(first, first + counts[owner])
         first = shown[name].stop
-    return RowGroups(groups, shown)
+    return RowGroups(Groups(row_names, contact_of), shown)
 
 
-def points_by_pair(contacts: Iterable[object]) -> dict[str, list[str]]:
+def points_by_pair(contacts: Iterable[object]) -> dict[str, Sequence[str]]:
     """Return the names of the points of each pair of shapes with several points.
 
     Args:
@@ -182,15 +185,6 @@ def points_by_pair(contacts: Iterable[object]) -> dict[str, list[str]]:
     """
     named = ((c.name, c.names) for c in contacts if isinstance(c, PairOfShapes))
     return {pair: names for pair, names in named if len(names) > 1}
-
-
-def contacts_of_points(pairs: Mapping[str, Sequence[str]]) -> dict[str, str]:
-    """Return the name of the pair of each point.
-
-    Args:
-        pairs: names of points by pair, see `points_by_pair`.
-    """
-    return {point: pair for pair, points in pairs.items() for point in points}
 
 
 def contact_names(names: Iterable[str], contact_of: Mapping[str, str]) -> list[str]:

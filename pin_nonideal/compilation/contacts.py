@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import get_args
 
 import numpy as np
@@ -19,6 +19,7 @@ from pin_nonideal.description.contacts import (
     UserContact,
 )
 from pin_nonideal.description.contacts.pair_of_shapes import CapsulePairs
+from pin_nonideal.description.contacts.point_names import ContactOfPoint
 from pin_nonideal.description.contacts.solids import (
     CylinderContact,
     EllipsoidContact,
@@ -41,10 +42,10 @@ NO_LIMIT = np.finfo(float).max
 
 def lower_contacts(
     contacts: Sequence[tuple[str, Contact | CapsulePairs]],
-    contact_of: Mapping[str, str],
+    contact_of: ContactOfPoint,
     out: core.Builder,
     resolver: Resolver,
-) -> Iterator[tuple[str, Contact | CapsulePairs]]:
+) -> Iterator[tuple[str, Contact | CapsulePairs, int]]:
     """Add the normal rows of all contacts; `lower_contact_friction` adds their friction after all rows.
 
     Bilateral contacts are added before unilateral contacts. Their rows are in the order of the descriptions.
@@ -56,7 +57,7 @@ def lower_contacts(
         resolver: frames and joints by name.
 
     Yields:
-        Name and description of each added contact.
+        Name, description and first block of each added contact.
 
     Raises:
         InputError, UnknownNameError: a frame or joint does not exist, or the description does not fit the
@@ -74,9 +75,12 @@ def lower_contacts(
         for i, (name, c) in enumerate(contacts):
             if getattr(c, "unilateral", True) is opens:
                 blocks[i] = lower_gaps(c, name, out, resolver)
-                yield name, c
-    pairs = {name: k for k, name in enumerate(dict.fromkeys(contact_of.values()))}
-    pair_of = [pairs.get(contact_of.get(name, ""), -1) for name, _ in contacts]
+                yield name, c, blocks[i][0]
+    pairs: dict[str, int] = {}
+    pair_of = []
+    for name, _ in contacts:
+        pair = contact_of.get(name)
+        pair_of.append(-1 if pair is None else pairs.setdefault(pair, len(pairs)))
     out.order_contacts(
         [block for i in range(len(contacts)) for block in blocks[i]],
         [pair_of[i] for i in range(len(contacts)) for _ in blocks[i]],

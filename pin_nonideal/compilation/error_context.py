@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import pinocchio as pin
@@ -80,7 +80,7 @@ class Circumstances(NamedTuple):
     explicit_only: str
     sources: tuple[str, str, str]
     pairs: dict[str, tuple[str, str]]
-    contact_of: dict[str, str]
+    contact_of: Mapping[str, str]
 
 
 def named_failure(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import pinocchio as pin
@@ -29,12 +30,14 @@ class LoweringContext(NamedTuple):
     Attributes:
         resolver: frames and joints by name.
         constraints: descriptions of the constraints by name.
-        reactions: names by which user laws may access reactions.
+        blocks: index of each constraint, and of the first block of each contact, among the core's blocks.
+        reactions: function that returns the names by which user laws may access reactions.
     """
 
     resolver: Resolver
     constraints: dict[str, object]
-    reactions: ReactionNames
+    blocks: dict[str, int]
+    reactions: Callable[[], ReactionNames]
 
 
 # Limits below are zero, because their squares underflow [N m or N].
@@ -171,7 +174,7 @@ def _in_constraint(
 ) -> list[FrictionSite]:
     """Return the friction sites of an anchor or a coupling."""
     c: object = context.constraints[law.joint]
-    who, anchor, resolver = words(law, name), context.reactions.blocks[law.joint], context.resolver
+    who, anchor, resolver = words(law, name), context.blocks[law.joint], context.resolver
     if isinstance(c, JointCoupling):
         return [_in_coupling(law, who, name, c, anchor, out, resolver)]
     _refuse(law, who, TEETH, f'a parameter of a JointCoupling, and "{law.joint}" is a {type(c).__name__}')

@@ -70,7 +70,7 @@ def _(law: Drag, name: str, out: core.Builder, context: LoweringContext) -> None
 
 @lower_law.register
 def _(law: UserLaw, name: str, out: core.Builder, context: LoweringContext) -> None:
-    nv, names = context.resolver.model.nv, context.reactions
+    nv, names = context.resolver.model.nv, context.reactions()
     shapes = ((nv,), (law.states,)) if law.states else ((nv,),)
     function = checked_function(law.function, f"{words(law, name)}: function", *shapes)
 
@@ -83,7 +83,7 @@ def _(law: UserLaw, name: str, out: core.Builder, context: LoweringContext) -> N
 
 @lower_law.register
 def _(law: UserFriction, name: str, out: core.Builder, context: LoweringContext) -> None:
-    who, names = words(law, name), context.reactions
+    who, names = words(law, name), context.reactions()
     direction = checked_function(law.direction, f"{who}: direction", (context.resolver.model.nv,))
     limits = checked_limits(law.limit, f"{who}: limit")
 

@@ -10,14 +10,14 @@ from pin_nonideal.core_loader import core
 from pin_nonideal.description.constraints import Rolling
 from pin_nonideal.description.contacts import JointLimit
 from pin_nonideal.description.contacts.pair_of_shapes import contact_parts, given_contacts
+from pin_nonideal.description.contacts.point_names import ContactOfPoint, UsedNames
 from pin_nonideal.description.scene_spec import SceneSpec
-from pin_nonideal.states.rows import row_slices
 
 from .actuation import lower_actuation
 from .callbacks import ReactionNames
 from .constraints import lower_constraint
 from .contact_friction import has_friction, lower_contact_friction
-from .contact_groups import contacts_of_points, grouped_rows, points_by_pair
+from .contact_groups import grouped_rows, points_by_pair
 from .contacts import lower_contacts, lower_gaps
 from .forces import lower_force
 from .friction import LoweringContext
@@ -82,26 +82,29 @@ def lower_stepwise(spec: SceneSpec, builder: core.Builder, resolver: Resolver) -
         builder: the core's program under construction, still empty.
         resolver: frames and joints by name.
     """
-    used_names: set[str] = set()
+    used_names = UsedNames()
     constraint_names = unique_names(spec.constraints, used_names)
-    own_names = unique_names(spec.contacts, set(used_names))  # of contacts, before their points
+    own_names = unique_names(spec.contacts, used_names.copy())  # of contacts, before their points
     contacts: list[Any] = contact_parts(spec.contacts)
     contact_names = unique_names(contacts, used_names)
     given = given_contacts(spec.contacts)
-    rubbing_names = {name for name, c in zip(own_names, given, strict=True) if has_friction(c)}
-    law_names = unique_names(spec.laws, rubbing_names)  # a contact with friction has a law of its name
+    rubbing_names = UsedNames()  # a contact with friction has a law of its name
+    for name, c in zip(own_names, given, strict=True):
+        if has_friction(c):
+            rubbing_names.add(name)
+    law_names = unique_names(spec.laws, rubbing_names)
     for c, name in zip(spec.constraints, constraint_names, strict=True):
         lower_constraint(c, name, builder, resolver)
         yield LoweredItem("constraint", name, c, partial(_relower, lower_constraint, name, resolver))
-    contact_of = contacts_of_points(points_by_pair(spec.contacts))
-    named = list(zip(contact_names, contacts, strict=True))
-    for name, contact in lower_contacts(named, contact_of, builder, resolver):
-        yield LoweredItem("contact", name, contact, partial(_relower, lower_gaps, name, resolver))
-    joints = {name: i for i, name in enumerate(resolver.model.names) if i}
     blocks = {name: block for block, name in enumerate(builder.block_names)}
-    multipliers = grouped_rows(row_slices(builder), contact_of)
-    names = ReactionNames(multipliers, blocks, joints)
-    context = LoweringContext(resolver, dict(zip(constraint_names, spec.constraints, strict=True)), names)
+    contact_of = ContactOfPoint(points_by_pair(spec.contacts))
+    named = list(zip(contact_names, contacts, strict=True))
+    for name, contact, first in lower_contacts(named, contact_of, builder, resolver):
+        blocks[name] = first
+        yield LoweredItem("contact", name, contact, partial(_relower, lower_gaps, name, resolver))
+    reactions = partial(_reaction_names, builder, contact_of, resolver)
+    constraints: dict[str, object] = dict(zip(constraint_names, spec.constraints, strict=True))
+    context = LoweringContext(resolver, constraints, blocks, reactions)
     for law, name in zip(spec.laws, law_names, strict=True):
         lower_law(law, name, builder, context)
         yield LoweredItem("law", name, law, partial(_relower, lower_law, name, context))
@@ -114,13 +117,20 @@ def lower_stepwise(spec: SceneSpec, builder: core.Builder, resolver: Resolver) -
     for touching, name in [*rolling, *rubbing]:
         lower_contact_friction(touching, name, builder, context)
         yield LoweredItem("contact", name, touching, partial(_relower, lower_contact_friction, name, context))
-    for name, f in zip(unique_names(spec.forces, set()), spec.forces, strict=True):
+    for name, f in zip(unique_names(spec.forces, UsedNames()), spec.forces, strict=True):
         lower_force(f, builder, resolver)
         yield LoweredItem("force", name, f, lambda f, out: lower_force(f, out, resolver))
     prepare = lower_actuation(spec.actuation, builder, resolver, spec)
     relower = partial(_relower_actuation, resolver, spec)
     yield LoweredItem("actuation", "actuation", spec.actuation, relower, prepare)
     builder.set_impact(core.ImpactLaw[spec.impact])  # last, since it belongs to no description
+
+
+def _reaction_names(builder: core.Builder, contact_of: ContactOfPoint, resolver: Resolver) -> ReactionNames:
+    """Return the names by which user laws access reactions, after all constraints and contacts are added."""
+    blocks = {name: block for block, name in enumerate(builder.block_names)}
+    joints = {name: i for i, name in enumerate(resolver.model.names) if i}
+    return ReactionNames(grouped_rows(builder, contact_of), blocks, joints)
 
 
 def _relower(

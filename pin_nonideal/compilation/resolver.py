@@ -12,6 +12,7 @@ from pin_nonideal.core_loader import core
 from pin_nonideal.description.constraints import HingeAnchor, Rolling
 from pin_nonideal.description.contacts import PointContact
 from pin_nonideal.description.contacts.pair_of_shapes import CapsulePairs
+from pin_nonideal.description.contacts.point_names import UsedNames
 from pin_nonideal.description.contacts.round import (
     BoxContact,
     CapsuleContact,
@@ -293,7 +294,7 @@ def rotated_frame(frame: Frame, rpy: Sequence[float] | Array) -> Frame:
     return joint, (np.reshape(R, (3, 3)) @ pin.rpy.rpyToMatrix(*rpy)).ravel().tolist(), p
 
 
-def unique_names(descriptions: Sequence[object], used_names: set[str]) -> list[str]:
+def unique_names(descriptions: Sequence[object], used_names: UsedNames) -> list[str]:
     """Return a unique name for each description: the user's name, or the kind with its frames or joints.
 
     Args:
@@ -306,9 +307,8 @@ def unique_names(descriptions: Sequence[object], used_names: set[str]) -> list[s
     names = []
     for d in descriptions:
         if isinstance(d, CapsulePairs):
-            if taken := used_names.intersection(d.names):
-                raise InputError(f'names must be unique in a scene; "{min(taken)}" is used twice')
-            used_names.update(d.names)
+            if taken := used_names.add_points(d.names):
+                raise InputError(f'names must be unique in a scene; "{taken}" is used twice')
             names.append(d.names[0])
             continue
         own = getattr(d, "name", None)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pin_nonideal.description.contacts.pair_of_shapes import PairOfShapes
+from pin_nonideal.description.contacts.point_names import UsedNames
 from pin_nonideal.description.drive_lists import drives_of
 from pin_nonideal.states.joint_order import file_order
 from pin_nonideal.types import Model, Table
@@ -132,7 +133,7 @@ def describe(scene: CompiledScene, name: str) -> Description:
         for key, (first, end, _) in scene.rows.items()
     ]
     held = len(spec.constraints)
-    names = unique_names(spec.laws, set())
+    names = unique_names(spec.laws, UsedNames())
     return Description(
         name=name,
         joints=_joints(scene.model, scene),

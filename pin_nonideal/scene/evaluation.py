@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import Concatenate, ParamSpec, TypeVar
 
 import numpy as np
@@ -31,16 +32,17 @@ class Evaluator:
     Args:
         compiled: the compiled scene.
         states: its states.
-
-    Attributes:
-        runner: the core's workspace for single states.
     """
 
     def __init__(self, compiled: CompiledScene, states: SceneStates) -> None:
-        self.runner = compiled.program.runner()
         self._compiled, self._states = compiled, states
         self._model, self._nv = compiled.model, int(compiled.model.nv)
         self._is_of = compiled.program.is_of
+
+    @cached_property
+    def runner(self) -> core.Runner:
+        """The core's workspace for single states."""
+        return self._compiled.program.runner()
 
     def solve(
         self,

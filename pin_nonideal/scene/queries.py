@@ -26,16 +26,16 @@ class Queries:
 
     def __init__(self, compiled: CompiledScene, states: SceneStates, evaluator: Evaluator, name: str) -> None:
         self._compiled, self._states, self._name = compiled, states, name
-        self._runner = evaluator.runner
+        self._evaluator = evaluator
         self._nv = int(compiled.model.nv)
 
     def mass_matrix(self, q: State | None) -> Array:
         """M(q) of the tree, without constraints, (nv, nv)."""
-        return self._runner.terms(self._at(q), np.zeros(self._nv))[0].reshape(self._nv, self._nv)
+        return self._evaluator.runner.terms(self._at(q), np.zeros(self._nv))[0].reshape(self._nv, self._nv)
 
     def bias_forces(self, q: State | None, v: State | None) -> Array:
         """Coriolis, centrifugal and gravity forces, (nv,)."""
-        return self._runner.terms(self._at(q), self._speed(v))[1]
+        return self._evaluator.runner.terms(self._at(q), self._speed(v))[1]
 
     def jacobian(self, name: str, q: State | None, t: float) -> Array:
         """Rows of one constraint or contact, (rows, nv)."""
@@ -46,11 +46,11 @@ class Queries:
             )
         points = self._compiled.points.get(name, [name])
         rows = slice(slices[points[0]].start, slices[points[-1]].stop)
-        return rows_at(self._runner, self._at(q), np.zeros(self._nv), number("t", t))[0][rows]
+        return rows_at(self._evaluator.runner, self._at(q), np.zeros(self._nv), number("t", t))[0][rows]
 
     def energies(self, q: State | None, v: State | None) -> dict[str, float]:
         """Kinetic, potential and total energy [J], by name."""
-        kinetic, potential = self._runner.energies(self._at(q), self._speed(v))
+        kinetic, potential = self._evaluator.runner.energies(self._at(q), self._speed(v))
         return {"kinetic": kinetic, "potential": potential, "total": kinetic + potential}
 
     def _at(self, q: State | None) -> Array:

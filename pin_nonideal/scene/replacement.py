@@ -9,6 +9,7 @@ import pinocchio as pin
 
 from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.compilation.resolver import unique_names
+from pin_nonideal.description.contacts.point_names import UsedNames
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
 from pin_nonideal.geometry.ground import lowest_height
 from pin_nonideal.states.held_entries import Held
@@ -50,9 +51,9 @@ def parts_after(
     spec = compiled.spec
     now: dict[str, tuple[object, ...]] = {kind: tuple(getattr(spec, kind)) for kind in KINDS}
     names = dict(
-        zip(("laws", "forces"), (unique_names(now[k], set()) for k in ("laws", "forces")), strict=True)
+        zip(("laws", "forces"), (unique_names(now[k], UsedNames()) for k in ("laws", "forces")), strict=True)
     )
-    used_names: set[str] = set()
+    used_names = UsedNames()
     names |= {kind: unique_names(now[kind], used_names) for kind in ("constraints", "contacts")}
     leave = set(sequence("replace: remove", remove))
     known = [name for kind in KINDS for name in names[kind]]

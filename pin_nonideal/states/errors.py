@@ -37,9 +37,8 @@ def widest_loop(phi: Array, program: core.Program) -> tuple[str, float]:
         phi: residuals or rates of all rows, (m,).
         program: the core's program.
     """
-    slices = row_slices(program)
-    loops = [c.name for c in program.constraints[: program.first_gap] if all(c.holonomic)]
-    gaps = {name: _largest(phi[slices[name]]) for name in loops}
+    loops = [c for c in program.bilateral if all(c.holonomic)]
+    gaps = {c.name: _largest(phi[c.first : c.first + c.count]) for c in loops}
     name = max(gaps, key=lambda key: gaps[key], default="")
     return name, gaps.get(name, 0.0)
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from contextlib import suppress
 from copy import copy
-from types import MappingProxyType
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
 from pin_nonideal.core_loader import core
+from pin_nonideal.description.contacts.point_names import NO_POINTS
 from pin_nonideal.errors import InputError, NonFiniteError, PinNonidealError
 from pin_nonideal.types import Array, Model
 
@@ -53,7 +53,6 @@ MAX_PENETRATION = 1e-2
 # Maximum number of degrees of freedom for a search, which takes minutes above it. Newton's method is then
 # tried from any residual.
 MANY_FREEDOMS = 300
-NO_PAIRS: Mapping[str, str] = MappingProxyType({})
 
 
 class Projection:
@@ -80,7 +79,7 @@ class Projection:
         q0: Array,
         immovable_contacts: Collection[str] = (),
         is_start: bool = True,
-        contact_of: Mapping[str, str] = NO_PAIRS,
+        contact_of: Mapping[str, str] = NO_POINTS,
     ) -> None:
         self._contact_of = contact_of
         self.model, self.program = model, program

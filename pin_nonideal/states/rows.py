@@ -11,9 +11,16 @@ from pin_nonideal.core_loader import core
 from pin_nonideal.types import Array
 
 
-def block_names(program: core.Program) -> list[str]:
-    """Return the names of all constraints and contacts, by block of the core."""
-    return program.block_names
+def names_by_row(program: core.Program | core.Builder) -> tuple[list[str], list[int]]:
+    """Return the names of all constraints and contacts in the order of their rows, and their numbers of rows.
+
+    Args:
+        program: the core's program, finished or under construction.
+    """
+    first, names = np.array(program.first_rows, dtype=np.intp), program.block_names
+    order = np.argsort(first, kind="stable")
+    counts = np.diff(np.append(first[order], program.rows))
+    return [names[block] for block in order.tolist()], counts.tolist()
 
 
 def row_slices(program: core.Program | core.Builder) -> dict[str, slice]:
@@ -22,9 +29,9 @@ def row_slices(program: core.Program | core.Builder) -> dict[str, slice]:
     Args:
         program: the core's program, finished or under construction.
     """
-    blocks = sorted(zip(program.first_rows, program.block_names, strict=True))
-    ends = [*(first for first, _ in blocks[1:]), program.rows]
-    return {name: slice(first, end) for (first, name), end in zip(blocks, ends, strict=False)}
+    names, counts = names_by_row(program)
+    ends = np.cumsum(counts, dtype=np.intp).tolist()
+    return {name: slice(end - count, end) for name, count, end in zip(names, counts, ends, strict=True)}
 
 
 def holonomic_rows(program: core.Program) -> NDArray[np.bool_]:
@@ -34,7 +41,7 @@ def holonomic_rows(program: core.Program) -> NDArray[np.bool_]:
         program: the core's program.
     """
     out = np.zeros(program.rows, dtype=bool)
-    for c in program.constraints[: program.first_gap]:
+    for c in program.bilateral:
         out[c.first : c.first + c.count] = c.holonomic
     return out
 

@@ -38,7 +38,7 @@ def contact_record(run: RunFields, name: str) -> ContactRecord:
         closed = run.closed[:, scene.contact_names.index(name)]
     return ContactRecord(
         name=name,
-        points=points,
+        points=list(points),
         bodies=(str(scene.model.names[bodies.joint]), str(scene.model.names[bodies.other])),
         closed=closed,
         force=forces[name],

@@ -78,7 +78,7 @@ def outcome_fields(compiled: CompiledScene, outcome: core.Outcome, options: Any)
         power = works.sum(outcome.power.reshape(nt, works.count))
         fields["power"] = dict(zip(_columns(compiled), power.T, strict=True))
     if options.energy:
-        jumps = ["impacts"] if compiled.opening_names else []
+        jumps = ["impacts"] if compiled.has_openings else []
         fields["energy"] = _ledger(works, [*_columns(compiled), *jumps], outcome.energy)
     if compiled.contacts.names:
         closed = outcome.closed.reshape(nt, compiled.contacts.count).astype(bool)

@@ -15,6 +15,7 @@ from pin_nonideal.compilation.contacts import lower_contacts
 from pin_nonideal.compilation.resolver import Resolver
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.constraints import PointAnchor
+from pin_nonideal.description.contacts.point_names import NO_POINTS
 from pin_nonideal.states.joint_layout import joint_places
 from pin_nonideal.trajectory.by_name import joint_record, law_record
 from pin_nonideal.trajectory.columns import columns
@@ -69,7 +70,7 @@ def run_of(model: pin.Model, t: Any, q: Callable[[float], Any], **fields: Any) -
         multipliers=SimpleNamespace(slices=scene.constraint_slices),
         spec=scene,
         points={},
-        contact_of={},
+        contact_of=NO_POINTS,
         contact=str,
     )
     values: dict[str, Any] = {
@@ -97,7 +98,7 @@ def run_of(model: pin.Model, t: Any, q: Callable[[float], Any], **fields: Any) -
 
 def described(names: list[str], held: list[Any]) -> Descriptions:
     """Return descriptions by name, without pairs of shapes."""
-    return Descriptions(dict(zip(names, held, strict=True)), (), {}, names)
+    return Descriptions(dict(zip(names, held, strict=True)), (), NO_POINTS, names)
 
 
 def _program(scene: Any, names: list[str]) -> Any:
@@ -106,7 +107,7 @@ def _program(scene: Any, names: list[str]) -> Any:
     for name, c in zip(names, scene.constraints, strict=False):
         lower_constraint(c, name, builder, where)
     contacts = list(zip(names[len(scene.constraints) :], scene.contacts, strict=True))
-    list(lower_contacts(contacts, {}, builder, where))
+    list(lower_contacts(contacts, NO_POINTS, builder, where))
     return builder.finish()
 
 

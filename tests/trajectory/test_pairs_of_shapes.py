@@ -13,6 +13,7 @@ import pytest
 
 import pin_nonideal as pn
 from pin_nonideal.compilation.contact_groups import Groups
+from pin_nonideal.description.contacts.point_names import NO_POINTS, ContactOfPoint
 from pin_nonideal.scene.scene import compiled_scene
 from pin_nonideal.states.rows import rows_at
 
@@ -287,7 +288,7 @@ def test_a_law_reads_the_load_of_the_pair() -> None:
 def test_groups_of_entries() -> None:
     groups = Groups(
         ["a 1", "a 2", "b", "c 1", "c 2", "c 3"],
-        {"a 1": "a", "a 2": "a"} | dict.fromkeys(("c 1", "c 2", "c 3"), "c"),
+        ContactOfPoint({"a": ["a 1", "a 2"], "c": ["c 1", "c 2", "c 3"]}),
     )
     assert groups.names == ["a", "b", "c"]
     assert groups.index.tolist() == [0, 0, 1, 2, 2, 2]
@@ -298,4 +299,4 @@ def test_groups_of_entries() -> None:
     assert groups.sum(np.arange(6.0)).tolist() == [1.0, 2.0, 12.0]
     assert groups.least(np.arange(6.0)).tolist() == [0.0, 2.0, 3.0]
     assert groups.any(modes[0] == 1).tolist() == [True, False, False]
-    assert Groups([], {}).sum(np.zeros((4, 0))).shape == (4, 0)
+    assert Groups([], NO_POINTS).sum(np.zeros((4, 0))).shape == (4, 0)

@@ -55,6 +55,20 @@ void Block::lay_out(const Mechanism& m, SharedSupports& shared) {
     acts_on = known;
 }
 
+void BlockValues::resize(const std::vector<Block>& blocks, int nv) {
+    storage_.clear();
+    for (const Block& block : blocks) storage_.emplace_back(block.kind);
+    known_.clear();
+    known_.resize(blocks.size());
+    nv_ = nv;
+}
+
+[[gnu::noinline]] RowValues& BlockValues::allocate(size_t block) const {
+    known_[block] = std::make_unique<RowValues>();
+    known_[block]->resize(storage_[block], nv_);
+    return *known_[block];
+}
+
 // Return a unit wrench as a force on one body of a block, about its reference point. The reference points of both
 // bodies differ if the bodies belong to different trees or to a deep tree.
 static PN_INLINE Force about(const Wrench& w, const Body& body) {
@@ -137,7 +151,7 @@ void scale_rows(const Mechanism& m, Terms& terms, const Block& block, const RowV
     scale_flat_rows<true>(m, terms, block, B);
 }
 
-void add_transpose(const Block& block, const std::vector<double>& B, const VecX& lam, VecX& y) {
+void add_transpose(const Block& block, const RowEntries& B, const VecX& lam, VecX& y) {
     with_rows(static_cast<int>(block.kept.size()), [&](auto r) {
         const double *x = B.data() + block.offset, *l = lam.data() + block.row;
         for (size_t p = 0; p < block.support().size(); ++p, x += r) {
@@ -149,7 +163,7 @@ void add_transpose(const Block& block, const std::vector<double>& B, const VecX&
 }
 
 void add_transpose(const Block& block, const Mechanism& m, const Terms& terms, const RowValues& values,
-                   const std::vector<double>& A, const VecX& lam, VecX& y, std::vector<Force>& body) {
+                   const RowEntries& A, const VecX& lam, VecX& y, std::vector<Force>& body) {
     const size_t r = block.kept.size();
     for (size_t l = 0; l < block.support().size(); ++l) {
         const int dof = block.support()[l];
@@ -160,7 +174,7 @@ void add_transpose(const Block& block, const Mechanism& m, const Terms& terms, c
     for (size_t k = 0; k < r; ++k) add_wrench(block, terms, values.wrench[block.kept[k]], lam[block.row + k], body);
 }
 
-void multiply(const Block& block, const std::vector<double>& B, const VecX& x, VecX& r) {
+void multiply(const Block& block, const RowEntries& B, const VecX& x, VecX& r) {
     with_rows(static_cast<int>(block.kept.size()), [&](auto n) {
         const double* a = B.data() + block.offset;
         double* __restrict out = r.data() + block.row;
@@ -172,7 +186,7 @@ void multiply(const Block& block, const std::vector<double>& B, const VecX& x, V
     });
 }
 
-void add_along(const Block& block, const std::vector<double>& rows, const Vec3& f, VecX& force) {
+void add_along(const Block& block, const RowEntries& rows, const Vec3& f, VecX& force) {
     const int n = static_cast<int>(block.kept.size());
     const double* A = rows.data() + block.offset;
     for (size_t l = 0; l < block.support().size(); ++l) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "constraints/row_type.hpp"
+#include "math/zeroed.hpp"
 
 namespace pn {
 
@@ -47,6 +48,27 @@ struct Block {
     void lay_out(const Mechanism& m, SharedSupports& shared);
 };
 
+// Entries of A or B, by block.
+using RowEntries = ZeroedVector<double>;
+
+// Values of the rows of all blocks. A block has storage from its first use on: most contacts of many shapes never come
+// near.
+class BlockValues {
+public:
+    void resize(const std::vector<Block>& blocks, int nv);
+    RowValues& operator[](size_t block) { return known_[block] ? *known_[block] : allocate(block); }
+    const RowValues& operator[](size_t block) const { return known_[block] ? *known_[block] : allocate(block); }
+    bool has_storage(size_t block) const { return known_[block] != nullptr; }
+    const RowStorage& storage(size_t block) const { return storage_[block]; }
+
+private:
+    RowValues& allocate(size_t block) const;
+
+    std::vector<RowStorage> storage_;
+    mutable std::vector<std::unique_ptr<RowValues>> known_;
+    int nv_ = 0;
+};
+
 // Fill A on the block's support from the wrenches or the dense rows, dof-major.
 void fill_A(const Block& block, const Mechanism& m, const Terms& terms, const RowValues& values, double* A);
 // Compute B = A R^-T on the support, that is B^T = D^-1/2 L^-T A^T. Deep trees use sweeps of the rows' wrenches.
@@ -55,14 +77,14 @@ void scale_rows(const Mechanism& m, Terms& terms, const Block& block, const RowV
 
 // Compute y += B^T lam and r = B x, with lam and r by kept row of the scene. With the array A in place of B, the
 // functions multiply by A.
-void add_transpose(const Block& block, const std::vector<double>& B, const VecX& lam, VecX& y);
-void multiply(const Block& block, const std::vector<double>& B, const VecX& x, VecX& r);
+void add_transpose(const Block& block, const RowEntries& B, const VecX& lam, VecX& y);
+void multiply(const Block& block, const RowEntries& B, const VecX& x, VecX& r);
 
 // Compute force += A^T f, for a force f along the rows of a block.
-void add_along(const Block& block, const std::vector<double>& rows, const Vec3& f, VecX& force);
+void add_along(const Block& block, const RowEntries& rows, const Vec3& f, VecX& force);
 // Compute y += A^T lam for the rows of a block. For deep trees, `body` takes the wrenches on the bodies instead.
 void add_transpose(const Block& block, const Mechanism& m, const Terms& terms, const RowValues& values,
-                   const std::vector<double>& A, const VecX& lam, VecX& y, std::vector<Force>& body);
+                   const RowEntries& A, const VecX& lam, VecX& y, std::vector<Force>& body);
 // Add a unit wrench times its size to the force on body 1, and subtract it from that on body 2, about their reference
 // points.
 inline void add_wrench(const Block& block, const Terms& terms, const Wrench& unit, double size,

@@ -1,6 +1,8 @@
 // Frames, their placements and motions, and unit wrenches, in which constraints between two bodies are written.
 #pragma once
 
+#include <memory>
+
 #include "tree/terms.hpp"
 
 namespace pn {
@@ -9,6 +11,24 @@ struct Frame {  // a frame fixed to the body of a joint (0: the world)
     int joint = 0;
     Mat3 R = Mat3::Identity();
     Vec3 p = Vec3::Zero();
+};
+
+// Frame of a constraint, by default the world's. The contacts of the features of two bodies share frames.
+class SharedFrame {
+public:
+    SharedFrame() : frame_(world()) {}
+    SharedFrame(const Frame& frame) : frame_(std::make_shared<const Frame>(frame)) {}
+    operator const Frame&() const { return *frame_; }
+    const Frame* operator->() const { return frame_.get(); }
+    const Frame* get() const { return frame_.get(); }
+
+private:
+    static const std::shared_ptr<const Frame>& world() {
+        static const auto frame = std::make_shared<const Frame>();
+        return frame;
+    }
+
+    std::shared_ptr<const Frame> frame_;
 };
 
 // Wrench: force at a point of the world, and couple.

@@ -13,7 +13,7 @@ namespace {
 // Return a basis of the multipliers of all described rows that together exert no force. The rows of Z follow the
 // described rows, and its columns are orthonormal. A_first has one described row for each row in use. The other described
 // rows are A_others = C A_first. Then y_first = -C^T z and y_others = z.
-MatX free_described(const std::vector<Block>& blocks, const std::vector<double>& B,
+MatX free_described(const std::vector<Block>& blocks, const RowEntries& B,
                     const DescribedRows& all, RowSystem& s) {
     const std::vector<int> dependent = dependent_rows(s);
     const MatX W = dependence(blocks, B, s, dependent);
@@ -69,7 +69,7 @@ std::vector<int> sharing_with(int index, const MatX& Z) {
 
 }  // namespace
 
-PullMargin press(const std::vector<Block>& blocks, const std::vector<double>& B,
+PullMargin press(const std::vector<Block>& blocks, const RowEntries& B,
             const DescribedRows& all, const std::vector<int>& pressing, RowSystem& s, const VecX& shared, int index) {
     const double multiplier = all.share(pressing[index], shared);
     const PullMargin alone{multiplier, {index}, {index}, multiplier < 0.0};

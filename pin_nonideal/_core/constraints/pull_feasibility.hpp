@@ -22,7 +22,7 @@ struct PullMargin {
 
 // Compute the margin of the described row pressing[index]. The multipliers of the rows `pressing` should not be
 // negative. `shared` holds the result of `share_multipliers`.
-PullMargin press(const std::vector<Block>& blocks, const std::vector<double>& B,
+PullMargin press(const std::vector<Block>& blocks, const RowEntries& B,
             const DescribedRows& all, const std::vector<int>& pressing, RowSystem& s, const VecX& shared, int index);
 
 }  // namespace pn

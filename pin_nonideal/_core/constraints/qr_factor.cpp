@@ -9,7 +9,7 @@ namespace pn {
 namespace {
 
 // Copy the rows in use, scaled to unit length, to the columns of Q.
-void dense_columns(const std::vector<Block>& blocks, const std::vector<double>& B,
+void dense_columns(const std::vector<Block>& blocks, const RowEntries& B,
                    const std::vector<char>& use, RowSystem& s) {
     if (s.Q.cols() < s.envelope.size()) s.Q.resize(s.Q.rows(), s.envelope.size());
     s.columns.clear();
@@ -78,7 +78,7 @@ int householder(RowSystem& s, int n, bool pivot, double tolerance, int lasting =
 
 }  // namespace
 
-void find_independent(const std::vector<Block>& blocks, const std::vector<double>& B, double tolerance, int max_rank,
+void find_independent(const std::vector<Block>& blocks, const RowEntries& B, double tolerance, int max_rank,
                       int lasting, RowSystem& s) {
     dense_columns(blocks, B, s.required, s);
     s.rank = std::min(max_rank, householder(s, static_cast<int>(s.columns.size()), true, tolerance, lasting));
@@ -87,7 +87,7 @@ void find_independent(const std::vector<Block>& blocks, const std::vector<double
     s.redundant = s.rank < static_cast<int>(s.columns.size());
 }
 
-void factor_orthogonally(const std::vector<Block>& blocks, const std::vector<double>& B, RowSystem& s) {
+void factor_orthogonally(const std::vector<Block>& blocks, const RowEntries& B, RowSystem& s) {
     dense_columns(blocks, B, s.active, s);
     householder(s, static_cast<int>(s.columns.size()), false, 0.0);
 }

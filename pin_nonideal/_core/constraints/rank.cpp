@@ -20,7 +20,7 @@ static bool keeps_length(const Block& block, const RowValues& values) {
     return !values.geometric && !block.holonomic.empty() && block.holonomic.front();
 }
 
-static void present_lengths(const Block& block, const std::vector<double>& B, double* length) {
+static void present_lengths(const Block& block, const RowEntries& B, double* length) {
     const size_t r = block.kept.size();
     std::fill_n(length, r, 0.0);
     for (size_t l = 0; l < block.support().size(); ++l)
@@ -29,7 +29,7 @@ static void present_lengths(const Block& block, const std::vector<double>& B, do
 }
 
 void decide_rows(const Mechanism& m, Terms& terms, const std::vector<Block>& blocks,
-                 const std::vector<RowValues>& values, const std::vector<double>& B, RowSystem& s, double tolerance,
+                 const BlockValues& values, const RowEntries& B, RowSystem& s, double tolerance,
                  int max_rank) {
     int lasting = 0;
     for (int i : s.blocks) {

@@ -8,7 +8,7 @@ namespace pn {
 // Find the rank (at most `max_rank`) and an independent subset of the required rows, by column-pivoted QR of B^T with each
 // row divided by its greatest length.
 void decide_rows(const Mechanism& m, Terms& terms, const std::vector<Block>& blocks,
-                 const std::vector<RowValues>& values, const std::vector<double>& B, RowSystem& s, double tolerance,
+                 const BlockValues& values, const RowEntries& B, RowSystem& s, double tolerance,
                  int max_rank);
 
 // Check if active rows have become short or nearly dependent since they were chosen. Another choice may then be better.

@@ -13,7 +13,7 @@ std::vector<int> dependent_rows(const RowSystem& s) {
 }
 
 // Return the given rows of B, as columns.
-static MatX columns_of(const std::vector<Block>& blocks, const std::vector<double>& B, const RowSystem& s,
+static MatX columns_of(const std::vector<Block>& blocks, const RowEntries& B, const RowSystem& s,
                        const std::vector<int>& rows) {
     std::vector<int> column(s.scale.size(), -1);
     for (size_t k = 0; k < rows.size(); ++k) column[rows[k]] = static_cast<int>(k);
@@ -28,7 +28,7 @@ static MatX columns_of(const std::vector<Block>& blocks, const std::vector<doubl
     return out;
 }
 
-MatX dependence(const std::vector<Block>& blocks, const std::vector<double>& B, RowSystem& s,
+MatX dependence(const std::vector<Block>& blocks, const RowEntries& B, RowSystem& s,
                 const std::vector<int>& dependent) {
     const std::vector<int>& rows = s.envelope.row_at;
     const MatX used = columns_of(blocks, B, s, rows);
@@ -90,7 +90,7 @@ static std::pair<VecX, VecX> inverse_weights(const DescribedRows& all, const std
 }
 
 // Return the load sharing of the rows in use, which is computed if they have changed.
-static LoadSharing& load_sharing(const std::vector<Block>& blocks, const std::vector<double>& B, const DescribedRows& all,
+static LoadSharing& load_sharing(const std::vector<Block>& blocks, const RowEntries& B, const DescribedRows& all,
                                  RowSystem& s) {
     LoadSharing& sharing = s.sharing;
     if (sharing.factorization == s.factorization && sharing.active == s.active && sharing.required == s.required)
@@ -107,7 +107,7 @@ static LoadSharing& load_sharing(const std::vector<Block>& blocks, const std::ve
     return sharing;
 }
 
-void share_multipliers(const std::vector<Block>& blocks, const std::vector<double>& B,
+void share_multipliers(const std::vector<Block>& blocks, const RowEntries& B,
                        const DescribedRows& all, RowSystem& s, const VecX& lam, VecX& shared) {
     shared = lam;
     if (!s.redundant) return;
@@ -121,7 +121,7 @@ void share_multipliers(const std::vector<Block>& blocks, const std::vector<doubl
     for (size_t k = 0; k < sharing.dependent.size(); ++k) shared[sharing.dependent[k]] = y[k];
 }
 
-FreeMultipliers free_multipliers(const std::vector<Block>& blocks, const std::vector<double>& B, const DescribedRows& all,
+FreeMultipliers free_multipliers(const std::vector<Block>& blocks, const RowEntries& B, const DescribedRows& all,
                                  RowSystem& s) {
     LoadSharing& sharing = load_sharing(blocks, B, all, s);
     const FreeMultipliers free(s.envelope, sharing.free);

@@ -45,12 +45,12 @@ struct DescribedRows {
 // Required rows that depend on the active rows, and their coefficients: A_dependent = W A_active. The columns of W are
 // the rows in use, in the order of the envelope.
 std::vector<int> dependent_rows(const RowSystem& s);
-MatX dependence(const std::vector<Block>& blocks, const std::vector<double>& B, RowSystem& s,
+MatX dependence(const std::vector<Block>& blocks, const RowEntries& B, RowSystem& s,
                 const std::vector<int>& dependent);
 
 // Compute minimum-norm multipliers by kept row from the multipliers of the rows in use. The multiplier of a kept row is
 // the total of the rows that it represents.
-void share_multipliers(const std::vector<Block>& blocks, const std::vector<double>& B,
+void share_multipliers(const std::vector<Block>& blocks, const RowEntries& B,
                        const DescribedRows& all, RowSystem& s, const VecX& lam, VecX& shared);
 
 // Basis of the multipliers by kept row that together exert no force. The basis is orthonormal in the norm of the described
@@ -77,7 +77,7 @@ private:
     const Envelope& envelope_;
     const MatX& basis_;  // by position in the envelope
 };
-FreeMultipliers free_multipliers(const std::vector<Block>& blocks, const std::vector<double>& B, const DescribedRows& all,
+FreeMultipliers free_multipliers(const std::vector<Block>& blocks, const RowEntries& B, const DescribedRows& all,
                                  RowSystem& s);
 
 }  // namespace pn

@@ -70,7 +70,7 @@ std::vector<const TimeFunction*> time_functions(const Kind& kind) {
 
 std::pair<const Frame*, const Frame*> frames(const Kind& kind) {
     return std::visit([](const auto& k) -> std::pair<const Frame*, const Frame*> {
-        if constexpr (is_geometric<std::decay_t<decltype(k)>>) return {&k.frame1, &k.frame2};
+        if constexpr (is_geometric<std::decay_t<decltype(k)>>) return {k.frame1.get(), k.frame2.get()};
         else return {nullptr, nullptr};
     }, kind);
 }
@@ -78,8 +78,8 @@ std::pair<const Frame*, const Frame*> frames(const Kind& kind) {
 std::vector<int> dofs(const Kind& kind, const Mechanism& m) {
     return std::visit([&m](const auto& k) {
         if constexpr (is_geometric<std::decay_t<decltype(k)>>) {
-            std::vector<int> both = m.dofs_of(k.frame1.joint);
-            for (int d : m.dofs_of(k.frame2.joint)) both.push_back(d);
+            std::vector<int> both = m.dofs_of(k.frame1->joint);
+            for (int d : m.dofs_of(k.frame2->joint)) both.push_back(d);
             return both;
         } else {
             return k.dofs(m);
@@ -87,10 +87,13 @@ std::vector<int> dofs(const Kind& kind, const Mechanism& m) {
     }, kind);
 }
 
-void RowValues::resize(const Kind& kind, int nv) {
-    rows = size(kind);
-    geometric = frames(kind).first != nullptr;
-    constant_A = has_constant_A(kind);
+RowStorage::RowStorage(const Kind& kind)
+    : rows(size(kind)), geometric(frames(kind).first != nullptr), constant_A(has_constant_A(kind)) {}
+
+void RowValues::resize(const RowStorage& storage, int nv) {
+    rows = storage.rows;
+    geometric = storage.geometric;
+    constant_A = storage.constant_A;
     wrench.assign(geometric ? rows : 0, Wrench{Vec3::Zero(), Vec3::Zero(), Vec3::Zero()});
     for (std::vector<double>* x : {&bias, &residual, &rate, &phi_t, &phi_tt}) x->assign(rows, 0.0);
     if (geometric) return;

@@ -49,6 +49,16 @@ using Kind = std::variant<PointRows, PlanePointRow, CapsuleCapsuleRow, BoxRow, F
                           CapsuleCylinderSlipRows, DiskHullRow, DiskHullSlipRows, CylinderCylinderRow,
                           CylinderCylinderSlipRows>;
 
+// Storage that the rows of a constraint need.
+struct RowStorage {
+    int rows = 0;
+    bool geometric = false;  // rows are wrenches between two bodies
+    bool constant_A = false;
+
+    RowStorage() = default;
+    explicit RowStorage(const Kind& kind);
+};
+
 // Values of the rows of one constraint, before any row is removed.
 struct RowValues {
     int rows = 0;
@@ -60,7 +70,7 @@ struct RowValues {
     bool constant_A = false, has_A = false;  // a constant A is written once
     VecX b, scratch;
 
-    void resize(const Kind& kind, int nv);
+    void resize(const RowStorage& storage, int nv);
 };
 
 // Quantities that the evaluation of a constraint may read.

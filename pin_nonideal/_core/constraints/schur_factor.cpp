@@ -32,7 +32,7 @@ static void multiply_tile(const double* X, int r1, const double* Y, int r2, cons
 // Multiply the rows of two blocks, one tile at a time. The rows of a block are adjacent in the layout, and rows of the
 // first block never precede rows of the second.
 static PN_INLINE void multiply_blocks(const Block& b1, const Block& b2, const CommonDofs& common,
-                                      const std::vector<double>& B, RowSystem& s) {
+                                      const RowEntries& B, RowSystem& s) {
     const int r1 = static_cast<int>(b1.kept.size()), r2 = static_cast<int>(b2.kept.size());
     const double *X = B.data() + b1.offset, *Y = B.data() + b2.offset;
     for (int i0 = 0; i0 < r1; i0 += tile)
@@ -46,7 +46,7 @@ static PN_INLINE void multiply_blocks(const Block& b1, const Block& b2, const Co
         }
 }
 
-void delassus(const std::vector<Block>& blocks, const std::vector<double>& B, RowSystem& s) {
+void delassus(const std::vector<Block>& blocks, const RowEntries& B, RowSystem& s) {
     for (const auto& [block, other, common] : s.envelope.pairs)
         multiply_blocks(blocks[block], blocks[other], s.envelope.common(common), B, s);
 }
@@ -122,7 +122,7 @@ static PN_INLINE bool factor_cholesky(RowSystem& s) {
     return true;
 }
 
-PN_WIDE void factor_rows(const std::vector<Block>& blocks, const std::vector<double>& B, RowSystem& s) {
+PN_WIDE void factor_rows(const std::vector<Block>& blocks, const RowEntries& B, RowSystem& s) {
     ++s.factorization;
     delassus(blocks, B, s);
     scale_to_unit_length(s.active, s);

@@ -134,8 +134,7 @@ TouchingContacts touching_contacts(const Program& p, Workspace& w, double t, con
     for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
         if (is_bare(p, i)) continue;
         if (!w.state.closed[i] && !p.is_users(i)) {
-            measure_gap(p, w, t, v, i);
-            if (gap_width(p, w, i) > active_set_parameters.sure_gap) continue;
+            if (measured_width(p, w, t, v, i) > active_set_parameters.sure_gap) continue;
         }
         evaluate_gap(p, w, t, v, i);
         const bool touches =

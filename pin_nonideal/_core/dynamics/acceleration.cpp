@@ -22,7 +22,7 @@ void choose_rows(const Program& p, Workspace& w, double tolerance, int max_rank)
 }
 
 // Compute r := b - A x, or b - B x with the scaled rows, for the rows in use.
-static PN_INLINE void row_residuals(const Program& p, const Evaluation& now, const std::vector<double>& rows, const VecX& x,
+static PN_INLINE void row_residuals(const Program& p, const Evaluation& now, const RowEntries& rows, const VecX& x,
                           const VecX& b, VecX& r) {
     for (int i : now.rows.blocks) {
         const Block& block = p.blocks[i];

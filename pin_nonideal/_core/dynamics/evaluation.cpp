@@ -193,6 +193,21 @@ void measure_gap(const Program& p, Workspace& w, double t, const VecX& v, int ga
     evaluate(p.blocks[i].kind, state, Part::residual, w.now.values[i]);
 }
 
+double measured_width(const Program& p, Workspace& w, double t, const VecX& v, int gap) {
+    const int i = p.gaps[gap].block;
+    if (p.is_users(gap) || w.now.values.has_storage(i)) {
+        measure_gap(p, w, t, v, gap);
+        return w.now.values[i].residual[0];
+    }
+    RowValues& passing = w.scratch.passing_gap;
+    passing.resize(w.now.values.storage(i), p.mechanism.nv);
+    const State state{p.mechanism, w.now.terms, w.now.row_time(t), w.now.terms.q, v};
+    evaluate(p.blocks[i].kind, state, Part::residual, passing);
+    const double width = passing.residual[0];
+    if (!(width > 0.0)) std::swap(w.now.values[i], passing);
+    return width;
+}
+
 void follow_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap) {
     measure_gap(p, w, t, v, gap);
     move_gap(p, w, t, v, gap);
@@ -209,9 +224,12 @@ void move_gap(const Program& p, Workspace& w, double t, const VecX& v, int gap) 
 static void gap_violations(const Program& p, Workspace& w, double t, const VecX& v, double& position, double& velocity,
                            const std::vector<char>* open_gaps) {
     const auto add = [&](int i) {
+        if (!w.state.closed[i]) {
+            position = std::max(position, -measured_width(p, w, t, v, i));
+            return;
+        }
         const RowValues& values = w.now.values[p.gaps[i].block];
-        if (!w.state.closed[i]) measure_gap(p, w, t, v, i);
-        else velocity = std::max(velocity, std::abs(values.rate[0]));
+        velocity = std::max(velocity, std::abs(values.rate[0]));
         position = std::max(position, -values.residual[0]);
     };
     const size_t count = p.gaps.size();

@@ -41,6 +41,8 @@ void place_rows(const Program& p, Workspace& w, double t, const VecX& v);
 void evaluate_rows(const Program& p, Workspace& w, double t, const VecX& v);
 void evaluate_residuals(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 
+// Return the width of a gap [m, rad] for given placements. A gap that was never evaluated, and is open, keeps no values.
+double measured_width(const Program& p, Workspace& w, double t, const VecX& v, int gap);
 // Evaluate the row of an open or closed gap. measure_gap computes the residual for given placements. move_gap computes
 // rate and bias for given velocities. follow_gap computes both, and evaluate_gap also A. A user's function computes all
 // of them at once.

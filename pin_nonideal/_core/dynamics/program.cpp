@@ -65,10 +65,10 @@ private:
     void add(const Vec3& x) {
         for (int k = 0; k < 3; ++k) add(x[k]);
     }
-    void add(const Frame& x) {
-        add(x.joint);
-        for (int k = 0; k < 3; ++k) add(x.R.col(k));
-        add(x.p);
+    void add(const SharedFrame& x) {
+        add(x->joint);
+        for (int k = 0; k < 3; ++k) add(x->R.col(k));
+        add(x->p);
     }
     template <class Other>
     void add(const Other&) { is_known_ = false; }
@@ -175,7 +175,9 @@ void Program::finish() {
     // A contact without mobility along its normal has no load and never opens.
     const auto normal = [&](int block) { return blocks[block].user_row + pressing_row(blocks[block].kind); };
     const auto bare = [&](int block) { return described.rows[normal(block)].kept < 0; };
-    contacts.erase(std::remove_if(contacts.begin(), contacts.end(), bare), contacts.end());
+    contacts.clear();
+    for (int i = 0; i < first_gap; ++i)
+        if (pressing_row(blocks[i].kind) >= 0 && !bare(i)) contacts.push_back(i);
     pressing.resize(contacts.size());
     std::transform(contacts.begin(), contacts.end(), pressing.begin(), normal);
     for (Gap& gap : gaps) {

@@ -44,7 +44,7 @@ struct Program {
     std::vector<int> bodies_of_gap;  // number of the pair of bodies of each gap
     ImpactLaw impact_law = ImpactLaw::newton;
     std::vector<int> all_contacts;  // blocks of all contacts, in the order of their descriptions
-    std::vector<int> contacts;  // blocks of kept contacts and of wheels, which need a compressive normal force
+    std::vector<int> contacts;  // blocks of kept bilateral contacts and of wheels, which need a compressive normal force
     std::vector<int> pressing;  // described rows of these forces
     int user_rows = 0;          // rows of all constraint descriptions
     struct Copy { int row, first; double factor; };

@@ -105,6 +105,7 @@ double product(const Workspace& w, const VecX& x, const VecX& y) {
 // Method, 2003, sec. 4.3.]
 void broyden_step(Workspace& w, int count) {
     VecX& step = w.scratch.position_lam_steps[count];
+    step.resize(w.scratch.position_lam.size());
     solve_rows(w.now.rows, w.scratch.r, step);
     for (int j = 0; j < count; ++j) {
         const VecX& known = w.scratch.position_lam_steps[j];

@@ -15,7 +15,7 @@ static void gather_body_forces(const Program& p, Workspace& w, std::vector<Force
     const Evaluation& now = w.now;
     if (p.has_body_forces) std::copy(now.body_force.begin(), now.body_force.end(), body.begin());
     else std::fill(body.begin(), body.end(), Force{Vec3::Zero(), Vec3::Zero()});
-    for (size_t i = 0; i < p.blocks.size(); ++i) {  // constraints, and sticking elements at an anchor or contact
+    for (int i : now.active_blocks) {  // constraints, and sticking elements at an anchor or contact
         const Block& block = p.blocks[i];
         if (!now.values[i].geometric) continue;
         for (int k = 0; k < block.total; ++k) {
@@ -27,7 +27,7 @@ static void gather_body_forces(const Program& p, Workspace& w, std::vector<Force
     if (now.ideal) return;
     for (size_t e = 0; e < p.frictions.size(); ++e) {  // slipping elements, and forces tried during the mode search
         const Friction& f = p.frictions[e];
-        if (w.state.mode[e] == sticking || !now.values[f.block].geometric) continue;
+        if (w.state.mode[e] == sticking || now.is_inactive[f.block] || !now.values[f.block].geometric) continue;
         for (int k = 0; k < f.dim; ++k)
             add_wrench(p.blocks[f.block], now.terms, now.values[f.block].wrench[k], now.slip_force[e][k], body);
     }
@@ -210,6 +210,7 @@ struct WrenchAbout {
 }  // namespace
 
 Force carried_wrench(const Program& p, Workspace& w, int index) {
+    if (w.now.is_inactive[index]) return {Vec3::Zero(), Vec3::Zero()};
     const Reactions& r = reactions(p, w);
     const Evaluation& now = w.now;
     const Block& block = p.blocks[index];

@@ -36,8 +36,8 @@ void project_out(const Program& p, Workspace& w, double t, VecX& q, const VecX& 
     update_kinematics(p, w, t, q, v);
     std::vector<char> inside(p.gaps.size(), 0);
     for (size_t i = 0; i < p.gaps.size(); ++i) {
-        evaluate_gap(p, w, t, v, static_cast<int>(i));
-        inside[i] = w.now.values[p.gaps[i].block].residual[0] < 0.0 && !p.blocks[p.gaps[i].block].kept.empty();
+        const double width = measured_width(p, w, t, v, static_cast<int>(i));
+        inside[i] = width < 0.0 && !p.blocks[p.gaps[i].block].kept.empty();
     }
     set_closed(p, w, inside);
     configure_anew(p, w, t, q, v);

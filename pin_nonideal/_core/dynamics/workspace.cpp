@@ -32,8 +32,7 @@ static void size(const Program& p, Evaluation& now) {
     for (VecX* x : {&now.tau, &now.external, &now.F, &now.C, &now.C_smooth, &now.base_C, &now.a, &now.v, &now.holding,
                     &now.override_torque, &now.joint_F, &now.joint_external})
         *x = VecX::Zero(nv);
-    now.values.resize(p.blocks.size());
-    for (size_t i = 0; i < p.blocks.size(); ++i) now.values[i].resize(p.blocks[i].kind, nv);
+    now.values.resize(p.blocks, nv);
     now.is_inactive.assign(p.blocks.size(), 0);
     now.selected.assign(p.gaps.size(), 1);
     now.active_blocks.resize(p.blocks.size());
@@ -42,8 +41,8 @@ static void size(const Program& p, Evaluation& now) {
     std::iota(now.closed_gaps.begin(), now.closed_gaps.end(), 0);
     now.loaded_elements.reserve(elements);
     now.slipping.reserve(elements);
-    now.A.assign(p.entries, 0.0);
-    now.B.assign(p.entries, 0.0);
+    now.A = RowEntries(p.entries);
+    now.B = RowEntries(p.entries);
     for (VecX* x : {&now.b, &now.lam, &now.closing_lam, &now.step_gap, &now.reactions.lam}) *x = VecX::Zero(p.layout.rows);
     now.rows.allocate(p.layout, static_cast<int>(p.blocks.size()), nv);
     now.ideal_rows.allocate(p.layout, static_cast<int>(p.blocks.size()), nv);
@@ -65,7 +64,7 @@ static void size(const Program& p, const Evaluation& now, Scratch& scratch) {
     for (VecX* x : {&scratch.r, &scratch.residual, &scratch.lam_step, &scratch.position_lam})
         *x = VecX::Zero(p.layout.rows);
     scratch.position_start = VecX::Zero(p.mechanism.nq);
-    scratch.position_lam_steps.assign(max_projection_iterations, scratch.position_lam);
+    scratch.position_lam_steps.resize(max_projection_iterations);
     scratch.ideal_locked.assign(nv, 0);
     scratch.unknown = scratch.image = scratch.shifted = VecX::Zero(p.unknowns());
     if (p.loads_are_of_trees) scratch.loaded.sweep.resize(p.mechanism);

@@ -103,13 +103,13 @@ struct Evaluation {
         not_after = std::nextafter(end, -HUGE_VAL);
     }
     double row_time(double t) const { return t < not_before ? not_before : t > not_after ? not_after : t; }
-    std::vector<RowValues> values;  // by block
+    BlockValues values;
     std::vector<char> is_inactive;  // blocks of open contacts, which are neither rows nor evaluated
     std::vector<int> active_blocks;              // the other blocks
     std::vector<int> closed_gaps;                // closed gaps
     std::vector<char> selected;                  // closed flags by gap, at the last selection of rows
     std::vector<int> loaded_elements, slipping;  // elements with load (sticking or slipping), and slipping elements
-    std::vector<double> A, B;
+    RowEntries A, B;
     // Number of rows of constraints that depend on others, at the start of the last time step whose rows were chosen. A
     // negative value means that the number is not known.
     int dependent_at_start = -1;
@@ -165,6 +165,7 @@ struct LoadedJoints {
 };
 
 struct Scratch {
+    RowValues passing_gap;  // a gap whose block has no storage
     VecX scaled, scaled_free, trial, work, r, residual, lam_step;
     std::vector<char> ideal_locked;
     // Projection of a position: state of the factorization, multipliers of the move from this state, and steps of the

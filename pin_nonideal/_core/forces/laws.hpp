@@ -25,7 +25,7 @@ enum class Reaction { none, ideal, total };
 // Quantities that a law may read at a state.
 struct LawState {
     const Terms& terms;
-    const std::vector<RowValues>& values;  // rates of each block
+    const BlockValues& values;  // rates of each block
     const VecX& v;
     const VecX& z;
     const std::vector<VecX>& user_force;  // last result of each user-defined law

@@ -17,48 +17,55 @@ using namespace nanobind::literals;
 namespace pn {
 
 Builder::Builder(nb::object model, Provider terms) {
-    p->mechanism = read_mechanism(model_pointer(model.ptr()), terms);
+    program_->mechanism = read_mechanism(model_pointer(model.ptr()), terms);
+}
+
+Program& Builder::edit() {
+    if (is_finished_) program_ = std::make_shared<Program>(*program_);
+    is_finished_ = false;
+    return *program_;
 }
 
 int Builder::add(const std::string& name, Kind kind, Role role) {
-    const int index = static_cast<int>(p->blocks.size());
-    p->blocks.emplace_back(name, std::move(kind));
+    Program& p = edit();
+    const int index = static_cast<int>(p.blocks.size());
+    p.blocks.emplace_back(name, std::move(kind));
     if (role == Role::direction) return index;
-    p->blocks[index].user_row = p->user_rows;
-    p->user_rows += p->blocks[index].total;
-    p->constraints = p->first_gap = index + 1;
-    if (pressing_row(p->blocks[index].kind) >= 0) p->contacts.push_back(index);
+    p.blocks[index].user_row = p.user_rows;
+    p.user_rows += p.blocks[index].total;
+    p.constraints = p.first_gap = index + 1;
     return index;
 }
 
 void Builder::set_unilateral(double restitution) {
-    p->contacts.pop_back();
-    p->gaps.push_back({p->constraints - 1, restitution, {}, -1});
-    p->first_gap = p->gaps.front().block;
+    Program& p = edit();
+    p.gaps.push_back({p.constraints - 1, restitution, {}, -1});
+    p.first_gap = p.gaps.front().block;
 }
 
 void Builder::order_contacts(const std::vector<int>& blocks, const std::vector<int>& pairs) {
-    p->all_contacts = blocks;
-    std::vector<int> pair_of(p->blocks.size(), -1);
+    Program& p = edit();
+    p.all_contacts = blocks;
+    std::vector<int> pair_of(p.blocks.size(), -1);
     for (size_t i = 0; i < blocks.size(); ++i) pair_of[blocks[i]] = pairs.at(i);
-    for (Gap& gap : p->gaps) gap.pair = pair_of[gap.block];
-    int row = p->user_rows;
-    for (int block : blocks) row = std::min(row, p->blocks[block].user_row);
+    for (Gap& gap : p.gaps) gap.pair = pair_of[gap.block];
+    int row = p.user_rows;
+    for (int block : blocks) row = std::min(row, p.blocks[block].user_row);
     for (int block : blocks) {
-        p->blocks[block].user_row = row;
-        row += p->blocks[block].total;
+        p.blocks[block].user_row = row;
+        row += p.blocks[block].total;
     }
 }
 
 int Builder::add_law(const std::string& name) {
-    p->law_names.push_back(name);
-    return static_cast<int>(p->law_names.size()) - 1;
+    edit().law_names.push_back(name);
+    return static_cast<int>(program().law_names.size()) - 1;
 }
 
-std::shared_ptr<const Program> Builder::finish() const {
-    auto finished = std::make_shared<Program>(*p);
-    finished->finish();
-    return finished;
+std::shared_ptr<const Program> Builder::finish() {
+    if (!is_finished_) program_->finish();
+    is_finished_ = true;
+    return program_;
 }
 
 namespace {
@@ -78,7 +85,7 @@ void bind_friction(nb::class_<Builder>& builder) {
             f.name = name;
             f.law = law;
             f.block = block;
-            f.dim = b.p->blocks[block].total;
+            f.dim = b.program().blocks[block].total;
             f.load = load;
             f.reaction = reaction;
             f.joint = joint;
@@ -94,7 +101,7 @@ void bind_friction(nb::class_<Builder>& builder) {
             f.static_ratio = static_ratio;
             f.stribeck_velocity = stribeck_velocity;
             if (user_limit) f.user_limit = limit_function(*user_limit);
-            b.p->frictions.push_back(std::move(f));
+            b.edit().frictions.push_back(std::move(f));
         }, "law"_a, "block"_a, nb::kw_only(), "name"_a, "load"_a = Friction::Load::none,
            "reaction"_a = Reaction::none, "joint"_a = -1, "anchor"_a = -1, "row"_a = 0,
            "axis"_a = std::vector<double>{0.0, 0.0, 1.0}, "axis_dof"_a = -1, "constant"_a = 0.0,
@@ -106,17 +113,17 @@ void bind_laws(nb::class_<Builder>& builder) {
     builder
         .def("add_law", &Builder::add_law, "name"_a)
         .def("add_viscous", [](Builder& b, int law, double coefficient, int dof, int count, int block, int anchor) {
-            b.p->add(Viscous{law, dof, count, block, coefficient, anchor});
+            b.edit().add(Viscous{law, dof, count, block, coefficient, anchor});
         }, "law"_a, "coefficient"_a, nb::kw_only(), "dof"_a = -1, "count"_a = 1, "block"_a = -1, "anchor"_a = -1)
         .def("add_drag", [](Builder& b, int law, const FrameTuple& frame, double coefficient, double exponent) {
-            b.p->add(Drag{law, frame_of(frame), coefficient, exponent});
+            b.edit().add(Drag{law, frame_of(frame), coefficient, exponent});
         }, "law"_a, "frame"_a, "coefficient"_a, "exponent"_a)
         .def("add_sigmoid", [](Builder& b, int law, int dof, double phi1, double phi2, double phi3) {
-            b.p->add(Sigmoid{law, dof, phi1, phi2, phi3});
+            b.edit().add(Sigmoid{law, dof, phi1, phi2, phi3});
         }, "law"_a, "dof"_a, "phi1"_a, "phi2"_a, "phi3"_a)
         .def("add_lugre", [](Builder& b, int law, int dof, double stiffness, double damping, double viscous,
                              double coulomb, double stiction, double stribeck_velocity) {
-            b.p->add(LuGre{law, dof, stiffness, damping, viscous, coulomb, stiction, stribeck_velocity});
+            b.edit().add(LuGre{law, dof, stiffness, damping, viscous, coulomb, stiction, stribeck_velocity});
         }, "law"_a, "dof"_a, "stiffness"_a, "damping"_a, "viscous"_a, "coulomb"_a, "stiction"_a,
            "stribeck_velocity"_a)
         .def("add_user_law", [](Builder& b, int law, int states, Reaction reaction,
@@ -126,7 +133,7 @@ void bind_laws(nb::class_<Builder>& builder) {
             u.states = states;
             u.reaction = reaction;
             u.function = law_function(function, states, u.reaction != Reaction::none);
-            b.p->add(std::move(u));
+            b.edit().add(std::move(u));
         }, "law"_a, "states"_a, "reaction"_a, "function"_a);
 }
 
@@ -136,46 +143,46 @@ void bind_forces(nb::class_<Builder>& builder) {
     builder
         .def("add_spring_damper", [](Builder& b, const FrameTuple& f1, const FrameTuple& f2, double stiffness,
                                      double damping, double rest_length) {
-            b.p->forces.emplace_back(SpringDamper{frame_of(f1), frame_of(f2), stiffness, damping, rest_length});
+            b.edit().forces.emplace_back(SpringDamper{frame_of(f1), frame_of(f2), stiffness, damping, rest_length});
         }, "frame1"_a, "frame2"_a, "stiffness"_a, "damping"_a, "rest_length"_a)
         .def("add_joint_spring", [](Builder& b, int joint, double stiffness, double rest, double damping) {
-            b.p->forces.emplace_back(JointSpring{joint, stiffness, rest, damping});
+            b.edit().forces.emplace_back(JointSpring{joint, stiffness, rest, damping});
         }, "joint"_a, "stiffness"_a, "rest"_a, "damping"_a)
         .def("add_wrench", [](Builder& b, const FrameTuple& frame, const std::vector<double>& six) {
             FrameWrench wrench{frame_of(frame), {}, {}};
             std::copy(six.begin(), six.end(), wrench.value);
-            b.p->forces.emplace_back(std::move(wrench));
+            b.edit().forces.emplace_back(std::move(wrench));
         }, "frame"_a, "value"_a)
         .def("add_wrench", [](Builder& b, const FrameTuple& frame,
                               const nb::typed<nb::callable, Numbers(double)>& function) {
-            b.p->forces.emplace_back(FrameWrench{frame_of(frame), wrench_function(function), {}});
+            b.edit().forces.emplace_back(FrameWrench{frame_of(frame), wrench_function(function), {}});
         }, "frame"_a, "function"_a)
         .def("add_user_force", [](Builder& b, const TorqueOfState& f) {
-            b.p->forces.emplace_back(UserForce{user_function<OfState>(f)});
+            b.edit().forces.emplace_back(UserForce{user_function<OfState>(f)});
         }, "function"_a);
 }
 
 void bind_actuation(nb::class_<Builder>& builder) {
     builder
-        .def("set_constant_torque", [](Builder& b, Array tau) { b.p->actuation = ConstantTorque{map(tau)}; }, "tau"_a)
+        .def("set_constant_torque", [](Builder& b, Array tau) { b.edit().actuation = ConstantTorque{map(tau)}; }, "tau"_a)
         .def("set_torque_function", [](Builder& b, const TorqueOfState& f) {
-            b.p->actuation = TorqueFunction{user_function<OfState>(f)};
+            b.edit().actuation = TorqueFunction{user_function<OfState>(f)};
         }, "function"_a)
         .def("set_sampled_torque", [](Builder& b, const TorqueOfState& f, double period) {
-            b.p->actuation = SampledTorque{user_function<OfState>(f), period};
+            b.edit().actuation = SampledTorque{user_function<OfState>(f), period};
         }, "function"_a, "period"_a)
         .def("set_hold_position", [](Builder& b, Array kp, Array kd, Array q) {
-            b.p->actuation = HoldPosition{map(kp), map(kd), map(q)};
+            b.edit().actuation = HoldPosition{map(kp), map(kd), map(q)};
         }, "kp"_a, "kd"_a, "q"_a)
         .def("set_torque_table", [](Builder& b, std::vector<double> times, Array2 values) {
-            b.p->actuation = TorqueTable{std::move(times), map(values).transpose()};
+            b.edit().actuation = TorqueTable{std::move(times), map(values).transpose()};
         }, "times"_a, "values"_a)
         .def("add_torque_table", [](Builder& b, std::vector<double> times, Array2 values) {
-            b.p->added_torque = TorqueTable{std::move(times), map(values).transpose()};
+            b.edit().added_torque = TorqueTable{std::move(times), map(values).transpose()};
         }, "times"_a, "values"_a)
         .def("limit_effort", [](Builder& b, Array min_effort, Array max_effort) {
-            b.p->min_effort = map(min_effort);
-            b.p->max_effort = map(max_effort);
+            b.edit().min_effort = map(min_effort);
+            b.edit().max_effort = map(max_effort);
         }, "min_effort"_a, "max_effort"_a);
 }
 
@@ -222,16 +229,17 @@ nb::class_<Builder> bind_builder(nb::module_& m) {
     nb::class_<Builder> builder(m, "Builder");
     builder.def(nb::init<nb::object, Provider>(), "model"_a, "terms"_a = Provider::core)
         .def("select_rows", [](Builder& b, int block, std::vector<int> rows) {
-            b.p->blocks[block].kept = std::move(rows);
+            b.edit().blocks[block].kept = std::move(rows);
         }, "block"_a, "rows"_a)
         .def("add_copy", [](Builder& b, int row, int first, double factor) {
-            b.p->copies.push_back({row, first, factor});
+            b.edit().copies.push_back({row, first, factor});
         }, "row"_a, "first"_a, "factor"_a)
         .def("add_breaks", [](Builder& b, const std::vector<double>& times) {
-            b.p->breaks.insert(b.p->breaks.end(), times.begin(), times.end());
+            std::vector<double>& breaks = b.edit().breaks;
+            breaks.insert(breaks.end(), times.begin(), times.end());
         }, "times"_a)
         .def("set_unilateral", &Builder::set_unilateral, "restitution"_a)
-        .def("set_impact", [](Builder& b, ImpactLaw law) { b.p->impact_law = law; }, "law"_a)
+        .def("set_impact", [](Builder& b, ImpactLaw law) { b.edit().impact_law = law; }, "law"_a)
         .def("order_contacts", &Builder::order_contacts, "blocks"_a, "pairs"_a)
         .def("finish", &Builder::finish);
     bind_friction(builder);

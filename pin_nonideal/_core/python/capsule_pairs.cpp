@@ -16,10 +16,10 @@ using Line = std::tuple<FrameTuple, double>;  // frame at the center, z along th
 template <class Add>
 void each_pair(const std::string& name, int number, const std::vector<Line>& lines1, const std::vector<Line>& lines2,
                const Add& add) {
-    std::vector<std::pair<Frame, double>> others;
+    std::vector<std::pair<SharedFrame, double>> others;
     for (const auto& [frame, half] : lines2) others.emplace_back(frame_of(frame), half);
     for (const auto& [tuple, half1] : lines1) {
-        const Frame frame1 = frame_of(tuple);
+        const SharedFrame frame1 = frame_of(tuple);
         for (const auto& [frame2, half2] : others)
             add(name + " " + std::to_string(number++), frame1, frame2, half1, half2);
     }
@@ -31,9 +31,9 @@ void bind_capsule_pairs(nb::class_<Builder>& builder) {
     builder
         .def("add_capsule_pairs", [](Builder& b, const std::string& name, int number, const std::vector<Line>& lines1,
                                      const std::vector<Line>& lines2, double radius, double restitution) {
-            const int first = static_cast<int>(b.p->blocks.size());
+            const int first = static_cast<int>(b.program().blocks.size());
             each_pair(name, number, lines1, lines2,
-                      [&](const std::string& own, const Frame& f1, const Frame& f2, double half1, double half2) {
+                      [&](const std::string& own, const SharedFrame& f1, const SharedFrame& f2, double half1, double half2) {
                 b.add(own, CapsuleCapsuleRow{{}, f1, f2, half1, half2, radius}, Role::contact);
                 b.set_unilateral(restitution);
             });
@@ -44,18 +44,18 @@ void bind_capsule_pairs(nb::class_<Builder>& builder) {
                                              double radius1, int first, double mu, double static_ratio) {
             int anchor = first;
             each_pair(name, number, lines1, lines2,
-                      [&](const std::string& own, const Frame& f1, const Frame& f2, double half1, double half2) {
+                      [&](const std::string& own, const SharedFrame& f1, const SharedFrame& f2, double half1, double half2) {
                 Friction f;
                 f.name = own;
                 f.law = b.add_law(own);
                 f.block = b.add(own, CapsuleCapsuleSlipRows{{}, f1, f2, half1, half2, radius1}, Role::direction);
-                f.dim = b.p->blocks[f.block].total;
+                f.dim = b.program().blocks[f.block].total;
                 f.load = Friction::Load::multiplier;
                 f.reaction = Reaction::total;
                 f.anchor = anchor++;
                 f.mu = mu;
                 f.static_ratio = static_ratio;
-                b.p->frictions.push_back(std::move(f));
+                b.edit().frictions.push_back(std::move(f));
             });
         }, "name"_a, "number"_a, "lines1"_a, "lines2"_a, "radius1"_a, "first"_a, "mu"_a, "static_ratio"_a);
 }

@@ -14,9 +14,10 @@ using namespace nanobind::literals;
 
 namespace pn {
 
-std::vector<ConstraintRows> constraint_rows(const Program& p) {
+std::vector<ConstraintRows> constraint_rows(const Program& p, const std::vector<int>& blocks) {
     std::vector<ConstraintRows> out;
-    for (int i = 0; i < p.constraints; ++i) {
+    for (const int i : blocks) {
+        if (i < 0 || i >= p.constraints) throw std::invalid_argument("no such block");
         const Block& block = p.blocks[i];
         ConstraintRows rows{block.name, block.user_row, block.total, {}, moves_in_time(block.kind), shown(block.kind)};
         for (int k = 0; k < block.total; ++k) rows.holonomic.push_back(is_holonomic(block.kind, k));
@@ -58,9 +59,9 @@ struct From {
     static Value make(const Argument& x) { return x; }
 };
 template <>
-struct From<Frame> {
+struct From<SharedFrame> {
     using Argument = FrameTuple;
-    static Frame make(const Argument& x) { return frame_of(x); }
+    static SharedFrame make(const Argument& x) { return SharedFrame(frame_of(x)); }
 };
 template <>
 struct From<Vec3> {
@@ -127,9 +128,9 @@ void bind_constraints(nb::module_& m, nb::class_<Builder>& builder) {
         .def_ro("holonomic", &ConstraintRows::holonomic)
         .def_ro("moves_in_time", &ConstraintRows::moves_in_time)
         .def_ro("shown", &ConstraintRows::shown);
-    builder.def_prop_ro("block_names", [](const Builder& b) { return block_names(*b.p); });
-    builder.def_prop_ro("first_rows", [](const Builder& b) { return first_rows(*b.p); });
-    builder.def_prop_ro("rows", [](const Builder& b) { return b.p->user_rows; });
+    builder.def_prop_ro("block_names", [](const Builder& b) { return block_names(b.program()); });
+    builder.def_prop_ro("first_rows", [](const Builder& b) { return first_rows(b.program()); });
+    builder.def_prop_ro("rows", [](const Builder& b) { return b.program().user_rows; });
     bind_kinds(builder, static_cast<const Kind*>(nullptr));
 }
 

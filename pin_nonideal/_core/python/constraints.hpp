@@ -16,7 +16,7 @@ struct ConstraintRows {
     bool moves_in_time;           // explicitly, or through a user function
     DisplayKind shown;                  // display kind in a replay
 };
-std::vector<ConstraintRows> constraint_rows(const Program& p);
+std::vector<ConstraintRows> constraint_rows(const Program& p, const std::vector<int>& blocks);
 // Names of the blocks of constraints and contacts, and the first row of each among all descriptions.
 std::vector<std::string> block_names(const Program& p);
 std::vector<int> first_rows(const Program& p);

@@ -28,7 +28,7 @@ void evaluate_blocks(const Program& p, const Array2& q, const Array& t, const st
     Terms terms;
     terms.allocate(p.mechanism);
     std::vector<RowValues> values(blocks.size());
-    for (size_t i = 0; i < blocks.size(); ++i) values[i].resize(p.blocks[blocks[i]].kind, p.mechanism.nv);
+    for (size_t i = 0; i < blocks.size(); ++i) values[i].resize(RowStorage(p.blocks[blocks[i]].kind), p.mechanism.nv);
     const VecX at_rest = VecX::Zero(p.mechanism.nv);
     for (size_t k = 0; k < t.shape(0); ++k) {
         const VecX at = map(q).row(k);

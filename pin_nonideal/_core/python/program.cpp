@@ -6,6 +6,7 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+#include <numeric>
 #include <tuple>
 
 #include "dynamics/law_forces.hpp"
@@ -19,12 +20,20 @@ using namespace nanobind::literals;
 
 namespace pn {
 
+static std::vector<int> first_blocks(int count) {
+    std::vector<int> blocks(count);
+    std::iota(blocks.begin(), blocks.end(), 0);
+    return blocks;
+}
+
 void bind_program(nb::module_& m) {
     nb::class_<Program>(m, "Program")
         .def("is_of", [](const Program& p, nb::handle model) {
             return same_model(p.mechanism.model.get(), model_pointer(model.ptr()));
         }, "model"_a)
-        .def_prop_ro("constraints", &constraint_rows)
+        .def("constraint_rows", &constraint_rows, "blocks"_a)
+        .def_prop_ro("constraints", [](const Program& p) { return constraint_rows(p, first_blocks(p.constraints)); })
+        .def_prop_ro("bilateral", [](const Program& p) { return constraint_rows(p, first_blocks(p.first_gap)); })
         .def_prop_ro("block_names", &block_names)
         .def_prop_ro("first_rows", &first_rows)
         .def_prop_ro("free_gaps", &free_gaps)

@@ -225,15 +225,19 @@ Numbers Runner::residuals(const Array& q_in, const Array& v_in, double t) {
     set(q_in, v_in, {});
     kinematics(p->mechanism, w->now.terms, q, v);
     std::vector<double> phi(p->user_rows);
+    RowValues gap;  // storage of all gaps, one after another
     for (int i = 0; i < p->constraints; ++i) {
         const Block& block = p->blocks[i];
-        if (std::holds_alternative<UserRows>(block.kind) || std::holds_alternative<UserGapRow>(block.kind)) {
+        const bool is_users = std::holds_alternative<UserRows>(block.kind) || std::holds_alternative<UserGapRow>(block.kind);
+        RowValues& values = is_users || i < p->first_gap ? w->now.values[i] : gap;
+        if (is_users) {
             evaluate_block(*p, *w, t, v, i);
         } else {
+            if (&values == &gap) gap.resize(RowStorage(block.kind), p->mechanism.nv);
             const State state{p->mechanism, w->now.terms, w->now.row_time(t), w->now.terms.q, v};
-            evaluate(block.kind, state, Part::residual, w->now.values[i]);
+            evaluate(block.kind, state, Part::residual, values);
         }
-        std::copy_n(w->now.values[i].residual.begin(), block.total, phi.begin() + block.user_row);
+        std::copy_n(values.residual.begin(), block.total, phi.begin() + block.user_row);
     }
     return to_numpy(std::move(phi));
 }

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 from typing import TypeVar
 
 from .base import similar
+from .point_names import NumberedNames
 from .round import CapsuleContact, Segment
 
 C = TypeVar("C")
@@ -36,9 +37,9 @@ class CapsulePairs:
         return len(self.lines1) * len(self.lines2)
 
     @property
-    def names(self) -> list[str]:
+    def names(self) -> NumberedNames:
         """Names of the contacts: of the pair of shapes and a number."""
-        return [f"{self.name} {number}" for number in range(self.number, self.number + len(self))]
+        return NumberedNames(self.name, range(self.number, self.number + len(self)))
 
     @property
     def mu(self) -> float:
@@ -79,12 +80,10 @@ class PairOfShapes:
         return tuple(point for part in self.parts for point in _contacts(part))
 
     @property
-    def names(self) -> list[str]:
+    def names(self) -> Sequence[str]:
         """Names of the contacts of the manifold."""
-        parts = (
-            p.names if isinstance(p, CapsulePairs) else [str(getattr(p, "name", ""))] for p in self.parts
-        )
-        return [name for names in parts for name in names]
+        count = sum(len(p) if isinstance(p, CapsulePairs) else 1 for p in self.parts)
+        return [self.name] if count == 1 else NumberedNames(self.name, range(1, count + 1))
 
 
 def _contacts(part: object) -> Iterable[object]:

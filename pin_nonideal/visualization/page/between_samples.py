@@ -153,7 +153,7 @@ def _closest(program: core.Program, q: Array, v: Array, t: Array, max_residual: 
 
     Configurations with residuals above `max_residual` are returned unchanged.
     """
-    if not any(block.moves_in_time for block in program.constraints):
+    if not any(block.moves_in_time for block in program.bilateral):
         no_values: Any = np.zeros((len(q), 0))
         closed, _, after, _ = core.nearest_states(
             program, q, v, t=float(t[0]), max_residual=max_residual, threads=1, names=[], values=no_values

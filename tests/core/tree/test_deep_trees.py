@@ -235,16 +235,6 @@ def test_steps_are_those_that_the_motion_needs():
     assert run.stats.rejected <= 3
 
 
-def test_a_thousand_links_take_time_and_room_in_proportion():
-    times = {}
-    for n in (100, 1000):
-        model = chain(n)
-        runner = pn.Scene(model)._compiled.program.runner()
-        q, v = np.full(n, 0.01), np.zeros(n)
-        times[n] = min(runner.time_evaluations(q, v, 0.0, 20) for _ in range(20))
-    assert times[1000] < 10.0**1.3 * times[100]  # exponent 1.1 when nothing else runs
-
-
 def test_massless_end_is_named():
     model = chain(60)
     model.inertias[60] = pin.Inertia.Zero()

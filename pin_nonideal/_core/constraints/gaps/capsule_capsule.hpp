@@ -12,7 +12,7 @@ namespace pn {
 struct CapsuleCapsuleRow : ShapeGap {
     static constexpr const char* name = "capsule_capsule";
 
-    Frame frame1, frame2;
+    SharedFrame frame1, frame2;
     double half1, half2, radius;  // radius: sum of both radii
 
     static constexpr auto data() {

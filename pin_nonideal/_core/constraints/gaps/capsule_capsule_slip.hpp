@@ -12,7 +12,7 @@ namespace pn {
 struct CapsuleCapsuleSlipRows : ContactSlip {
     static constexpr const char* name = "capsule_capsule_slip";
 
-    Frame frame1, frame2;
+    SharedFrame frame1, frame2;
     double half1, half2, radius1;
 
     static constexpr auto data() {

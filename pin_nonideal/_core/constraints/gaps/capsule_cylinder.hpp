@@ -12,7 +12,7 @@ namespace pn {
 struct CapsuleCylinderRow : ShapeGap {
     static constexpr const char* name = "capsule_cylinder";
 
-    Frame frame1, frame2;
+    SharedFrame frame1, frame2;
     Revolved solid;
     double half1, radius;  // half length of the segment, and sum of both radii
 

@@ -13,7 +13,7 @@ namespace pn {
 struct CapsuleCylinderSlipRows : ContactSlip {
     static constexpr const char* name = "capsule_cylinder_slip";
 
-    Frame frame1, frame2;
+    SharedFrame frame1, frame2;
     Revolved solid;
     double half1, radius1;
 

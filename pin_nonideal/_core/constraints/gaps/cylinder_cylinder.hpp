@@ -13,7 +13,7 @@ struct CylinderCylinderRow : ShapeGap {
     static constexpr const char* name = "cylinder_cylinder";
     static constexpr DisplayKind shown = DisplayKind::nothing;
 
-    Frame frame1, frame2;
+    SharedFrame frame1, frame2;
     Revolved first, second;
     double radius;  // sum of both radii
 

@@ -13,7 +13,7 @@ namespace pn {
 struct CylinderCylinderSlipRows : ContactSlip {
     static constexpr const char* name = "cylinder_cylinder_slip";
 
-    Frame frame1, frame2;
+    SharedFrame frame1, frame2;
     Revolved first, second;
     double radius1, radius2;
 

@@ -12,7 +12,7 @@ namespace pn {
 struct DiskHullRow : ShapeGap {
     static constexpr const char* name = "disk_hull";
 
-    Frame frame1, frame2;
+    SharedFrame frame1, frame2;
     Hull solid;
     double rim, radius;  // radius of the disk, and radius around the hull
 

@@ -13,7 +13,7 @@ namespace pn {
 struct DiskHullSlipRows : ContactSlip {
     static constexpr const char* name = "disk_hull_slip";
 
-    Frame frame1, frame2;
+    SharedFrame frame1, frame2;
     Hull solid;
     double rim;
 

@@ -11,7 +11,7 @@ namespace pn {
 struct PlanePointRow : PlaneGap {
     static constexpr const char* name = "plane_point";
 
-    Frame frame1, frame2;
+    SharedFrame frame1, frame2;
     Vec3 normal;
     double radius;
 

@@ -11,7 +11,7 @@ namespace pn {
 struct PlanePointSlipRows : ContactSlip {
     static constexpr const char* name = "plane_point_slip";
 
-    Frame frame1, frame2;
+    SharedFrame frame1, frame2;
     double radius;
     Vec3 tangent1, tangent2, normal;
 

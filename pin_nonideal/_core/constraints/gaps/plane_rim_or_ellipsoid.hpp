@@ -14,7 +14,7 @@ namespace pn {
 struct PlaneEllipsoidRow : PlaneGap {
     static constexpr const char* name = "plane_ellipsoid";
 
-    Frame frame1, frame2;
+    SharedFrame frame1, frame2;
     Vec3 normal, semiaxes;
 
     static constexpr auto data() {

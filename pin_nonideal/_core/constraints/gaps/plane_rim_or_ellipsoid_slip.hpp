@@ -12,7 +12,7 @@ namespace pn {
 struct PlaneEllipsoidSlipRows : ContactSlip {
     static constexpr const char* name = "plane_ellipsoid_slip";
 
-    Frame frame1, frame2;
+    SharedFrame frame1, frame2;
     Vec3 semiaxes, tangent1, tangent2, normal;
 
     static constexpr auto data() {

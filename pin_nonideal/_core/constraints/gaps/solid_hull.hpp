@@ -16,7 +16,7 @@ template <class Solid>
 struct SolidHullRow : ShapeGap {
     static constexpr const char* name = Solid::gap;
 
-    Frame frame1, frame2;
+    SharedFrame frame1, frame2;
     Solid solid;
     double radius;  // sum of both radii
 

@@ -16,7 +16,7 @@ template <class Solid>
 struct SolidHullSlipRows : ContactSlip {
     static constexpr const char* name = Solid::slip;
 
-    Frame frame1, frame2;
+    SharedFrame frame1, frame2;
     Solid solid;
     double radius1;
 

@@ -14,7 +14,7 @@ struct DistanceRows : ConstraintKind {
     static constexpr bool affine_rate = true;
     static constexpr DisplayKind shown = DisplayKind::rod;
 
-    Frame frame1, frame2;
+    SharedFrame frame1, frame2;
     TimeFunction length;
 
     static constexpr auto data() {

@@ -32,7 +32,7 @@ struct FrameRows : ConstraintKind {
     static constexpr bool affine_rate = true;
     static constexpr DisplayKind shown = DisplayKind::anchor;
 
-    Frame frame1, frame2;
+    SharedFrame frame1, frame2;
 
     static constexpr auto data() {
         return std::tuple(Field{"frame1", &FrameRows::frame1}, Field{"frame2", &FrameRows::frame2});

@@ -18,7 +18,7 @@ struct HingeRows : ConstraintKind {
     static constexpr bool affine_rate = true;
     static constexpr DisplayKind shown = DisplayKind::anchor;
 
-    Frame frame1, frame2;
+    SharedFrame frame1, frame2;
     Vec3 axis, normal1, normal2;  // right-handed, in both frames
 
     static constexpr auto data() {

@@ -11,7 +11,7 @@ namespace pn {
 struct HingeSlipRows : SlipDirections {
     static constexpr const char* name = "hinge_slip";
 
-    Frame frame1, frame2;
+    SharedFrame frame1, frame2;
     Vec3 axis;
 
     static constexpr auto data() {

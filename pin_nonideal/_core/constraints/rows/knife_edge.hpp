@@ -13,7 +13,7 @@ struct KnifeEdgeRows : ConstraintKind {
     static constexpr bool affine_rate = true;
     static constexpr DisplayKind shown = DisplayKind::edge;
 
-    Frame frame1, frame2;  // frame2 is the world's
+    SharedFrame frame1, frame2;  // frame2 is the world's
     Vec3 axis;
 
     static constexpr auto data() {

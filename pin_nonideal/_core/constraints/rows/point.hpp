@@ -14,7 +14,7 @@ struct PointRows : ConstraintKind {
     static constexpr bool affine_rate = true, comparable_rows = true;
     static constexpr DisplayKind shown = DisplayKind::anchor;
 
-    Frame frame1, frame2;
+    SharedFrame frame1, frame2;
     std::vector<int> axes;
 
     static constexpr auto data() {

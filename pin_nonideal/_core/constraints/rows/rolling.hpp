@@ -14,7 +14,7 @@ struct RollingRows : ConstraintKind {
     static constexpr DisplayKind shown = DisplayKind::rolling;
     static constexpr int pressing = 2;
 
-    Frame frame1, frame2;
+    SharedFrame frame1, frame2;
     double radius;
     bool sphere;
     Vec3 axis;  // unit vector along the axis of the disk, in frame 1; unused for a sphere

@@ -13,7 +13,7 @@ namespace pn {
 struct SpinSlipRows : SlipDirections {
     static constexpr const char* name = "spin_slip";
 
-    Frame frame1, frame2;
+    SharedFrame frame1, frame2;
     std::vector<int> axes;
 
     static constexpr auto data() {

@@ -128,7 +128,7 @@ GapSample GapSearch::sample_at_start(int gap) const {
     double level = plane(gap);
     for (int held : closed_round_)
         if (same_bodies(p, gap, held)) level = std::min(level, start_.width[held]);
-    return above({0.0, start_.width[gap], start_.rate[gap], start_.separation[gap]}, level);
+    return above({0.0, start_.width[gap], start_.rate[gap], start_.separation_of(gap)}, level);
 }
 
 GapSample GapSearch::sample(int gap, double part) {

@@ -11,13 +11,11 @@ namespace pn {
 
 GapWatch::GapWatch(System& system, GapState& state)
     : gaps(state), travel(system.p), system_(system), p(system.p), w(system.w) {
-    bool round = false;
     for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
-        round |= Separation::has(p, i);
         if (i == 0 || p.bodies_of_gap[i] != p.bodies_of_gap[i - 1]) first_of_group_.push_back(i);
         group_.push_back(static_cast<int>(first_of_group_.size()) - 1);
     }
-    gaps = GapState(p.gaps.size(), first_of_group_.size(), round);
+    gaps = GapState(p.gaps.size(), first_of_group_.size());
     first_of_group_.push_back(static_cast<int>(p.gaps.size()));
     travel.size(gaps.travel);
 }
@@ -51,12 +49,11 @@ void GapWatch::sample_all(double t) {
     for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
         gaps.monitored[i] = gaps.skipped[i] = 0;
         if (is_bare(p, i)) continue;
-        measure_gap(p, w, t, system_.v, i);
-        gaps.width[i] = gap_width(p, w, i);
+        gaps.width[i] = measured_width(p, w, t, system_.v, i);
         gaps.rate[i] = 0.0;
         if (!w.state.closed[i]) classify(i);
         if (gaps.skipped[i]) continue;
-        move_gap(p, w, t, system_.v, i);
+        follow_gap(p, w, t, system_.v, i);
         gaps.keep(i, GapSample::here(p, w, i, 0.0));
     }
     gaps.list_monitored();
@@ -200,6 +197,11 @@ void GapState::keep(int gap, const GapSample& sample) {
     width[gap] = sample.width;
     rate[gap] = sample.rate;
     if (sample.separation) separation[gap] = *sample.separation;
+}
+
+Separation GapState::separation_of(int gap) const {
+    const auto at = separation.find(gap);
+    return at == separation.end() ? Separation() : at->second;
 }
 
 void GapState::defer_retry(int gap, double t) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <optional>
 
 #include "contact/bounds/distance.hpp"
@@ -24,7 +25,7 @@ struct GapSample {
 // until the travel since the last sample adds up to the width. Other open gaps are monitored.
 struct GapState {
     std::vector<double> width, rate;
-    std::vector<Separation> separation;
+    std::map<int, Separation> separation;     // of gaps that were monitored
     static constexpr char from_step_end = 2;  // monitored, but first sampled at the end of the current step
     std::vector<char> monitored, skipped;     // sampled in each step, or not (neither: closed or immovable)
     // Travel of the bodies of skipped gaps at the last sample (contact/bounds/travel.hpp).
@@ -38,12 +39,13 @@ struct GapState {
     // For a touching gap that the solver left open: time of the first attempt, and time before which it is not retried.
     std::vector<double> blocked_since, retry_time;
 
-    // `groups`: number of groups of gaps. `round`: true if a gap is between round bodies.
-    explicit GapState(size_t gaps = 0, size_t groups = 0, bool round = false)
-        : width(gaps, 0.0), rate(gaps, 0.0), separation(round ? gaps : 0), monitored(gaps, 0), skipped(gaps, 0),
+    // `groups`: number of groups of gaps.
+    explicit GapState(size_t gaps = 0, size_t groups = 0)
+        : width(gaps, 0.0), rate(gaps, 0.0), monitored(gaps, 0), skipped(gaps, 0),
           path_length(gaps, 0.0), turn(gaps, 0.0), distance(gaps, 0.0), group_recheck(groups, 0.0),
           blocked_since(gaps, 0.0), retry_time(gaps, -HUGE_VAL) {}
     void keep(int gap, const GapSample& sample);
+    Separation separation_of(int gap) const;  // at the last sample
     void list_monitored();
     // Recheck a group at this travel of the scene, or before.
     void recheck_at(int group, double scene_travel) {

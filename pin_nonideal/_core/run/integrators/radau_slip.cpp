@@ -26,9 +26,7 @@ constexpr double defect_part = 1.0 / (2 * Collocation::stages + 1);
 }  // namespace
 
 Collocation::Collocation(Step& step, System& system, ErrorNorm& norm) : step_(step), system_(system), norm_(norm) {
-    F_.assign(stages, VecX::Zero(system.ny));
-    Y_ = next_ = F_;
-    error_ = F_[0];
+    for (auto* list : {&F_, &Y_, &next_}) list->resize(stages);
     for (auto* list : {&u_, &n_, &turned_}) list->resize(stages);
     for (auto* list : {&A_, &T_, &P_, &Q_}) list->resize(stages);
 }
@@ -235,6 +233,10 @@ void Collocation::measure_stiffness() {
 
 void Collocation::advance() {
     const bool again = has_warm_start_;
+    if (error_.size() == 0) {  // most runs never solve for directions
+        error_ = VecX::Zero(system_.ny);
+        for (auto* list : {&F_, &Y_, &next_}) list->assign(stages, error_);
+    }
     gather();
     converged_ = has_warm_start_ = false;
     step_.y1 = step_.y0;

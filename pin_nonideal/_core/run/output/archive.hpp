@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <cstring>
+#include <map>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
@@ -91,6 +92,13 @@ private:
         raw(x.data(), x.size() * sizeof(double));
     }
     void item(Vec3& x) { raw(&x[0], 3 * sizeof(double)); }
+    template <class T>
+    void item(std::map<int, T>& x) {
+        std::vector<int> keys;
+        for (const auto& entry : x) keys.push_back(entry.first);
+        resized(keys);
+        for (int key : keys) item(x[key]);
+    }
     template <class T>
     void item(std::vector<T>& x) {
         same(x.size());

@@ -226,8 +226,7 @@ void MoreauContacts::find_touching(double t) {
     touching_.clear();
     const double uncertainty = parameters.width_rounding * scene_size(p, w);
     for (int i : watch_.advance(path_since_last())) {
-        measure_gap(p, w, t, mean_.start(), i);
-        const double width = gap_width(p, w, i);
+        const double width = measured_width(p, w, t, mean_.start(), i);
         const bool touches = was_closed_[i] || (width <= 0.0 && has_known_direction(i, width));
         if (touches) touching_.push_back(i);
         watch_.gaps.width[i] = touches ? 0.0 : width - uncertainty;  // guaranteed width
