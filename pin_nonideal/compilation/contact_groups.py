@@ -13,10 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pin_nonideal.core_loader import core
+from pin_nonideal.description.contacts import JointLimit
 from pin_nonideal.description.contacts.pair_of_shapes import CapsulePairs, PairOfShapes
 from pin_nonideal.description.contacts.point_names import ContactOfPoint, split_number
 from pin_nonideal.states.rows import names_by_row
 from pin_nonideal.types import Array
+
+STOPS = ("lower", "upper")  # sides of a joint limit, which end the names of its stops
 
 # Modes of friction elements.
 SLIP_PLUS, SLIP_MINUS = int(core.Mode.slip_plus), int(core.Mode.slip_minus)
@@ -122,6 +125,8 @@ class Descriptions(Mapping[str, object]):
     ) -> None:
         self._described, self._contact_of, self._names = described, contact_of, names
         self._pairs = {pair.name: pair for pair in pairs}
+        limits = (name for name, c in described.items() if isinstance(c, JointLimit))
+        self._stops = {f"{name} {side}" for name in limits for side in STOPS}
 
     def __getitem__(self, name: str) -> object:
         """Return the description of a constraint or contact point."""
@@ -136,7 +141,7 @@ class Descriptions(Mapping[str, object]):
             if name in self._described:
                 if not isinstance(self._described[name], CapsulePairs):
                     yield name, self._described[name]
-            elif name not in self._contact_of:
+            elif name in self._stops:
                 yield name, self[name]
 
     def __iter__(self) -> Iterator[str]:

@@ -32,6 +32,7 @@ from pin_nonideal.types import Model
 
 from .callbacks import checked_function
 from .constraints import user_rate, user_rows
+from .contact_groups import STOPS
 from .resolver import Resolver, rotated_frame, words
 
 RoundContact = HullContact | BoxContact | RevolvedContact | SphereContact | CapsuleContact
@@ -162,7 +163,7 @@ def _on_plane(c: PointContact, name: str, out: core.Builder, resolver: Resolver)
 def _stops(c: JointLimit, name: str, out: core.Builder, resolver: Resolver) -> list[int]:
     """Add the finite stops of a joint, "NAME lower" and "NAME upper"."""
     blocks = []
-    for which, sign, bound in zip(("lower", "upper"), (1.0, -1.0), stops_of(c, name, resolver), strict=True):
+    for which, sign, bound in zip(STOPS, (1.0, -1.0), stops_of(c, name, resolver), strict=True):
         if math.isfinite(bound):
             blocks.append(
                 out.add_limit(f"{name} {which}", resolver.joint(c.joint, name), bound=bound, sign=sign)

@@ -43,6 +43,9 @@ from .cylinder import (
 from .cylinder_manifold import cylinder_contacts
 from .shapes import CORNERS, Shape
 
+# Pairs of corners of a box that an edge joins.
+BOX_EDGES = [(i, j) for i, j in combinations(range(len(CORNERS)), 2) if (CORNERS[i] != CORNERS[j]).sum() == 1]
+
 ManifoldContact = (
     PointContact
     | CapsuleContact
@@ -259,8 +262,8 @@ def _edges(shape: Shape, points: Array) -> list[Segment]:
     if shape.half is None:
         hull = convex_hull(points, shape.name)
         return [_segment(hull.points[edge[:2]]) for edge in hull.edges]
-    pairs = combinations(range(len(CORNERS)), 2)
-    return [_segment(points[[i, j]]) for i, j in pairs if (CORNERS[i] != CORNERS[j]).sum() == 1]
+    corners = rows_of(points)
+    return [(corners[i], corners[j]) for i, j in BOX_EDGES]
 
 
 def _segment(points: Array) -> Segment:

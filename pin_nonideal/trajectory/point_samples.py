@@ -128,7 +128,7 @@ def _touching(compiled: CompiledScene, outcome: core.Outcome, closed: NDArray[np
     chosen = set(np.array(compiled.point_names)[closed.any(axis=0)].tolist())
     chosen |= {compiled.block_names[event.element] for event in outcome.events if event.of_contact}
     framed = [compiled.block_names[block] for block in compiled.program.framed_contacts]
-    return [name for name in framed if name in compiled.contact_of and name in chosen]
+    return [name for name in framed if name in chosen and name in compiled.contact_of]
 
 
 def _forces(outcome: core.Outcome, framed: Sequence[str], names: Sequence[str]) -> Array:
