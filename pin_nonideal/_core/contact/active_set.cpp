@@ -236,8 +236,8 @@ void select_active_contacts(const Program& p, Workspace& w, double t, const VecX
         close(query.rest, nullptr);
         // Multipliers of redundant rows do not show if friction at rest is within its cones. Sliding friction follows
         // the minimum-norm loads, unlike the solution of the cone problem.
-        if (query.prescribed || !w.now.rows.redundant || !w.state.sticks_anywhere() || slides_anywhere(p, w, v))
-            return;
+        const bool are_shared = w.now.rows.redundant && w.state.sticks_anywhere() && !slides_anywhere(p, w, v);
+        if (query.prescribed || !(are_shared || !slip_opposes_friction(p, w, v))) return;
         if (!joint_motion) joint_motion = solve_jointly();
         if (joint_motion) close(joint_motion->closed, &*joint_motion);
         else close(query.rest, nullptr);
@@ -249,8 +249,11 @@ void select_active_contacts(const Program& p, Workspace& w, double t, const VecX
     // Modes with a negative determinant belong to one of several motions. The cone problem of all contacts gives
     // another motion.
     const bool one_of_several = unsolved->solutions == Failure::Solutions::unproven && !unsolved->accelerations.empty();
-    if (!joint_motion || !(undecided || one_of_several || joint_motion->shared)) throw *unsolved;
-    if (one_of_several) {
+    const bool goes_on = w.continues && unsolved->solutions == Failure::Solutions::several;
+    // If these active sets have no motion, another one may have.
+    const bool has_other = undecided || one_of_several || goes_on || unsolved->solutions == Failure::Solutions::none;
+    if (!joint_motion || !(has_other || joint_motion->shared)) throw *unsolved;
+    if (one_of_several || goes_on) {
         joint_motion->several = true;
         joint_motion->several_element = unsolved->elements.front();
     }

@@ -196,9 +196,10 @@ struct Search {
         return false;
     }
 
-    // Try the modes of a nearby motion, which are right if their motion satisfies all laws.
+    // Try the modes of a nearby motion, which are right if their motion satisfies all laws. Few elements are searched for
+    // other motions instead.
     bool keeps_nearby_modes() {
-        if (query.nearby_modes.empty()) return false;
+        if (static_cast<int>(list.size()) <= max_searched_forces || query.nearby_modes.empty()) return false;
         std::vector<Mode> modes = query.modes;
         for (int e : list) modes[e] = query.nearby_modes[e];
         if (std::any_of(list.begin(), list.end(), [&](int e) { return modes[e] == unloaded; })) return false;
@@ -228,8 +229,7 @@ struct Search {
             w.now.several_element = query.several_element < 0 ? list.front() : query.several_element;
             return;
         }
-        const bool are_few = static_cast<int>(list.size()) <= max_searched_forces;  // searched for other motions first
-        if (!are_few && keeps_nearby_modes()) return;
+        if (keeps_nearby_modes()) return;
         std::vector<Mode> modes = query.modes;
         for (int e : list) modes[e] = unloaded;
         bool found = false;
@@ -240,8 +240,7 @@ struct Search {
         });
         if (p.needs_reactions && search_further(found, modes)) return;
         if (found) return apply(modes, false);
-        if (enumerate_modes(p, w, t, q, v, query) || (are_few && keeps_nearby_modes())) return;
-        throw Failure(Failure::Kind::not_converged, t, list);
+        if (!enumerate_modes(p, w, t, q, v, query)) throw Failure(Failure::Kind::not_converged, t, list);
     }
 
     // Check if the iteration may have lowered a limit too early: an element that slips in one iterate gets its kinetic

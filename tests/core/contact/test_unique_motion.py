@@ -57,6 +57,28 @@ def test_a_motion_that_is_called_unique_is_the_only_one(seed, count):
         assert count_motions(W, w0, mu, seed) == 1
 
 
+@pytest.mark.parametrize(
+    ("seed", "count", "friction", "several"),
+    [
+        (2, 3, (0.1, 1.0), "error"),
+        (976, 4, (0.1, 1.0), "error"),
+        (541, 5, (0.2, 4.0), "error"),
+        (472, 4, (0.2, 4.0), "continue"),
+        (472, 5, (0.2, 4.0), "continue"),
+    ],
+)
+def test_a_motion_that_one_contact_after_another_does_not_show_is_sought_jointly(
+    seed, count, friction, several
+):
+    """Contacts decided one by one had no motion, several, or one whose slip does not oppose its friction."""
+    scene, W, w0, mu = body_on_points(seed, count, friction)
+    a = scene.solve(*scene.initial_state(), several=several).a
+    points = [scene.model.frames[scene.model.getFrameId(f"{k}")].placement.translation for k in range(count)]
+    found = np.concatenate([NORMAL_FIRST @ (a[:3] + np.cross(a[3:], point)) for point in points])
+    expected = W @ pn.cone_complementarity(W, w0, [mu] * count).f + w0
+    assert np.abs(found - expected).max() < SAME * np.abs(expected).max()
+
+
 def test_several_motions_are_not_called_unique():
     several = 0
     for seed in range(60):
