@@ -10,7 +10,7 @@ from pin_nonideal.core_loader import core
 from pin_nonideal.description.constraints import Rolling
 from pin_nonideal.description.contacts import JointLimit
 from pin_nonideal.description.contacts.pair_of_shapes import contact_parts, given_contacts
-from pin_nonideal.description.contacts.point_names import ContactOfPoint, UsedNames
+from pin_nonideal.description.contacts.point_names import ContactOfPoint, NumberedNames, UsedNames
 from pin_nonideal.description.scene_spec import SceneSpec
 
 from .actuation import lower_actuation
@@ -88,16 +88,19 @@ def lower_stepwise(spec: SceneSpec, builder: core.Builder, resolver: Resolver) -
     contacts: list[Any] = contact_parts(spec.contacts)
     contact_names = unique_names(contacts, used_names)
     given = given_contacts(spec.contacts)
-    rubbing_names = UsedNames()  # a contact with friction has a law of its name
+    points = points_by_pair(spec.contacts)
+    names_of_contacts = UsedNames()  # a contact with friction has a law of its name, and its points have laws
     for name, c in zip(own_names, given, strict=True):
         if has_friction(c):
-            rubbing_names.add(name)
-    law_names = unique_names(spec.laws, rubbing_names)
+            names_of_contacts.add(name)
+    for pair, names in points.items():
+        names_of_contacts.add_points(NumberedNames(pair, range(1, len(names) + 1)))
+    law_names = unique_names(spec.laws, names_of_contacts)
     for c, name in zip(spec.constraints, constraint_names, strict=True):
         lower_constraint(c, name, builder, resolver)
         yield LoweredItem("constraint", name, c, partial(_relower, lower_constraint, name, resolver))
     blocks = {name: block for block, name in enumerate(builder.block_names)}
-    contact_of = ContactOfPoint(points_by_pair(spec.contacts))
+    contact_of = ContactOfPoint(points)
     named = list(zip(contact_names, contacts, strict=True))
     for name, contact, first in lower_contacts(named, contact_of, builder, resolver):
         blocks[name] = first

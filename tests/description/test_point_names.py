@@ -30,6 +30,7 @@ def points() -> dict[str, NumberedNames]:
         ("left -1", ("left -1", 0)),
         ("left 1.5", ("left 1.5", 0)),
         ("left ²", ("left ²", 0)),
+        ("left " + 5000 * "9", ("left " + 5000 * "9", 0)),
         ("left ", ("left ", 0)),
         (" 3", (" 3", 0)),
         ("3", ("3", 0)),

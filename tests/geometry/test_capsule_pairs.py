@@ -92,6 +92,19 @@ def test_a_law_with_the_name_of_a_contact_with_friction_is_refused() -> None:
     assert again.law_names == [law.name]
 
 
+@pytest.mark.parametrize("mu", [0.0, 0.4])
+def test_a_law_with_the_name_of_a_contact_point_is_refused(mu: float) -> None:
+    scene = boxes(2, mu)
+    for number, is_refused in ((1, True), (160, True), (161, False)):
+        law = pn.JointFriction("box 0", viscous=0.1, name=f"{scene.contact_names[-1]} {number}")
+        parts = {"contacts": scene.contacts, "laws": [law], "collision_model": scene.collision_model}
+        if not is_refused:
+            assert law.name in pn.Scene(scene.model, **parts).law_names
+            continue
+        with pytest.raises(pn.InputError, match="names must be unique"):
+            pn.Scene(scene.model, **parts)
+
+
 def test_one_pair_of_capsules_has_no_number() -> None:
     pairs = CapsulePairs(pn.CapsuleContact("a", "b", LINE, LINE, 0.1), (LINE,), (LINE,))
     (single,) = numbered([pairs], "pair")

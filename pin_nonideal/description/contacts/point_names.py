@@ -8,6 +8,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import overload
 
+# Maximum digits of the number of a point. Longer numbers are part of a name.
+MAX_DIGITS = 9
+
 
 def split_number(name: str) -> tuple[str, int]:
     """Return the name and the number of "NAME NUMBER", or (name, 0) for a name without a number.
@@ -16,7 +19,7 @@ def split_number(name: str) -> tuple[str, int]:
         name: any name.
     """
     base, _, number = name.rpartition(" ")
-    is_number = number.isascii() and number.isdecimal() and number[0] != "0"
+    is_number = number.isascii() and number.isdecimal() and number[0] != "0" and len(number) <= MAX_DIGITS
     return (base, int(number)) if base and is_number else (name, 0)
 
 

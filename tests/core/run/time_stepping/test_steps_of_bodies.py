@@ -276,3 +276,20 @@ def test_sparse_samples_keep_all_events(seed):
     np.testing.assert_array_equal(sparse.q[-1], dense.q[-1])
     assert len(dense.events) > 1
     assert summary(sparse) == summary(dense)
+
+
+def test_a_free_joint_carries_no_friction_of_a_contact_that_a_step_opens():
+    """A law reads reactions in the middle of a step, where all contacts are open."""
+    model, shapes, wrenches = pin.Model(), pin.GeometryModel(), []
+    pn.free_body(model, "box", coal.Box(0.1, 0.1, 0.1), mass=4.0, collision_model=shapes, place=(0, 0, 0.05))
+
+    def law(t, q, v, reactions):
+        wrenches.append(reactions.wrench("box").copy())
+        return np.zeros(6)
+
+    contacts = pn.ground_contacts(model, shapes, mu=0.5)
+    scene = pn.Scene(model, contacts=contacts, laws=[pn.UserLaw(law)], collision_model=shapes)
+    run = pn.simulate(scene, 0.02, v=[0.5, 0.0, 0.0, 0.0, 0.0, 0.0], method="moreau", dt=1e-3)
+    assert run.v[-1, 0] == pytest.approx(0.5 - 0.5 * 9.81 * 0.02, rel=1e-9)
+    assert len(wrenches) > 20
+    assert np.abs(wrenches).max() < 1e-6
