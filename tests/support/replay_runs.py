@@ -47,6 +47,7 @@ def run_of(model: pin.Model, t: Any, q: Callable[[float], Any], **fields: Any) -
     rates = [pin.difference(model, q(x - STEP), q(x + STEP)) / (2 * STEP) for x in t]
     held = [*fields.get("constraints", []), *fields.get("contacts", [])]
     names = [getattr(item, "name", None) or type(item).__name__ for item in held]
+    contact_names = names[len(fields.get("constraints", [])) :]
     scene = SimpleNamespace(
         model=model,
         visual_model=fields.pop("visual_model", None),
@@ -55,6 +56,7 @@ def run_of(model: pin.Model, t: Any, q: Callable[[float], Any], **fields: Any) -
         constraints=fields.pop("constraints", []),
         laws=[],
         contacts=fields.pop("contacts", []),
+        contact_names=contact_names,
         forces=fields.pop("given_forces", []),
         q0=configurations[0],
         v0=np.asarray(rates[0]),

@@ -64,7 +64,7 @@ def contact_points(run: Trajectory, motion: Motion) -> list[ContactPoint]:
     names = [compiled.block_names[block] for block in compiled.program.framed_contacts]
     struck, points = {str(event.element) for event in run.events}, getattr(run, "points", None)
     touched = set() if points is None else set(points.names)
-    single = set(compiled.contacts.names).difference(compiled.points)
+    single = set(run.scene.contact_names).difference(compiled.points)
     touched |= single.intersection(names) - (open_contacts(run) - struck)
     on_planes = {name for name, item in compiled.described.single() if hasattr(item, "plane")}
     chosen = [k for k, name in enumerate(names) if name in on_planes or name in touched]
