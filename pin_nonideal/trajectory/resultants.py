@@ -64,9 +64,11 @@ def reactions(
         points: samples of the points of pairs of shapes.
     """
     joints = [str(name) for name in compiled.model.names][1:]
-    names = [*joints, *(compiled.block_names[block] for block in compiled.program.reaction_blocks)]
-    raw = outcome.reactions.reshape(len(outcome.t), len(names), WRENCH)
-    table = {name: raw[:, own.start] for name, own in Groups(names, compiled.contact_of).slices().items()}
+    names = [compiled.block_names[block] for block in compiled.program.reaction_blocks]
+    raw = outcome.reactions.reshape(len(outcome.t), len(joints) + len(names), WRENCH)
+    table = {name: raw[:, k] for k, name in enumerate(joints)}
+    groups = Groups(names, compiled.contact_of)
+    table |= {name: raw[:, len(joints) + k] for name, k in zip(groups.names, groups.starts, strict=True)}
     if points is not None:
         places = _places(compiled, outcome, points)
         table |= {name: _wrench(compiled, outcome, points, places, name) for name in compiled.points}

@@ -47,8 +47,8 @@ def test_a_pair_of_boxes_adds_its_edges_together() -> None:
     pair = compiled_scene(boxes(2)).spec.contacts[-1]
     assert [len(p) for p in pair.parts if isinstance(p, CapsulePairs)] == [EDGES * EDGES]
     assert len(pair.parts) == 2 * CORNERS + 1
-    assert pair.names == [point.name for point in pair.points]
-    assert pair.names == [f"{pair.name} {k + 1}" for k in range(2 * CORNERS + EDGES * EDGES)]
+    assert list(pair.names) == [point.name for point in pair.points]
+    assert list(pair.names) == [f"{pair.name} {k + 1}" for k in range(2 * CORNERS + EDGES * EDGES)]
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.4])

@@ -300,3 +300,17 @@ def test_groups_of_entries() -> None:
     assert groups.least(np.arange(6.0)).tolist() == [0.0, 2.0, 3.0]
     assert groups.any(modes[0] == 1).tolist() == [True, False, False]
     assert Groups([], NO_POINTS).sum(np.zeros((4, 0))).shape == (4, 0)
+
+
+def test_a_joint_may_have_the_name_of_a_contact_point() -> None:
+    model, shapes = pin.Model(), pin.GeometryModel()
+    names = ["box", "box on ground 3", "other"]
+    for k, name in enumerate(names):
+        shape, place = coal.Box(EDGE, EDGE, EDGE), (k, 0.0, 0.5 * EDGE)
+        pn.free_body(model, name, shape, mass=MASS, collision_model=shapes, place=place)
+    scene = pn.Scene(model, contacts=pn.ground_contacts(model, shapes), collision_model=shapes)
+    run = pn.simulate(scene, 0.01, method="moreau", dt=1e-3, record="reactions")
+    assert list(run.reactions)[: len(names)] == names
+    for name in names:
+        assert np.abs(run.reactions[name]).max() < 1e-9
+        np.testing.assert_allclose(np.linalg.norm(run.reaction(f"{name} on ground")[-1, :3]), MASS * G)

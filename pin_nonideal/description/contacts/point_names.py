@@ -6,6 +6,8 @@ A scene of many shapes has a hundred thousand points, nearly all open, so their 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from copy import deepcopy
+from dataclasses import dataclass
 from typing import overload
 
 # Maximum digits of the number of a point. Longer numbers are part of a name.
@@ -23,16 +25,17 @@ def split_number(name: str) -> tuple[str, int]:
     return (base, int(number)) if base and is_number else (name, 0)
 
 
+@dataclass(frozen=True)
 class NumberedNames(Sequence[str]):
     """Names "NAME 1", "NAME 2" and so on.
 
-    Args:
+    Attributes:
         name: name of the pair of shapes.
         numbers: numbers of the points.
     """
 
-    def __init__(self, name: str, numbers: range) -> None:
-        self.name, self.numbers = name, numbers
+    name: str
+    numbers: range
 
     def __len__(self) -> int:
         return len(self.numbers)
@@ -55,12 +58,6 @@ class NumberedNames(Sequence[str]):
         """Check if a point has this name."""
         base, number = split_number(str(name))
         return base == self.name and number in self.numbers
-
-    def __eq__(self, other: object) -> bool:
-        """Check if other names are the same."""
-        return isinstance(other, Sequence) and list(self) == list(other)
-
-    __hash__ = None  # type: ignore[assignment]
 
 
 class ContactOfPoint(Mapping[str, str]):
@@ -154,8 +151,4 @@ class UsedNames:
 
     def copy(self) -> UsedNames:
         """Return a copy."""
-        copied = UsedNames()
-        copied._names = set(self._names)
-        copied._numbers = {base: set(numbers) for base, numbers in self._numbers.items()}
-        copied._points = {base: list(points) for base, points in self._points.items()}
-        return copied
+        return deepcopy(self)
