@@ -192,7 +192,7 @@ def gains_of(model: Model, gain: object, who: str) -> Array:
     Args:
         model: pinocchio.Model.
         gain: a number, an array (nv,), or a table by joint name.
-        who: words for messages.
+        who: prefix of error messages.
 
     Raises:
         InputError: wrong shape, or not finite.

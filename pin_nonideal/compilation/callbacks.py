@@ -34,7 +34,7 @@ def checked_function(
 
     Args:
         function: the user's function.
-        who: words for messages.
+        who: prefix of error messages.
         shapes: shape of the result, or of each part of a tuple of results.
     """
     ask = named_function(function, who)
@@ -64,7 +64,7 @@ def named_function(function: Callable[..., object], who: str) -> Callable[..., A
 
     Args:
         function: the user's function.
-        who: words for messages.
+        who: prefix of error messages.
     """
 
     def call(*arguments: object) -> object:
@@ -90,7 +90,7 @@ def numbers_of(part: object, shape: tuple[int, ...], who: str) -> Array:
     Args:
         part: the result.
         shape: required shape.
-        who: words for messages.
+        who: prefix of error messages.
 
     Raises:
         UserFunctionError: the result is no finite array of this size.
@@ -110,7 +110,7 @@ def checked_limits(function: Callable[..., object], who: str) -> Callable[..., t
 
     Args:
         function: the user's function; it returns one number for both directions, or two.
-        who: words for messages.
+        who: prefix of error messages.
     """
     ask = named_function(function, who)
 
@@ -135,7 +135,7 @@ def time_function(function: Any, who: str) -> Any:
 
     Args:
         function: one of `description.time_functions`, or the user's t -> (value, rate, acceleration).
-        who: words for messages.
+        who: prefix of error messages.
 
     Raises:
         InputError: a derivative is wrong.
@@ -158,7 +158,7 @@ def breaks(function: object, who: str) -> list[float]:
 
     Args:
         function: the user's function.
-        who: words for messages.
+        who: prefix of error messages.
 
     Raises:
         InputError: the attribute is no ascending sequence of times.
@@ -177,7 +177,7 @@ def _check_derivatives(jet: Callable[..., Any], who: str) -> None:
 
     Args:
         jet: checked function t -> (value, rate, acceleration).
-        who: words for messages.
+        who: prefix of error messages.
 
     Raises:
         InputError: the rate or the acceleration is wrong at every probe.

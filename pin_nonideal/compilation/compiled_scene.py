@@ -9,7 +9,7 @@ from functools import cached_property
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.actuation import SampledControl
 from pin_nonideal.description.constraints import UserConstraint
-from pin_nonideal.description.contacts.pair_of_shapes import CapsulePairs, PairOfShapes, contact_parts
+from pin_nonideal.description.contacts.pair_of_shapes import ContactGroup, PairOfShapes, contact_parts
 from pin_nonideal.description.contacts.point_names import ContactOfPoint, UsedNames
 from pin_nonideal.description.drive_kinds import delayed_control, switching_drives
 from pin_nonideal.description.scene_spec import SceneSpec
@@ -259,7 +259,7 @@ class CompiledScene:
 def _frames_of(contact: object) -> tuple[str, str]:
     """Return the frames of a contact, empty for the world or if it has none."""
     contact = contact_parts([contact])[0]
-    contact = contact.like if isinstance(contact, CapsulePairs) else contact
+    contact = contact.like if isinstance(contact, ContactGroup) else contact
     first = getattr(contact, "frame", None) or getattr(contact, "frame1", None)
     second = getattr(contact, "plane", None) or getattr(contact, "frame2", None)
     return (str(first or ""), str(second or ""))

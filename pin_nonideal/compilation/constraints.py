@@ -79,7 +79,7 @@ def frames_of(c: PinocchioConstraint, resolver: Resolver, who: str) -> tuple[Fra
     Args:
         c: the description.
         resolver: frames and joints by name.
-        who: words for messages.
+        who: prefix of error messages.
     """
     if hasattr(c, "joint1_placement"):
         return placed_on(c.joint1_id, c.joint1_placement), placed_on(c.joint2_id, c.joint2_placement)
@@ -196,7 +196,7 @@ def user_rows(c: UserConstraint | UserContact, size: int, who: str, resolver: Re
     Args:
         c: the description.
         size: number of rows.
-        who: words for messages.
+        who: prefix of error messages.
         resolver: resolver of the model.
     """
     model = resolver.model
@@ -229,7 +229,7 @@ def user_rate(
     Args:
         c: the description.
         size: number of rows.
-        who: words for messages.
+        who: prefix of error messages.
         rows: result of `user_rows`.
         residual: checked function of (t, q).
     """

@@ -12,7 +12,7 @@ import pinocchio as pin
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.constraints import Rolling
 from pin_nonideal.description.contacts import Contact, UserContact
-from pin_nonideal.description.contacts.pair_of_shapes import CapsulePairs
+from pin_nonideal.description.contacts.pair_of_shapes import BallContacts, CapsulePairs
 from pin_nonideal.description.contacts.round import BoxContact
 from pin_nonideal.description.contacts.solids import (
     CylinderContact,
@@ -42,7 +42,7 @@ def has_friction(c: object) -> bool:
 
 
 def lower_contact_friction(
-    c: Contact | CapsulePairs | Rolling,
+    c: Contact | BallContacts | CapsulePairs | Rolling,
     name: str,
     out: core.Builder,
     context: LoweringContext,
@@ -50,7 +50,7 @@ def lower_contact_friction(
     """Add the friction elements of a contact: sliding, spinning about the normal, and rolling resistance.
 
     Args:
-        c: description of a contact or of a rolling constraint, or pairs of capsules.
+        c: description of a contact or of a rolling constraint, or a group of contacts.
         name: its unique name.
         out: the program under construction.
         context: names of the scene.
@@ -70,6 +70,11 @@ def lower_contact_friction(
             mu=like.mu,
             static_ratio=like.static_ratio,
         )
+        return
+    if isinstance(c, BallContacts):
+        lower_contact_friction(c.like, name, out, context)
+        frames = context.resolver.other_balls(c, words(c.like, name))
+        out.repeat_contact_friction(c.name, c.number + 1, frames1=frames)
         return
     law = out.add_law(name)
     slip = _user_slip if isinstance(c, UserContact) else _flat_slip if hasattr(c, "plane") else _round_slip

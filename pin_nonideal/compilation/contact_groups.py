@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.contacts import JointLimit
-from pin_nonideal.description.contacts.pair_of_shapes import CapsulePairs, PairOfShapes
+from pin_nonideal.description.contacts.pair_of_shapes import ContactGroup, PairOfShapes
 from pin_nonideal.description.contacts.point_names import ContactOfPoint, split_number
 from pin_nonideal.states.rows import names_by_row
 from pin_nonideal.types import Array
@@ -136,10 +136,10 @@ class Descriptions(Mapping[str, object]):
         return self._described[name if name in self._described else name.rpartition(" ")[0]]
 
     def single(self) -> Iterator[tuple[str, object]]:
-        """Yield names and descriptions, without contacts of `CapsulePairs`."""
+        """Yield names and descriptions, without contacts of a `ContactGroup`."""
         for name in self._names:
             if name in self._described:
-                if not isinstance(self._described[name], CapsulePairs):
+                if not isinstance(self._described[name], ContactGroup):
                     yield name, self._described[name]
             elif name in self._stops:
                 yield name, self[name]

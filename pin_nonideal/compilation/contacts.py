@@ -18,7 +18,7 @@ from pin_nonideal.description.contacts import (
     SphereContact,
     UserContact,
 )
-from pin_nonideal.description.contacts.pair_of_shapes import CapsulePairs
+from pin_nonideal.description.contacts.pair_of_shapes import BallContacts, CapsulePairs, ContactGroup
 from pin_nonideal.description.contacts.point_names import ContactOfPoint
 from pin_nonideal.description.contacts.solids import (
     CylinderContact,
@@ -42,17 +42,17 @@ NO_LIMIT = np.finfo(float).max
 
 
 def lower_contacts(
-    contacts: Sequence[tuple[str, Contact | CapsulePairs]],
+    contacts: Sequence[tuple[str, Contact | BallContacts | CapsulePairs]],
     contact_of: ContactOfPoint,
     out: core.Builder,
     resolver: Resolver,
-) -> Iterator[tuple[str, Contact | CapsulePairs, int]]:
+) -> Iterator[tuple[str, Contact | BallContacts | CapsulePairs, int]]:
     """Add the normal rows of all contacts; `lower_contact_friction` adds their friction after all rows.
 
     Bilateral contacts are added before unilateral contacts. Their rows are in the order of the descriptions.
 
     Args:
-        contacts: unique names and descriptions; `CapsulePairs` have the name of their first contact.
+        contacts: unique names and descriptions; a `ContactGroup` has the name of its first contact.
         contact_of: contact of each point of the pairs of shapes with several points.
         out: the program under construction.
         resolver: frames and joints by name.
@@ -64,7 +64,7 @@ def lower_contacts(
         InputError, UnknownNameError: a frame or joint does not exist, or the description does not fit the
         model.
     """
-    kinds = (*get_args(Contact), CapsulePairs)
+    kinds = (*get_args(Contact), ContactGroup)
     for name, c in contacts:
         if not isinstance(c, kinds):
             known = ", ".join(kind.__name__ for kind in get_args(Contact))
@@ -88,11 +88,13 @@ def lower_contacts(
     )
 
 
-def lower_gaps(c: Contact | CapsulePairs, name: str, out: core.Builder, resolver: Resolver) -> Sequence[int]:
+def lower_gaps(
+    c: Contact | BallContacts | CapsulePairs, name: str, out: core.Builder, resolver: Resolver
+) -> Sequence[int]:
     """Add the normal rows of one contact and return the indices of its blocks.
 
     Args:
-        c: the description, or pairs of capsules.
+        c: the description, or a group of contacts.
         name: its unique name.
         out: the program under construction.
         resolver: frames and joints by name.
@@ -104,6 +106,10 @@ def lower_gaps(c: Contact | CapsulePairs, name: str, out: core.Builder, resolver
         first = out.add_capsule_pairs(
             c.name, c.number, lines1=lines1, lines2=lines2, radius=radius, restitution=like.restitution
         )
+        return range(first, first + len(c))
+    if isinstance(c, BallContacts):
+        (first,) = lower_gaps(c.like, name, out, resolver)
+        out.repeat_contact(c.name, c.number + 1, frames1=resolver.other_balls(c, words(c.like, name)))
         return range(first, first + len(c))
     if isinstance(c, JointLimit):
         return _stops(c, name, out, resolver)

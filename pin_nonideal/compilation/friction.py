@@ -81,7 +81,7 @@ def friction_joint(name: str, who: str, context: LoweringContext, *, freedoms: t
 
     Args:
         name: name of the joint.
-        who: words for messages.
+        who: prefix of error messages.
         context: names that the law may use.
         freedoms: numbers of degrees of freedom that the law supports.
 

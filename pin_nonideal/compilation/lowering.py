@@ -47,7 +47,7 @@ class LoweredScene(NamedTuple):
     """A scene that has been added to the builder.
 
     Attributes:
-        described: constraints and contacts by their unique names, `CapsulePairs` by their first name.
+        described: constraints and contacts by their unique names, a `ContactGroup` by its first name.
         prepare: functions of drives that runs call before their first step, see `BoundDrive`.
     """
 

@@ -11,7 +11,7 @@ import pinocchio as pin
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.constraints import HingeAnchor, Rolling
 from pin_nonideal.description.contacts import PointContact
-from pin_nonideal.description.contacts.pair_of_shapes import CapsulePairs
+from pin_nonideal.description.contacts.pair_of_shapes import BallContacts, CapsulePairs, ContactGroup
 from pin_nonideal.description.contacts.point_names import UsedNames
 from pin_nonideal.description.contacts.round import (
     BoxContact,
@@ -138,7 +138,7 @@ class Resolver:
             axes = axis_triad(key[2])
             self._planes[key] = translated_frame(self.plane(c.plane, who), np.array(axes[2]) * key[1]), axes
         plane, axes = self._planes[key]
-        frame = self._placed(c.frame, getattr(c, "offset", (0.0, 0.0, 0.0)), who)
+        frame = self.placed(c.frame, getattr(c, "offset", (0.0, 0.0, 0.0)), who)
         if frame[0] == plane[0]:
             raise InputError(f"{who}: frame and plane are on the same body, which cannot touch itself")
         return frame, plane, axes
@@ -169,18 +169,22 @@ class Resolver:
             self._segments[key] = along(self.frame(frame, who), np.array(ends), who)
         return self._segments[key]
 
+    def other_balls(self, balls: BallContacts, who: str) -> list[Frame]:
+        """Return the frames at the centers of all spheres but the first."""
+        return [self.placed(balls.like.frame1, offset, who) for offset in balls.offsets[1:]]
+
     def box(self, c: BoxContact, who: str) -> tuple[Frame, Frame, list[float]]:
         """Return frames at the centers of sphere and box, and half edges minus the rounding radius [m]."""
         self._two_bodies(c, who)
         half = [0.5 * edge - c.radius2 for edge in c.size]
-        return self._placed(c.frame1, c.offset, who), self._placed(c.frame2, c.xyz, who, c.rpy), half
+        return self.placed(c.frame1, c.offset, who), self.placed(c.frame2, c.xyz, who, c.rpy), half
 
     def hull(
         self, c: HullContact, who: str
     ) -> tuple[Frame, Frame, tuple[list[float], list[float], list[int]]]:
         """Return the frame at the sphere's center, the frame of the hull, and the hull in the core's form."""
         second = self._two_bodies(c, who)[1]
-        return self._placed(c.frame1, c.offset, who), second, core_hull(c)
+        return self.placed(c.frame1, c.offset, who), second, core_hull(c)
 
     def cylinder(
         self, c: CylinderContact, who: str
@@ -217,7 +221,7 @@ class Resolver:
             other,
         )
 
-    def _placed(self, frame: str, by: Vector3, who: str, rpy: Vector3 = (0.0, 0.0, 0.0)) -> Frame:
+    def placed(self, frame: str, by: Vector3, who: str, rpy: Vector3 = (0.0, 0.0, 0.0)) -> Frame:
         """Return a frame translated in its axes and then rotated; contacts of the same shapes share it."""
         key = frame, by, rpy
         if key not in self._placed_frames:
@@ -272,7 +276,7 @@ def along(frame: Frame, ends: Array, who: str) -> tuple[Frame, float]:
     Args:
         frame: a frame on the same body.
         ends: ends of the segment in the axes of the frame [m], (2, 3).
-        who: words for messages.
+        who: prefix of error messages.
     """
     first, last = ends
     half = 0.5 * float(np.linalg.norm(last - first))
@@ -298,7 +302,7 @@ def unique_names(descriptions: Sequence[object], used_names: UsedNames) -> list[
     """Return a unique name for each description: the user's name, or the kind with its frames or joints.
 
     Args:
-        descriptions: constraints, laws or contacts; `CapsulePairs` get the name of their first contact.
+        descriptions: constraints, laws or contacts; a `ContactGroup` gets the name of its first contact.
         used_names: names in use; extended by this function.
 
     Raises:
@@ -306,7 +310,7 @@ def unique_names(descriptions: Sequence[object], used_names: UsedNames) -> list[
     """
     names = []
     for d in descriptions:
-        if isinstance(d, CapsulePairs):
+        if isinstance(d, ContactGroup):
             if taken := used_names.add_points(d.names):
                 raise InputError(f'names must be unique in a scene; "{taken}" is used twice')
             names.append(d.names[0])

@@ -120,7 +120,7 @@ def named_torques(function: Callable[..., object], model: Model, who: str) -> Ca
     Args:
         function: (t, q, v) -> torques.
         model: pinocchio.Model.
-        who: words for messages.
+        who: prefix of error messages.
     """
 
     def torques(*arguments: object) -> object:

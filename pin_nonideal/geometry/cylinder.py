@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from pin_nonideal.description.contacts.base import similar
-from pin_nonideal.description.contacts.pair_of_shapes import CapsulePairs
+from pin_nonideal.description.contacts.pair_of_shapes import BallContacts, CapsulePairs
 from pin_nonideal.description.contacts.round import CapsuleContact, Segment
 from pin_nonideal.description.contacts.solids import CylinderContact
 from pin_nonideal.errors import InputError
@@ -72,43 +72,47 @@ def rows_of(points: Array) -> tuple[Vector3, ...]:
 
 def sphere_contacts(
     points: Array, radius: float, frame: str, solid: Shape, options: Table
-) -> list[CylinderContact]:
+) -> list[BallContacts]:
     """Return the contacts of spheres, or of rounded corners, with a cylinder or cone."""
-    ends = [(at, None) for at in rows_of(points)]
-    return _alike(ends, radius, frame, solid, options) if ends else []
+    offsets = rows_of(points)
+    if not offsets:
+        return []
+    return [BallContacts(_with_solid((offsets[0], None), radius, frame, solid, options), offsets)]
 
 
 def capsule_contacts(
     lines: Sequence[Segment], radius: float, frame: str, solid: Shape, options: Table
 ) -> list[CylinderContact]:
     """Return the contacts of capsules, or of rounded edges, with a cylinder or cone."""
-    return _alike(lines, radius, frame, solid, options) if lines else []
+    if not lines:
+        return []
+    first = _with_solid(lines[0], radius, frame, solid, options)
+    return [similar(first, offset=one, end=other) for one, other in lines]
 
 
-def _alike(
-    ends: Sequence[tuple[Vector3, Vector3 | None]],
+def _with_solid(
+    ends: tuple[Vector3, Vector3 | None],
     radius: float,
     frame: str,
     solid: Shape,
     options: Table,
-) -> list[CylinderContact]:
-    """Return the contacts of capsules, or of spheres without a second end, with a cylinder or cone."""
+) -> CylinderContact:
+    """Return the contact of a capsule, or of a sphere without a second end, with a cylinder or cone."""
     assert solid.ends is not None
     half, below, above = solid.ends
-    first = CylinderContact(
+    return CylinderContact(
         frame,
         solid.frame,
         2.0 * half,
         below,
         radius,
         above,
-        offset=ends[0][0],
-        end=ends[0][1],
+        offset=ends[0],
+        end=ends[1],
         xyz=tuple(solid.place.translation.tolist()),
         rpy=tuple(pin.rpy.matrixToRpy(solid.place.rotation).tolist()),
         **options,
     )
-    return [similar(first, offset=one, end=other) for one, other in ends]
 
 
 def capsule_pairs(

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 
-from pin_nonideal.description.contacts.pair_of_shapes import CapsulePairs
+from pin_nonideal.description.contacts.pair_of_shapes import ContactGroup
 from pin_nonideal.description.contacts.round import Segment
 from pin_nonideal.description.contacts.solids import CylinderContact, RevolvedContact
 from pin_nonideal.errors import InputError
@@ -44,7 +44,7 @@ MIN_RIM_DISTANCE = 2.0
 
 def cylinder_contacts(
     who: str, first: Shape, second: Shape, rounding: float | None, options: Table
-) -> list[CylinderContact | CapsulePairs | RevolvedContact]:
+) -> list[CylinderContact | ContactGroup | RevolvedContact]:
     """Return the contacts of two cylinders or cones.
 
     Args:
@@ -64,7 +64,7 @@ def cylinder_contacts(
             f"{who}: rounding must be less than {MAX_ROUNDING:g} of the largest ball inside both, of radius "
             f"{ball:g} m; got {inset:g} m"
         )
-    contacts: list[CylinderContact | CapsulePairs | RevolvedContact] = []
+    contacts: list[CylinderContact | ContactGroup | RevolvedContact] = []
     core, other_core = (
         _core(inset_side(solid, inset, SIDE_INSET * inset), inset) for solid in (first, second)
     )

@@ -3,7 +3,7 @@
 A half-space touches a sphere or an ellipsoid at one point, a capsule at its two ends, a box or a convex mesh
 at its corners, and a cylinder or a cone at its rims, faces and tip. Spheres and capsules touch each other at
 one point. Boxes and convex meshes touch spheres, capsules and each other with corners on faces and with edges
-on edges; solids with flat faces have no other contacts. Cylinders and cones touch spheres, and they touch
+on edges. Cylinders and cones touch spheres, and they touch
 capsules, boxes, convex meshes and each other with faces, sides, rims and tips.
 """
 
@@ -18,7 +18,7 @@ from typing import Any
 import pinocchio as pin
 
 from pin_nonideal.atomic_files import file_path
-from pin_nonideal.description.contacts.pair_of_shapes import PairOfShapes
+from pin_nonideal.description.contacts.pair_of_shapes import PairOfShapes, pair_name
 from pin_nonideal.description.joint_friction import static_ratio as ratio_of_static
 from pin_nonideal.errors import InputError, LoadingError, UnknownNameError, nearest, short_repr
 from pin_nonideal.types import GeometryModel, GeometryObject, Model
@@ -206,7 +206,7 @@ def ground_contacts(
     single_links = [link for link in shapes.values() if link and list(shapes.values()).count(link) == 1]
     return [
         GeometryContact(
-            objects[i].name, ground, name=f"{link} on {below}" if link in single_links else None, **rubbing
+            objects[i].name, ground, name=pair_name(link, below) if link in single_links else None, **rubbing
         )
         for i, link in shapes.items()
     ]
@@ -309,7 +309,7 @@ def _manifold(
     if first.frame == second.frame:
         raise InputError(f"{who}: both geometries are on the same body, which cannot touch itself")
     ground, thing = (first, second) if first.normal is not None else (second, first)
-    base = c.name or f"{thing.name} on {ground.name}"
+    base = c.name or pair_name(thing.name, ground.name)
     options = {"mu": c.mu, "static_ratio": c.static_ratio, "restitution": c.restitution}
     parts = manifold(who, first, second, c.rounding, base, options)
     return PairOfShapes(c, base, (first.name, second.name), parts)

@@ -10,9 +10,8 @@ import numpy as np
 import pinocchio as pin
 
 from pin_nonideal.description.contacts import PointContact
-from pin_nonideal.description.contacts.base import similar
 from pin_nonideal.description.contacts.convex_hull import convex_hull, shrunk
-from pin_nonideal.description.contacts.pair_of_shapes import CapsulePairs, numbered
+from pin_nonideal.description.contacts.pair_of_shapes import BallContacts, ContactGroup, numbered
 from pin_nonideal.description.contacts.round import BoxContact, CapsuleContact, Segment
 from pin_nonideal.description.contacts.solids import (
     CylinderContact,
@@ -49,7 +48,7 @@ BOX_EDGES = [(i, j) for i, j in combinations(range(len(CORNERS)), 2) if (CORNERS
 ManifoldContact = (
     PointContact
     | CapsuleContact
-    | CapsulePairs
+    | ContactGroup
     | BoxContact
     | CylinderContact
     | EllipsoidContact
@@ -164,7 +163,7 @@ def _cylinder_manifold(
         for disk in rim_slices(solid, inset):
             contacts += capsule_contacts(lines, radius, other.frame, disk, options)
         return contacts
-    contacts += _solid_contacts(solid, np.array(tips), other, core, 0.0, radius, options)
+    contacts.append(_solid_contacts(solid, np.array(tips), other, core, 0.0, radius, options))
     rpy, points = tuple(pin.rpy.matrixToRpy(solid.place.rotation).tolist()), rows_of(core)
     inner = section(solid, *end_coordinates(solid, inset), 1.0)
     for end, rim in faces(inner):
@@ -191,7 +190,7 @@ def _solid_manifold(
         (solid, cores[1], first, cores[0], r2),
     ):
         if target.solid:
-            contacts += _solid_contacts(ball, points, target, core, radius, r2, options)
+            contacts.append(_solid_contacts(ball, points, target, core, radius, r2, options))
     return contacts + capsule_pairs(first.frame, solid.frame, *lines, r1, r2, options)
 
 
@@ -222,7 +221,7 @@ def _solid_contacts(
     radius: float,
     rounding: float,
     options: Table,
-) -> list[BoxContact | HullContact]:
+) -> BallContacts:
     """Return the contacts of spheres or points of a body with a rounded box or mesh with these corners."""
     offsets = rows_of(points)
     first: BoxContact | HullContact
@@ -235,7 +234,7 @@ def _solid_contacts(
         )
     else:
         first = HullContact(ball.frame, target.frame, rows_of(core), radius, rounding, offsets[0], **options)
-    return [similar(first, offset=offset) for offset in offsets]
+    return BallContacts(first, offsets)
 
 
 def _min_edge(shape: Shape) -> float:

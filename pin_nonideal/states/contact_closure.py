@@ -88,7 +88,7 @@ class UnilateralClosure(Search):
     def _gaps(self, iterate: Iterate) -> tuple[Array, Array]:
         """Return rows and values of the gaps, in coordinates x in which |x| is the distance."""
         G, gap = self.gaps(iterate.q)
-        return np.linalg.solve(iterate.half.T, G.T).T, gap
+        return np.linalg.solve(iterate.dx_dq.T, G.T).T, gap
 
     def _least(self, iterate: Iterate, move: Array) -> LeastDistance | None:
         return solve_ldp(iterate.B, iterate.phi, *self._gaps(iterate), move)

@@ -89,14 +89,14 @@ class Iterate(NamedTuple):
     Attributes:
         q: configuration, (nq,).
         move: displacement from the start, (nv,).
-        half: matrix of x = half dq, (nv, nv).
+        dx_dq: derivative of the scaled displacement x, dx = dx_dq dq, (nv, nv).
         B: scaled rows, (m, nv).
         phi: scaled residuals, (m,).
     """
 
     q: Array
     move: Array
-    half: Array
+    dx_dq: Array
     B: Array
     phi: Array
 
@@ -246,8 +246,8 @@ class Search:
         move = self.root @ self._difference(q)
         turned = pin.dDifference(self.model, self.q0, q, pin.ArgumentPosition.ARG1)
         turned = turned.reshape(self.model.nv, self.model.nv)
-        half = self.root @ (turned if self.free is None else turned[np.ix_(self.free, self.free)])
-        return Iterate(q, move, half, np.linalg.solve(half.T, A.T).T, phi)
+        dx_dq = self.root @ (turned if self.free is None else turned[np.ix_(self.free, self.free)])
+        return Iterate(q, move, dx_dq, np.linalg.solve(dx_dq.T, A.T).T, phi)
 
     @staticmethod
     def _distance(iterate: Iterate) -> float:
@@ -255,7 +255,7 @@ class Search:
 
     def _displace(self, iterate: Iterate, x: Array, part: float = 1.0) -> Array:
         """Return the configuration after a displacement x, which is cut to one unit per coordinate."""
-        dq = np.linalg.solve(iterate.half, x)
+        dq = np.linalg.solve(iterate.dx_dq, x)
         longest = float((np.abs(dq) / self.unit).max(initial=0.0))
         if not np.isfinite(longest):
             raise np.linalg.LinAlgError("a move is not finite")
@@ -378,7 +378,7 @@ class Search:
 
     def _unit_length(self, iterate: Iterate, x: Array) -> float:
         """Return the factor of x at which the first coordinate moves by its unit."""
-        return 1.0 / max(float((np.abs(np.linalg.solve(iterate.half, x)) / self.unit).max()), MIN_NUMBER)
+        return 1.0 / max(float((np.abs(np.linalg.solve(iterate.dx_dq, x)) / self.unit).max()), MIN_NUMBER)
 
     def _downhill(self, iterate: Iterate, x: Array, slope: float) -> Iterate | None:
         """Backtrack along x until the distance falls, or, if it changes by rounding only, the slope falls."""
@@ -409,14 +409,14 @@ class Search:
             x = open_directions[:, k]
             h = DIFFERENCE_STEP * self._unit_length(iterate, x)
             moved_gradient = self._gradient(self._place(self._displace(iterate, h * x)), lam)
-            H[:, k] = open_directions.T @ np.linalg.solve(iterate.half.T, (moved_gradient - gradient) / h)
+            H[:, k] = open_directions.T @ np.linalg.solve(iterate.dx_dq.T, (moved_gradient - gradient) / h)
         values, vectors = np.linalg.eigh(0.5 * (H + H.T))
         return values, open_directions @ vectors
 
     @staticmethod
     def _gradient(iterate: Iterate, lam: Array) -> Array:
         """Return the gradient of |move|^2/2 + lam . phi, in tangent coordinates."""
-        gradient: Array = iterate.half.T @ (iterate.move + iterate.B.T @ lam)
+        gradient: Array = iterate.dx_dq.T @ (iterate.move + iterate.B.T @ lam)
         return gradient
 
 

@@ -147,17 +147,17 @@ class Projection:
         allowed = MAX_PENETRATION * min(1.0, self.length)
         refuse_deep_starts(phi, self.program, allowed, t, self._contact_of)
         on, v_on, before, after, rate = runner.project(q, v, t, self._reached())
-        iterations, nearest, is_closed = 0, True, after <= self._closed
+        iterations, is_nearest, is_closed = 0, True, after <= self._closed
         if not (is_closed and self._is_nearby(q, on) and self._stays_outside(runner, q, on, t)):
-            closure, nearest = self._search(runner, q, t, on if is_closed else None)
+            closure, is_nearest = self._search(runner, q, t, on if is_closed else None)
             iterations = closure.iterations
             on, v_on, after, rate = self._polished(runner, closure.q, v, t)
             is_closed = after <= self._closed or closure.gap <= CLOSURE_TOLERANCE
-            self._require_met(runner, q, closure.q, is_closed, nearest, t)
+            self._require_met(runner, q, closure.q, is_closed, is_nearest, t)
         if held.q is not None and held.q.any():
             on, search = self._hold(runner, q, on, held.q, held.firm_q, t)
             if search is not None:
-                iterations, nearest = iterations + search[0], search[1]
+                iterations, is_nearest = iterations + search[0], search[1]
             _, v_on, _, _, rate = runner.project(on, v, t, np.inf)
         if not np.isfinite(v_on).all():
             raise NonFiniteError("v: the velocity on the constraints overflows; give a slower one")
@@ -180,7 +180,7 @@ class Projection:
         return (
             on,
             v_on,
-            report_of(self.model, self.unit, mass, (q, v), (on, v_on), held, before, iterations, nearest),
+            report_of(self.model, self.unit, mass, (q, v), (on, v_on), held, before, iterations, is_nearest),
         )
 
     def _hold(

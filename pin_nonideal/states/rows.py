@@ -165,17 +165,15 @@ SAME_ROW = 1e-11
 SUM_ROUNDING = 1e-9
 
 
-def duplicate_rows(
-    wide: Array, candidates: NDArray[np.bool_], direction: int
-) -> list[tuple[int, int, float]]:
+def duplicate_rows(wide: Array, candidates: NDArray[np.bool_], width: int) -> list[tuple[int, int, float]]:
     """Return the rows that are multiples of earlier rows, as (row, first, factor): row = factor first.
 
     Args:
         wide: rows at several states side by side, followed by right-hand sides or residuals, (m, n).
         candidates: mask of rows to compare, (m,).
-        direction: number of leading columns that define the length of a row.
+        width: number of leading columns that hold the rows; the other columns do not count for the length.
     """
-    length = np.linalg.norm(wide[:, :direction], axis=1)
+    length = np.linalg.norm(wide[:, :width], axis=1)
     rows = np.flatnonzero(candidates & (length > 0.0))
     unit = wide[rows] / length[rows, None]
     probe = unit @ np.random.default_rng(2).standard_normal(unit.shape[1])

@@ -45,7 +45,7 @@ class ClosedReference:
         v: velocities, (nt, nv), or None.
         stated: mask of the stated coordinates, (nv,).
         driven: mask of the driven degrees of freedom, (nv,).
-        who: words for messages.
+        who: prefix of error messages.
         rounding: rounding of times at the ends, see `ReferenceMotion`.
 
     Raises:
@@ -231,7 +231,7 @@ def without_drives(model: Model, q0: Array, spec: SceneSpec, who: str) -> Compil
         model: pinocchio.Model.
         q0: initial configuration, (nq,).
         spec: descriptions of the other scene.
-        who: words for messages.
+        who: prefix of error messages.
 
     Raises:
         InputError: a constraint holds no position.

@@ -129,12 +129,12 @@ class _Joint:
 
     def holding(self) -> HoldingTorque:
         low, high = self.band()
-        ways = (self.slow(sign) for sign in (-1.0, 1.0))
+        ways = (self.slow_torque(sign) for sign in (-1.0, 1.0))
         return HoldingTorque(low, high, *ways)
 
     # --- Band -----------------------------------------------------------------------------------------------
 
-    def ends(self, x: float) -> _Ends:
+    def band_at(self, x: float) -> _Ends:
         """Return the ends of the band under the friction limits at one torque, and these limits."""
         if x not in self.known:
             torque = self.tau.copy()
@@ -151,21 +151,21 @@ class _Joint:
     def band(self) -> tuple[float, float]:
         """Return the smallest and the largest torque that holds, or NaN."""
         try:
-            inside = self.inside()
+            inside = self.holding_torque()
             if inside is None:
                 return math.nan, math.nan
-            return self.end(inside, 0), self.end(inside, 1)
+            return self.consistent_end(inside, 0), self.consistent_end(inside, 1)
         except core.CoreFailure:
             return math.nan, math.nan
 
-    def inside(self) -> float | None:
+    def holding_torque(self) -> float | None:
         """Return a torque that holds, or None. Friction limits may depend on the torque."""
         own = float(self.tau[self.dof])
-        self.ends(own)  # sets the scale
+        self.band_at(own)  # sets the scale
         for start in (own, 0.0, self.scale, -self.scale):
             x = start
             for _ in range(MAX_PASSES):
-                low, high, _ = self.ends(x)
+                low, high, _ = self.band_at(x)
                 if low <= x <= high:
                     return x
                 if math.isnan(low):
@@ -174,37 +174,37 @@ class _Joint:
                 x = 0.5 * (low + high) if both else min(max(x, low), high)
         return None
 
-    def end(self, inside: float, side: int) -> float:
+    def consistent_end(self, inside: float, side: int) -> float:
         """Return an end x of the band that equals the end under the friction limits at x."""
         sign = (-1.0, 1.0)[side]
         within = inside
         for k in range(MAX_PASSES):
-            x, limits = self.ends(within).at(side), self.ends(within).limits
+            x, limits = self.band_at(within).at(side), self.band_at(within).limits
             if not math.isfinite(x) or abs(x - within) <= BAND_TOL * (self.scale + abs(x)):
                 return x
             if self.same_limits(x, limits):
                 return x
-            there = self.ends(x).at(side)
+            there = self.band_at(x).at(side)
             if not sign * (there - x) >= 0.0:
-                return self.between(within, x)
+                return self.bisect_end(within, x)
             within = x
             if k == 0:
                 far = inside + sign * UNBOUNDED_TORQUE * self.scale
-                if sign * (self.ends(far).at(side) - far) >= 0.0:
+                if sign * (self.band_at(far).at(side) - far) >= 0.0:
                     return sign * math.inf
-        return self.between(within, inside + sign * UNBOUNDED_TORQUE * self.scale)
+        return self.bisect_end(within, inside + sign * UNBOUNDED_TORQUE * self.scale)
 
     def same_limits(self, x: float, limits: Array) -> bool:
         """Check if the friction limits at a torque are the given ones."""
         return bool(
-            np.allclose(self.ends(x).limits, limits, rtol=BAND_TOL, atol=BAND_TOL * (self.scale + abs(x)))
+            np.allclose(self.band_at(x).limits, limits, rtol=BAND_TOL, atol=BAND_TOL * (self.scale + abs(x)))
         )
 
-    def between(self, within: float, outside: float) -> float:
+    def bisect_end(self, within: float, outside: float) -> float:
         """Return the end of the band between a torque that holds and one that does not, by bisection."""
         for _ in range(2 * MAX_PASSES):
             middle = 0.5 * (within + outside)
-            low, high, _ = self.ends(middle)
+            low, high, _ = self.band_at(middle)
             if low <= middle <= high:
                 within = middle
             else:
@@ -215,9 +215,9 @@ class _Joint:
 
     # --- Slow motion ----------------------------------------------------------------------------------------
 
-    def slow(self, sign: float) -> float:
+    def slow_torque(self, sign: float) -> float:
         """Return the torque at which slow motion in one direction needs no other force."""
-        direction = self.way(sign)
+        direction = self.slow_direction(sign)
         if direction is None:
             return math.nan
         way, opens = direction
@@ -240,27 +240,27 @@ class _Joint:
         except core.CoreFailure:
             return math.nan
 
-    def way(self, sign: float) -> tuple[Array, bool] | None:
+    def slow_direction(self, sign: float) -> tuple[Array, bool] | None:
         """Return the motion of least norm with unit rate of the joint, and whether it opens a contact.
 
         Contacts stay closed if the joint can move with closed contacts. The result is None if the constraints
         admit no motion.
         """
-        way = self._way(sign)
+        way = self._least_motion(sign)
         if way is not None or not self.rest.gaps.any():
             return None if way is None else (way, False)
         closed, before = self.rest.gaps & ~self.rest.open, self.rest.open
         rows = self.rest.rows(self.q)[closed]
         self.rest.open = self.rest.gaps
         try:
-            way = self._way(sign)
+            way = self._least_motion(sign)
         finally:
             self.rest.open = before
         if way is None or (rows @ way < -MIN_SINGULAR_VALUE).any():
             return None
         return way, True
 
-    def _way(self, sign: float) -> Array | None:
+    def _least_motion(self, sign: float) -> Array | None:
         free = self.rest.free(self.q)
         own = free[self.dof]
         part = float(own @ own)

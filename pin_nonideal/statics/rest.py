@@ -169,7 +169,7 @@ def _unheld(at_rest: AtRest, q: Array, cones: LimitCones) -> str:
 
 
 def _joint_of(model: Model, dof: int) -> str:
-    """Return the name of the joint with a degree of freedom."""
+    """Return the name of the joint to which a degree of freedom belongs."""
     joints = range(1, model.njoints)
     return next(str(model.names[j]) for j in joints if 0 <= dof - int(model.idx_vs[j]) < int(model.nvs[j]))
 

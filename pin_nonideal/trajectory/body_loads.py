@@ -29,7 +29,7 @@ class Load(NamedTuple):
     """Wrench on a body.
 
     Attributes:
-        who: words for messages.
+        who: prefix of error messages.
         joint: index of the joint that moves the body.
         frame: name of the frame or joint that the load is attached to, or None if it has no name.
         at: the wrench at a sample.

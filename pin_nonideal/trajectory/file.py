@@ -23,11 +23,12 @@ from pin_nonideal.states.joint_layout import JointPlace
 from pin_nonideal.types import Table
 
 from .dense_output import DenseOutput
+from .energy_ledger import LEDGER
 from .fields import RunFields
 from .missing_array import REASONS
 from .npz import npz_bytes
 from .point_samples import PointSamples
-from .records import LEDGER, Event, Stats, UserEventRecord
+from .records import Event, Stats, UserEventRecord
 
 FORMAT = 1
 # Files up to this size [bytes] are compressed, in less than a tenth of a second. Compression of

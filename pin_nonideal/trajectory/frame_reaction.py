@@ -235,7 +235,7 @@ def _child_beyond(model: Model, child: int, index: int, who: str) -> bool:
 
 
 def _load_beyond(scene: Scene, load: Load, index: int, who: str) -> bool:
-    """Check if a load on the body of a frame acts beyond it.
+    """Check if a load on the body of a frame acts on the part of this body on the child side of the frame.
 
     Raises:
         InputError: the scene does not determine the side.

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from pin_nonideal.compilation.compiled_scene import CompiledScene
-from pin_nonideal.compilation.contact_groups import Groups
 from pin_nonideal.compilation.error_context import joint_of
 from pin_nonideal.core_loader import core
 from pin_nonideal.types import Array, Table
 
+from .energy_ledger import energy_ledger, power_columns
 from .pair_events import ContactStates, contact_events
 from .point_samples import recorded_points
-from .records import LEDGER, Event, Stats
+from .records import Event, Stats
 from .resultants import contact_forces, reactions
 
 
@@ -76,10 +76,10 @@ def outcome_fields(compiled: CompiledScene, outcome: core.Outcome, options: Any)
     works = compiled.works
     if options.power:
         power = works.sum(outcome.power.reshape(nt, works.count))
-        fields["power"] = dict(zip(_columns(compiled), power.T, strict=True))
+        fields["power"] = dict(zip(power_columns(compiled), power.T, strict=True))
     if options.energy:
         jumps = ["impacts"] if compiled.has_openings else []
-        fields["energy"] = _ledger(works, [*_columns(compiled), *jumps], outcome.energy)
+        fields["energy"] = energy_ledger(works, [*power_columns(compiled), *jumps], outcome.energy)
     if compiled.contacts.names:
         closed = outcome.closed.reshape(nt, compiled.contacts.count).astype(bool)
         fields["closed"] = compiled.contacts.any(closed)
@@ -175,26 +175,3 @@ def _event(compiled: CompiledScene, event: core.Event, functions: Sequence[str])
         return Event(event.time, event.kind.name, name, miss=event.miss)
     change = event.energy_change
     return Event(event.time, event.kind.name, name, event.impulse, change, event.v_minus, event.v_plus)
-
-
-def _ledger(works: Groups, columns: Sequence[str], energy: Array) -> dict[str, Array]:
-    """Return the stored energies, the work since the start, and their sums, from the core's columns."""
-    stored, names = ("kinetic", "potential"), (*columns, "projection")
-    split = len(stored)
-    more = len(names) - len(works.names)
-    numbers, last = energy.reshape(-1, split + works.count + more), split + works.count
-    if not works.single:
-        numbers = np.hstack([numbers[:, :split], works.sum(numbers[:, split:last]), numbers[:, last:]])
-    ledger = dict(zip(stored, numbers.T[:split], strict=True))
-    ledger["total"] = ledger["kinetic"] + ledger["potential"]
-    ledger |= dict(zip(names, numbers.T[split:], strict=True))
-    ledger["balance"] = ledger["total"] - ledger["total"][:1] - numbers[:, split:].sum(axis=1)
-    return ledger
-
-
-def _columns(compiled: CompiledScene) -> list[str]:
-    """Return the names of the power columns; laws are renamed if another ledger column has their name."""
-    names = compiled.works.names
-    first_law = len(names) - len(compiled.laws.names)
-    used_names = {*LEDGER, *names[:first_law], "projection"}
-    return names[:first_law] + [f"law {name}" if name in used_names else name for name in names[first_law:]]

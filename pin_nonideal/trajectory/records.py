@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from pin_nonideal.types import Array, Placement
 
-LEDGER = ("kinetic", "potential", "total", "balance")  # columns of every energy ledger
-
 
 @dataclass(frozen=True, eq=False)
 class Event:

@@ -201,8 +201,8 @@ int main() {
         check("box slip", pn::BoxSlipRows{{}, f, f, pn::Box({half, 0.4, 0.1}), 0.1}, 0, 0);
     }
     for (const double least : {0.0, 0.05, 0.3}) {
-        check("ellipsoid", pn::PlaneEllipsoidRow{{}, f, f, z, {0.3, 0.4, least}}, 0, 1);
-        check("ellipsoid slip", pn::PlaneEllipsoidSlipRows{{}, f, f, {0.3, 0.4, least}, x, y, z}, 0, 0);
+        check("ellipsoid", pn::PlaneRimOrEllipsoidRow{{}, f, f, z, {0.3, 0.4, least}}, 0, 1);
+        check("ellipsoid slip", pn::PlaneRimOrEllipsoidSlipRows{{}, f, f, {0.3, 0.4, least}, x, y, z}, 0, 0);
     }
     // A corner with its three faces, and the face across it.
     const double third = 1.0 / std::sqrt(3.0);

@@ -140,8 +140,9 @@ void BoxProgram::descend(const MatX& W, const VecX& alpha0, const VecX& s) {
     }
 }
 
-// Sweeps over the elements: each takes the best force within its limits for the forces of the others. If block pivoting
-// makes no progress, the elements that are at their limits after a few sweeps are a better start for it.
+// Projected Gauss-Seidel sweeps: each element in turn takes the force within its limits that is nearest to zero slip
+// acceleration, with the forces of the others fixed. If block pivoting makes no progress, the elements that are at their
+// limits after a few sweeps are a better start for it.
 void BoxProgram::relax(const MatX& W, const VecX& alpha0, const VecX& s) {
     const int n = static_cast<int>(s.size());
     f_ = f_.cwiseMin(s).cwiseMax(-s);

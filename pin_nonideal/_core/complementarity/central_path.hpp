@@ -1,5 +1,5 @@
 // Central path of an element's laws: its force z and its velocity u with de Saxce's correction, as points of second-order
-// cones with z o u = target, in Nesterov and Todd's scaling. Predictor and corrector are Mehrotra's.
+// cones with z o u = target, in Nesterov and Todd's scaling. Steps along the path are Mehrotra's predictor-corrector steps.
 #pragma once
 
 #include "complementarity/cone/problem.hpp"

@@ -170,9 +170,9 @@ struct ConeProgram {
         return last < socp_parameters.condition_slack;
     }
 
-    // Find the modes from the end of the path. An element slips if its acceleration exceeds the distance of its force
-    // to the limit. If both are small, the solution decides: modes that contradict the solution are changed until all
-    // modes agree. Return false if the modes do not settle.
+    // Find the modes from the end of the central path. First guess: an element slips if its scaled acceleration y_e.head
+    // exceeds 1 - |x_e|, the scaled distance of its force to the limit. Then solve the equations of these modes and switch
+    // elements that contradict their modes, until none does. Return false if the modes do not settle.
     bool find_modes() {
         std::vector<char> slides(elements);
         for (int e = 0; e < elements; ++e) slides[e] = y[e].head > 1.0 - tail(x, e).norm();

@@ -2,7 +2,7 @@
 // distinguish.
 #pragma once
 
-#include "constraints/system.hpp"
+#include "constraints/row_system.hpp"
 
 namespace pn {
 

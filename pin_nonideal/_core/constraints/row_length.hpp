@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "constraints/system.hpp"
+#include "constraints/row_system.hpp"
 
 namespace pn {
 

@@ -147,7 +147,7 @@ static constexpr size_t index_of(const std::variant<K...>*) {
 // Three wide functions evaluate the first kinds. The last kinds are gaps between shapes, which search for nearest points.
 // Each other kind has separate functions, compiled once: wide functions for all kinds take 20 s more to compile (GCC 12) and
 // run no faster.
-constexpr size_t shapes = index_of<PlaneEllipsoidRow>(static_cast<const Kind*>(nullptr));
+constexpr size_t shapes = index_of<PlaneRimOrEllipsoidRow>(static_cast<const Kind*>(nullptr));
 static PN_WIDE void residual(const Kind& kind, const State& s, RowValues& out) {
     evaluate_until<Part::residual, shapes>(kind, s, out);
 }

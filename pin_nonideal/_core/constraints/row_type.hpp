@@ -2,7 +2,8 @@
 //
 // A kind is one struct in one header. constraints/row_completeness.hpp lists its members. Most kinds act between two
 // bodies. A row is then the power of a unit wrench w on the motion of body 1 relative to body 2. So A_j = w . J_j, and
-// the multiplier is the size of the wrench. The other kinds act on dofs directly and write A.
+// the multiplier is the size of the wrench. The other kinds act on dofs directly and write A. constraints/block.hpp fills
+// A with the rows of a block.
 #pragma once
 
 #include <utility>
@@ -44,7 +45,7 @@ namespace pn {
 using Kind = std::variant<PointRows, PlanePointRow, CapsuleCapsuleRow, BoxRow, FrameRows, HingeRows, DistanceRows,
                           KnifeEdgeRows, RollingRows, CouplingRows, MotionRows, LimitRow, UserRows, UserGapRow,
                           DofSlipRows, HingeSlipRows, SpinSlipRows, PlanePointSlipRows, CapsuleCapsuleSlipRows,
-                          BoxSlipRows, CouplingSlipRow, UserSlipRows, PlaneEllipsoidRow, PlaneEllipsoidSlipRows,
+                          BoxSlipRows, CouplingSlipRow, UserSlipRows, PlaneRimOrEllipsoidRow, PlaneRimOrEllipsoidSlipRows,
                           HullRow, HullSlipRows, RevolvedRow, RevolvedSlipRows, CapsuleCylinderRow,
                           CapsuleCylinderSlipRows, DiskHullRow, DiskHullSlipRows, CylinderCylinderRow,
                           CylinderCylinderSlipRows>;

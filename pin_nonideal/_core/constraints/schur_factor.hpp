@@ -1,7 +1,7 @@
 // Delassus matrix B B^T of the rows in use, its factor, and the multipliers that solve with it.
 #pragma once
 
-#include "constraints/system.hpp"
+#include "constraints/row_system.hpp"
 
 namespace pn {
 

@@ -1,5 +1,6 @@
 // Active set of contacts: closed contacts have compressive loads, and open contacts separate. All resting contacts are
-// closed if their loads can be compressive. Among several valid active sets the largest is selected.
+// closed if a motion exists in which all of them have compressive loads. Among several valid active sets the largest is
+// selected.
 #pragma once
 
 #include <functional>

@@ -45,8 +45,9 @@ bool rests_at_once(const Program& p, Workspace& w, const VecX& v, const OnsetQue
 }
 
 // Call act(problem) with the contacts of `query.rest` and the other elements at rest as a cone problem, or
-// rest(elements) if they rest at once. The workspace is unchanged afterwards. Return false if the elements form no cone
-// problem, or if other rows admit no motion.
+// rest(elements) if they rest at once. The workspace is unchanged afterwards. Return false if no contact rests, if an
+// element has a law without a cone or slips in several directions, or if the constraints admit no motion without these
+// contacts.
 template <class Rest, class Act>
 bool with_problem(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, const OnsetQuery& query,
                   const Rest& rest, const Act& act) {

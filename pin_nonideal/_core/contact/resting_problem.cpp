@@ -206,8 +206,8 @@ bool RestingProblem::solve_cones(bool warm, bool& shared) {
     return true;
 }
 
-// Distribute loads as if friction was given, and iterate with the friction that they cause. Return false without
-// convergence.
+// Alternate between the friction of sliding contacts under the current loads and the contact forces under this friction.
+// Return false without convergence.
 bool RestingProblem::alternate(const VecX& free) {
     bool shared = false;
     for (int turn = 0; turn < parameters.max_load_iterations; ++turn) {

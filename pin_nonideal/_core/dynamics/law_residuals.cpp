@@ -164,10 +164,10 @@ struct Laws {
         const double speed = u.norm();
         // Only an element at rest can share its load.
         if (!(size > 0.0) || (speed <= rest && !forces.is_determined[e])) return;
-        SlipLimits at_rest = forces.limits[e];
+        SlipLimits base = forces.limits[e];
         if (element.gap >= 0 && element.load == Friction::Load::multiplier)
-            at_rest = element.constant + element.mu * p.described.share(element.row, forces.shared_lam);
-        const SlipLimits kinetic = at_rest * element.speed_factor(speed);
+            base = element.constant + element.mu * p.described.share(element.row, forces.shared_lam);
+        const SlipLimits kinetic = base * element.speed_factor(speed);
         if (speed > rest) {
             out.coulomb.include(excess(element, kinetic, f) * size, e);
             out.dissipation.include(missing_force(element, kinetic, f, u) * size, e);
@@ -176,7 +176,9 @@ struct Laws {
         const Vec3 onset = slip_acceleration_of(element);
         const double begins = onset.norm() / (size * scale * scale);
         const bool moves = begins > law_residual_parameters.tolerance;
-        out.coulomb.include(excess(element, moves ? kinetic : at_rest * element.static_ratio, f) * size, e);
+        out.coulomb.include(excess(element, moves ? kinetic : base * element.static_ratio, f) * size, e);
+        // At rest the force opposes the onset of slip. Below the error of slip accelerations an element at its limit may
+        // begin to slip any way, and at the end of a step friction may still oppose the slip before.
         double residual = std::abs(missing_power(element, kinetic, f, onset)) / scale / scale;
         if (begins <= law_residual_parameters.onset_acceleration)
             residual = std::min(residual, std::abs(excess(element, kinetic, f)) * size);

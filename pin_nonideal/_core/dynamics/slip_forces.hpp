@@ -18,7 +18,7 @@ public:
     }
     size_t size() const { return force_.size(); }
     const Vec3& operator[](int element) const { return force_[element]; }
-    // Return the force of an element, to change it.
+    // Return the force of an element for writing, and list the element.
     Vec3& change(int element) {
         if (!is_listed_[element]) listed_.push_back(element);
         is_listed_[element] = 1;

@@ -138,7 +138,7 @@ struct UserLaw {
     void act(const LawState& s, Sink& sink) const { sink.on_all(s.user_force[index]); }
 };
 
-// Forces are summed by kind, in this order.
+// The forces of all laws of one kind are added before those of the next kind, in this order.
 using Law = std::variant<Viscous, Sigmoid, LuGre, Drag, UserLaw>;
 
 // Check if a law has a member `state`, the index of its first state.

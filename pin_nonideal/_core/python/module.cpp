@@ -10,10 +10,10 @@
 #include "python/batch.hpp"
 #include "python/builder.hpp"
 #include "python/callbacks.hpp"
-#include "python/capsule_pairs.hpp"
 #include "python/cones.hpp"
 #include "python/constraints.hpp"
 #include "python/contact_geometry.hpp"
+#include "python/contact_groups.hpp"
 #include "python/failures.hpp"
 #include "python/external_run.hpp"
 #include "python/program.hpp"
@@ -32,7 +32,7 @@ NB_MODULE(_core, m) {
     bind_reactions(m);
     nb::class_<Builder> builder = bind_builder(m);
     bind_constraints(m, builder);
-    bind_capsule_pairs(builder);
+    bind_contact_groups(builder);
     nb::class_<Runner> runner = bind_runner(m);
     bind_runs(m, runner);
     bind_batch(m);

@@ -9,7 +9,7 @@
 #include "dynamics/projection.hpp"
 #include "dynamics/step_start.hpp"
 #include "math/tolerances.hpp"
-#include "run/events/events.hpp"
+#include "run/events/mode_selection.hpp"
 
 namespace pn {
 
@@ -121,7 +121,7 @@ Simulation::Proposal Simulation::propose() {
     if (breaks.reached()) pass_break();
     torques.sample();
     const bool adaptive = options.method.adaptive();
-    const std::optional<double> before_hand_over = to_hand_over();
+    const std::optional<double> before_hand_over = pass_hand_overs();
     if (p.searches_breaks) breaks.find_in_step(std::min(t_end, progress.t + (adaptive ? progress.h : options.dt)), adaptive);
     double stop = torques.next_stop(progress.t, t_end);
     if (!adaptive)  // stay on the fixed grid, also after an event inside a step
@@ -151,9 +151,9 @@ Simulation::Proposal Simulation::propose() {
     return {size, stop, last};
 }
 
-// Steps without error control are searched always. Other steps are searched after a rejection, as a hand-over causes one.
-// Contacts of bodies without a load open at once: near a hand-over their rows can turn singular.
-std::optional<double> Simulation::to_hand_over() {
+// Steps without error control are searched always, other steps after a rejection,
+// as a hand-over causes one. Contacts of bodies without a load open at once: near a hand-over their rows can turn singular.
+std::optional<double> Simulation::pass_hand_overs() {
     const bool adaptive = options.method.adaptive();
     hand_over_ahead = false;
     if (system.ng == 0 || (adaptive && !progress.may_hand_over)) return std::nullopt;
@@ -171,7 +171,7 @@ std::optional<double> Simulation::to_hand_over() {
             hand_over_ahead = true;
             return HandOver::step_before(next->time);
         }
-        modes.change({FoundEvent::Kind::lift, -1, progress.t, false, true});
+        modes.change(FoundEvent::hand_over(progress.t));
         output.now();
     }
 }
@@ -275,7 +275,7 @@ void Simulation::find_event() {
         event = FoundEvent{FoundEvent::Kind::user, value_events.found().front(), stepper.t0 + stepper.h};
     // A motion that violates a law ends here, and modes are selected anew.
     if (system.has_events() && !(event && event->changes_modes()) && !satisfies_laws())
-        event = FoundEvent{FoundEvent::Kind::lift, -1, stepper.t0 + stepper.h};
+        event = FoundEvent::joint_lift(stepper.t0 + stepper.h);
 }
 
 // Check the laws of the motion at the step's end.

@@ -68,7 +68,7 @@ protected:
 
     void pass_break();
     // Return the length of a step up to the next hand-over of a closed contact, after passing the hand-overs at this time.
-    std::optional<double> to_hand_over();
+    std::optional<double> pass_hand_overs();
     void find_event();
     bool satisfies_laws();
     bool recover(const Failure& failure);

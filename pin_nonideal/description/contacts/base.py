@@ -49,7 +49,7 @@ def check_two_frames(c: Any, who: str) -> None:
 
     Args:
         c: the description.
-        who: words for messages.
+        who: prefix of error messages.
 
     Raises:
         InputError: the names are equal.
@@ -65,7 +65,7 @@ def check_vectors(c: object, who: str, *keys: str) -> None:
 
     Args:
         c: the description.
-        who: words for messages.
+        who: prefix of error messages.
         keys: names of the fields.
     """
     for key in keys:

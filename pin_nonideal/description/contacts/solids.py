@@ -281,7 +281,7 @@ def hull_points(corners: object, who: str) -> tuple[Vector3, ...]:
 
     Args:
         corners: points, (n, 3).
-        who: words for messages.
+        who: prefix of error messages.
 
     Raises:
         InputError: the points are invalid or span no solid.

@@ -58,7 +58,7 @@ class Motion:
         """Return the generalized force of forces and moments in world axes at placements on joints, (nv,).
 
         Args:
-            q: configuration of the last update.
+            q: configuration of the last call of `update`.
             forces: joint, placement on the joint, force and moment.
         """
         on = [pin.Force.Zero() for _ in range(self.model.njoints)]

@@ -2,6 +2,15 @@
 
 The keys are a superset of the keys in community repositories of closed-loop robots. The file contains data
 only; no content is executed.
+
+This module checks the keys and reads closed_loop and type. Other modules read the values of other keys:
+
+| keys | module |
+| --- | --- |
+| model | `loading/robot_files.py`, and `loading/edit/tree.py` for base and locked |
+| constraints, laws, contacts, forces, impact, gravity | `assembly.py` |
+| actuation | `actuation.py` |
+| initial | `initial_state.py` |
 """
 
 from __future__ import annotations

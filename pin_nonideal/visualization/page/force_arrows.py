@@ -288,7 +288,7 @@ def _at_joints(model: pin.Model, motion: Motion, kind: str, force: Array) -> lis
 
 
 def _particle_joints(model: pin.Model, joint: int) -> list[int]:
-    """Return a joint and the joints before it that move the same particle."""
+    """Return a joint and the prismatic joints before it that only massless links separate from it."""
     chain = [joint]
     while _slides(model, joint):
         joint = int(model.parents[joint])

@@ -1,4 +1,7 @@
-"""Friction elements at their positions: modes, friction over its limit, and cones of contacts."""
+"""Friction elements at their positions: rings with mode and used part of the limit, and cones of contacts.
+
+The arrows of contact forces, friction included, are in `force_arrows.py`.
+"""
 
 from __future__ import annotations
 

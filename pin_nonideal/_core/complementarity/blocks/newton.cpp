@@ -318,6 +318,48 @@ double BlockNewton::solve_without_compliance(const BlockProblem& p, const Island
     return error;
 }
 
+namespace {
+
+// Weight of the proximal term through the steps of one search.
+class ProximalWeight {
+public:
+    // A factor of the equations exists for the weight `factored`, if that is positive.
+    ProximalWeight(double weight, double factored) : weight_(weight), factored_(factored) {}
+
+    static double of_error(double error) { return std::clamp(error, limits.min_proximal, limits.max_proximal); }
+    void set(double weight) { weight_ = weight; }
+    // Return the weight for which the next step has its factor, the present one if the weight has changed little.
+    // `is_new`: whether this weight differs from that of the present factor.
+    double choose_factored(bool& is_new) {
+        is_new = !(weight_ >= limits.min_kept_ratio * factored_ && weight_ <= limits.max_kept_ratio * factored_);
+        if (is_new) factored_ = weight_;
+        return factored_;
+    }
+    bool may_grow() const {
+        return refusals_ < limits.max_refusals && weight_ < limits.min_kept_ratio * limits.max_proximal;
+    }
+    // Grow after a refused step; after a refused first step the weight is that of the error.
+    void grow(bool is_first, double error) {
+        weight_ = is_first ? of_error(error) : std::min(limits.max_proximal, limits.proximal_growth * weight_);
+        ++refusals_;
+        factored_ = 0.0;
+    }
+    void forget_refusals() { refusals_ = 0; }
+    // Shrink after a full step from the squared error `before` to `merit`.
+    void shrink(double merit, double before, double error) {
+        const double reduction = merit < limits.good_decrease * before ? limits.good_reduction : limits.reduction;
+        weight_ = std::max({limits.min_proximal, weight_ * reduction,
+                            std::min(limits.error_part * error, limits.max_proximal)});
+    }
+
+private:
+    static constexpr const BlockNewtonParameters& limits = BlockNewton::parameters;
+    double weight_, factored_;
+    int refusals_ = 0;
+};
+
+}  // namespace
+
 double BlockNewton::solve(const BlockProblem& p, const Island& island, BlockFactor& factor, Search search,
                           double compliance, VecX& f, VecX& x, VecX& w) {
     compliance_ = compliance;
@@ -335,18 +377,16 @@ double BlockNewton::solve(const BlockProblem& p, const Island& island, BlockFact
         for (int i : island.elements) piece_[i] = Piece::unknown;
     }
     each_row([&](int r) { f_best_[r] = f[r]; });
-    const auto cautious = [&] { return std::clamp(error, parameters.min_proximal, parameters.max_proximal); };
-    double weight = keeps_factor_ ? yielding_ : bold ? parameters.min_proximal : cautious();
-    double factored = keeps_factor_ ? weight : 0.0, recent[4] = {merit, merit, merit, merit};
-    int refusals = 0, unguarded = 0, stagnant_steps = 0;
+    ProximalWeight weight(keeps_factor_ ? yielding_ : bold ? parameters.min_proximal : ProximalWeight::of_error(error),
+                          keeps_factor_ ? yielding_ : 0.0);
+    double recent[4] = {merit, merit, merit, merit};
+    int unguarded = 0, stagnant_steps = 0;
     for (int step = 0; step < parameters.max_steps && error > parameters.tolerance; ++step, ++steps_) {
-        if (!bold) weight = cautious();
-        const bool anew =
-            !(weight >= parameters.min_kept_ratio * factored && weight <= parameters.max_kept_ratio * factored);
-        bool symmetric = true;
-        if (anew) factored = weight;
+        if (!bold) weight.set(ProximalWeight::of_error(error));
+        bool is_new, symmetric = true;
+        const double factored = weight.choose_factored(is_new);
         keeps_factor_ = keeps_factor_ && !has_changed_piece(island);
-        if (!keeps_factor_ && linearize(p, island, factored, anew, symmetric)) {
+        if (!keeps_factor_ && linearize(p, island, factored, is_new, symmetric)) {
             ++factors_;
             yielding_ = factored + compliance_;
             if (!factor.factor(p, island, G_, symmetric)) break;
@@ -356,13 +396,11 @@ double BlockNewton::solve(const BlockProblem& p, const Island& island, BlockFact
         double length;
         const double before = error, merit_before = merit;
         const double bound = bold ? merit : std::max({recent[0], recent[1], recent[2], recent[3]});
-        const bool accepted = shorten(p, island, f, w, bound, bold ? 2 : 6, length, error, merit);
-        if (!accepted && bold && refusals < parameters.max_refusals &&
-            weight < parameters.min_kept_ratio * parameters.max_proximal) {
+        const int halvings = bold ? parameters.max_halvings : parameters.max_patient_halvings;
+        const bool accepted = shorten(p, island, f, w, bound, halvings, length, error, merit);
+        if (!accepted && bold && weight.may_grow()) {
             error = evaluate(p, island, f, w, merit);
-            weight = step == 0 ? cautious() : std::min(parameters.max_proximal, parameters.proximal_growth * weight);
-            ++refusals;
-            factored = 0.0;
+            weight.grow(step == 0, error);
             continue;
         }
         if (!accepted) {
@@ -370,18 +408,16 @@ double BlockNewton::solve(const BlockProblem& p, const Island& island, BlockFact
                 error = before;
                 break;
             }
-            refusals = 0;
+            weight.forget_refusals();
         }
         take(p, island, length, f, x, w);
         if (!accepted || (length != 1.0 && error <= parameters.stall_tolerance)) error = evaluate(p, island, f, w, merit);
         recent[step % 4] = merit;
         if (!(merit < HUGE_VAL)) break;
         if (accepted && length == 1.0) {
-            refusals = 0;
+            weight.forget_refusals();
             keeps_factor_ = keeps_factor_ && merit < parameters.fast_decrease * merit_before;
-            if (!keeps_factor_)
-                weight = std::max({parameters.min_proximal, weight * (merit < 0.1 * merit_before ? 0.01 : 0.3),
-                                   std::min(1e-3 * error, parameters.max_proximal)});
+            if (!keeps_factor_) weight.shrink(merit, merit_before, error);
         }
         if (error < least) {
             least = error;

@@ -3,8 +3,8 @@
 // With y = f - rho w and the projection P of each element (for a contact, P_n = max(0, y_n) and P_T the projection of
 // y_T on the disk of radius mu P_n), the laws hold exactly if
 //     e(f) = P(f - rho w) - f = 0.
-// A step has a proximal term d (f - f_now) / rho. Steps with this term end at a solution of the laws, and their
-// equations are regular for any redundancy of the rows. With A = dP/dy, S = I - (1 - d) A, z = S^-1 e and G = S^-1 A
+// A step has a proximal term d (f - f_now) / rho. With this term the iteration has the same solutions, and the equations of
+// a step are regular for any redundancy of the rows. With A = dP/dy, S = I - (1 - d) A, z = S^-1 e and G = S^-1 A
 // diag(rho):
 //     (M + J^T G J) dx = J^T z,   df = z - G J dx.
 // rho is the inverse of an element's own response. (P. Alart, A. Curnier, "A mixed formulation for frictional contact
@@ -22,11 +22,15 @@ struct BlockNewtonParameters {
     double stall_ratio = 0.25;      // ratio of two errors that counts as no progress near the solution
     int max_steps = 40;             // maximum number of steps
     double decrease = 0.01;         // required part of the predicted decrease of the squared error
-    int max_refusals = 4;           // refused steps, each with a larger proximal term
+    int max_refusals = 4;           // refused steps in a row, each with a larger proximal term
+    int max_halvings = 2, max_patient_halvings = 6;  // halvings of a step of a bold and of a patient search
     int max_unguarded_steps = 3;    // full steps without decrease
     double min_proximal = 1e-8;     // minimum weight d of the proximal term: the root of the unit roundoff
     double max_proximal = 0.1;      // largest weight of the proximal term
     double proximal_growth = 5.0;   // growth of the weight after a refused step
+    // Reduction of the weight after a full step, and after one whose ratio of squared errors is at most `good_decrease`.
+    double reduction = 0.3, good_reduction = 0.01, good_decrease = 0.1;
+    double error_part = 1e-3;  // minimum weight after a full step, relative to the error
     // Ratio of two squared errors after which `solve_without_compliance` keeps its factor.
     double fast_decrease = 1e-4;
     // Least and largest change of the weight that keeps the factor.

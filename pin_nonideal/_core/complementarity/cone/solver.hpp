@@ -38,8 +38,8 @@ public:
     static constexpr Parameters parameters{};
 
     // Solve for f. If `warm`, f holds a guess (often the solution of the previous step), otherwise its value is
-    // ignored. If the result is not `solved`, f is the best point found. Forces that share a load have minimum norm.
-    // With `may_keep_shares`, a guess that solves the problem keeps its shares.
+    // ignored. If the result is not `solved`, f is the best point found. If the forces are not unique, f has minimum norm.
+    // With `may_keep_shares`, a guess that solves the problem is returned unchanged.
     ConeStatus solve(const Eigen::Ref<const MatX>& W, const Eigen::Ref<const VecX>& w0,
                      const std::vector<ConeElement>& elements, bool warm, Eigen::Ref<VecX> f,
                      bool may_keep_shares = false);

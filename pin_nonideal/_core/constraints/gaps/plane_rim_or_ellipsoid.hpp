@@ -11,15 +11,16 @@
 
 namespace pn {
 
-struct PlaneEllipsoidRow : PlaneGap {
+struct PlaneRimOrEllipsoidRow : PlaneGap {
     static constexpr const char* name = "plane_ellipsoid";
 
     SharedFrame frame1, frame2;
     Vec3 normal, semiaxes;
 
     static constexpr auto data() {
-        return std::tuple(Field{"frame", &PlaneEllipsoidRow::frame1}, Field{"plane", &PlaneEllipsoidRow::frame2},
-                          Field{"normal", &PlaneEllipsoidRow::normal}, Field{"semiaxes", &PlaneEllipsoidRow::semiaxes});
+        return std::tuple(Field{"frame", &PlaneRimOrEllipsoidRow::frame1}, Field{"plane", &PlaneRimOrEllipsoidRow::frame2},
+                          Field{"normal", &PlaneRimOrEllipsoidRow::normal},
+                          Field{"semiaxes", &PlaneRimOrEllipsoidRow::semiaxes});
     }
     double extent1() const { return std::max({semiaxes[0], semiaxes[1], semiaxes[2]}); }
 

@@ -9,19 +9,19 @@
 
 namespace pn {
 
-struct PlaneEllipsoidSlipRows : ContactSlip {
+struct PlaneRimOrEllipsoidSlipRows : ContactSlip {
     static constexpr const char* name = "plane_ellipsoid_slip";
 
     SharedFrame frame1, frame2;
     Vec3 semiaxes, tangent1, tangent2, normal;
 
     static constexpr auto data() {
-        return std::tuple(Field{"frame", &PlaneEllipsoidSlipRows::frame1},
-                          Field{"plane", &PlaneEllipsoidSlipRows::frame2},
-                          Field{"semiaxes", &PlaneEllipsoidSlipRows::semiaxes},
-                          Field{"tangent1", &PlaneEllipsoidSlipRows::tangent1},
-                          Field{"tangent2", &PlaneEllipsoidSlipRows::tangent2},
-                          Field{"normal", &PlaneEllipsoidSlipRows::normal});
+        return std::tuple(Field{"frame", &PlaneRimOrEllipsoidSlipRows::frame1},
+                          Field{"plane", &PlaneRimOrEllipsoidSlipRows::frame2},
+                          Field{"semiaxes", &PlaneRimOrEllipsoidSlipRows::semiaxes},
+                          Field{"tangent1", &PlaneRimOrEllipsoidSlipRows::tangent1},
+                          Field{"tangent2", &PlaneRimOrEllipsoidSlipRows::tangent2},
+                          Field{"normal", &PlaneRimOrEllipsoidSlipRows::normal});
     }
 
     template <class Sides, class Out>

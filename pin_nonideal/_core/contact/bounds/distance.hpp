@@ -98,7 +98,7 @@ inline double depth_left(const Program& p, const Workspace& w, int gap, double w
 // Check if the gap is the lowest point of a body over a plane. Then each point of the body separately keeps its
 // distance from the plane.
 inline bool has_lowest_point(const Program& p, int gap) {
-    return std::holds_alternative<PlaneEllipsoidRow>(p.blocks[p.gaps[gap].block].kind);
+    return std::holds_alternative<PlaneRimOrEllipsoidRow>(p.blocks[p.gaps[gap].block].kind);
 }
 
 template <class Bytes>

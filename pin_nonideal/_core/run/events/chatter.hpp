@@ -2,7 +2,7 @@
 #pragma once
 
 #include "run/integrators/stiffness.hpp"
-#include "run/time_stepping/bridge.hpp"
+#include "run/time_stepping/time_stepping.hpp"
 
 namespace pn {
 

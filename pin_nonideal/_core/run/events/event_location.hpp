@@ -1,5 +1,9 @@
 // Location of an event inside a step.
 //
+// An event passes through four files: event_candidates.hpp lists the values that may cross zero in the step,
+// event_search.hpp finds the first crossing on the interpolant, this file locates its instant, and mode_selection.hpp
+// selects the modes there.
+//
 // The search on the interpolant gives a first guess of the instant. The step is then repeated up to that instant, so an
 // event is as accurate as a step. The remaining margin corrects the step's end. A step can miss the rest of slip in
 // several directions by more than the tolerance. Such a step ends before the rest, and a shorter step follows.

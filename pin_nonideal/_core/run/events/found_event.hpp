@@ -18,6 +18,9 @@ struct FoundEvent {
     bool in_vain = false;  // touch of a gap without load, whose contact had been opened
     bool of_hand_over = false;  // lift at which closed contacts pass to other features
 
+    // Lift of several gaps together.
+    static FoundEvent joint_lift(double time) { return {Kind::lift, -1, time}; }
+    static FoundEvent hand_over(double time) { return {Kind::lift, -1, time, false, true}; }
     bool changes_modes() const { return kind != Kind::reversal && kind != Kind::pull && kind != Kind::user; }
     bool of_gap() const { return kind == Kind::lift || kind == Kind::touch; }
 };

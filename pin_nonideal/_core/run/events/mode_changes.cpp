@@ -97,7 +97,7 @@ bool ModeChanges::force_switch() {
     const VecX y = progress_.y;
     progress_.y.noalias() += ahead * progress_.rate;
     progress_.t += ahead;
-    if (attempt([&] { change(FoundEvent{FoundEvent::Kind::lift, -1, progress_.t}); })) {
+    if (attempt([&] { change(FoundEvent::joint_lift(progress_.t)); })) {
         progress_.t = t;
         progress_.y = y;
         return false;

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "run/events/chatter.hpp"
-#include "run/events/events.hpp"
+#include "run/events/mode_selection.hpp"
 #include "run/events/impact_handler.hpp"
 #include "run/torque_schedule.hpp"
 

@@ -4,7 +4,7 @@
 // the accumulation. Flights with restitution 1 also end, because their energy is only rounding.
 #pragma once
 
-#include "run/events/events.hpp"
+#include "run/events/mode_selection.hpp"
 
 namespace pn {
 

@@ -78,7 +78,7 @@ std::optional<FoundEvent> ReleaseLocator::lift_together() {
         if (const auto released = release_together()) return released;  // the release is earlier
     }
     stepper_.end_at(high);
-    return FoundEvent{FoundEvent::Kind::lift, -1, stepper_.t0 + stepper_.h};
+    return FoundEvent::joint_lift(stepper_.t0 + stepper_.h);
 }
 
 // Return the part of the step at which its interpolant releases the sticking elements. `rate`: their slip acceleration

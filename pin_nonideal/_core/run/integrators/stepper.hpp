@@ -3,7 +3,7 @@
 
 #include <variant>
 
-#include "run/integrators/radau_slip.hpp"
+#include "run/integrators/slip_collocation.hpp"
 #include "run/integrators/external_step.hpp"
 #include "run/integrators/runge_kutta.hpp"
 #include "run/integrators/semi_implicit_euler.hpp"

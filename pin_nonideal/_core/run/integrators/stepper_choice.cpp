@@ -1,6 +1,6 @@
 #include "run/integrators/stepper_choice.hpp"
 
-#include "run/events/events.hpp"
+#include "run/events/mode_selection.hpp"
 
 namespace pn {
 

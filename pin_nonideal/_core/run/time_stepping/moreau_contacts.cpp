@@ -22,7 +22,7 @@ MoreauContacts::MoreauContacts(System& system, GapWatch& watch)
     : system_(system), p(system.p), w(system.w), mean_(p), drives_(p), flight_(p, drives_), opposed_(p), watch_(watch),
       elements_(p), forces_(p, w, elements_), was_closed_(system.ng, 0), closed_(system.ng, 0), open_(system.ng, 0),
       modes_(system.ne, unloaded), unloaded_(modes_), q_mid_(VecX::Zero(system.nq)), v0_(VecX::Zero(system.nv)), v1_(v0_),
-      a_free_(v0_), power_(VecX::Zero(system.nw)), projection_(system.p), force_(v0_) {
+      a_free_(v0_), power_(VecX::Zero(system.nw)), projection_(system.p), tangent_(v0_) {
     projection_.energy = system.energy;
     if (system.ng == 0) return;
     for (const Gap& gap : p.gaps) rounded_by_.push_back(rounded_by(p.blocks[gap.block].kind));
@@ -69,8 +69,8 @@ void MoreauContacts::step(double t, double h, VecX& y, double& numerical_energy,
     const Mechanism& m = p.mechanism;
     h_ = h;
     v0_ = system_.velocity(y);
-    force_ = 0.5 * h * v0_;
-    retract(m, y.data(), force_.data(), q_mid_.data());
+    tangent_ = 0.5 * h * v0_;
+    retract(m, y.data(), tangent_.data(), q_mid_.data());
     const double middle = t + 0.5 * h;
     const bool watched = system_.watches();
     if (watched || had_contacts_) {
@@ -105,8 +105,8 @@ void MoreauContacts::step(double t, double h, VecX& y, double& numerical_energy,
     select(closed_, modes_, elements_.rows.empty());
     had_contacts_ = watched || !elements_.rows.empty();
     if (system_.nz > 0) y.segment(system_.nq + system_.nv, system_.nz) += h * w.now.dz;
-    force_ = 0.5 * h * v1_;
-    retract(m, q_mid_.data(), force_.data(), y.data());
+    tangent_ = 0.5 * h * v1_;
+    retract(m, q_mid_.data(), tangent_.data(), y.data());
     flight_.place(p, y.data());
     y.segment(system_.nq, system_.nv) = v1_;
 }
@@ -125,9 +125,9 @@ bool MoreauContacts::project(double t, VecX& y, double& numerical_energy) {
 const std::vector<char>& MoreauContacts::open_gaps(const VecX& y) {
     if (q_sampled_.size() == 0) return open_;  // no step was taken yet: no gap is known to be open
     const VecX change = y.head(system_.nq) - q_sampled_;
-    ambient_to_tangent(p.mechanism, q_sampled_.data(), change.data(), force_.data());
-    force_ = force_.cwiseAbs().cwiseMax(0.5 * h_ * v1_.cwiseAbs());
-    return watch_.open_after(force_);
+    ambient_to_tangent(p.mechanism, q_sampled_.data(), change.data(), tangent_.data());
+    tangent_ = tangent_.cwiseAbs().cwiseMax(0.5 * h_ * v1_.cwiseAbs());
+    return watch_.open_after(tangent_);
 }
 
 // Solve the step with the forces at the predicted mean velocity. If no motion is found, or only a relaxed one, solve it at
@@ -193,9 +193,9 @@ void MoreauContacts::solve_free(double t) {
 const VecX& MoreauContacts::path_since_last() {
     q_sampled_ -= q_mid_;
     ambient_to_tangent(p.mechanism, q_mid_.data(), q_sampled_.data(), v1_.data());
-    force_ = v1_.cwiseAbs().cwiseMax(h_ * v0_.cwiseAbs());
+    tangent_ = v1_.cwiseAbs().cwiseMax(h_ * v0_.cwiseAbs());
     q_sampled_ = q_mid_;
-    return force_;
+    return tangent_;
 }
 
 // Collect the elements that take part, with the rates at the step's start. A velocity after a strike is not predicted.
@@ -399,13 +399,13 @@ void MoreauContacts::book_work(VecX& y, double& numerical_energy, double& impact
     const auto& parts = elements_.parts;
     const auto& cones = elements_.cones;
     begin_multipliers();
-    force_ = 0.5 * (mean_.start() + mean_.finish());
-    powers(p, w, force_, power_.data());
+    tangent_ = 0.5 * (mean_.start() + mean_.finish());
+    powers(p, w, tangent_, power_.data());
     for (size_t e = 0, at = 0; e < parts.size(); at += cones[e].dim, ++e) {
         double power = 0.0;
         for (int k = 0; k < cones[e].dim; ++k) {
             const StepRow& row = rows[at + k];
-            multiply(p.blocks[row.block], w.now.A, force_, w.scratch.r);
+            multiply(p.blocks[row.block], w.now.A, tangent_, w.scratch.r);
             const double part = w.scratch.r[p.blocks[row.block].row + row.k] * forces_.f[at + k];
             if (k == 0 && parts[e].gap >= 0) impact_energy += h_ * part;
             else power += part;

@@ -108,7 +108,8 @@ private:
     bool repeats_ = false;     // the next step is another attempt
     VecX q_mid_, q_sampled_, v0_, v1_, a_free_, lam_free_, power_;
     ContactProjection projection_;
-    VecX b_, force_;
+    VecX b_;
+    VecX tangent_;  // move, travel or mean velocity of the step
 };
 
 }  // namespace pn

@@ -142,7 +142,8 @@ void StepForces::measure_free(const MeanVelocity& mean, double h, const VecX& a_
     }
     for (size_t e = 0, at = 0; e < parts.size(); at += cones[e].dim, ++e) {
         offset_[at] += parts[e].approach / h;
-        // A contact that strikes need not open against the turn of its normal, which would add energy.
+        // The turn of its normal may close the gap of a contact that strikes: an impulse against this part would add
+        // energy.
         if (parts[e].strikes) offset_[at] -= std::min(0.0, turning_rate(rows[at], h));
     }
     for (int i = 0; i < n; ++i) {

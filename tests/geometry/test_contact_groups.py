@@ -1,6 +1,8 @@
-"""Contacts of all edges of two boxes are added together, and are the same as contacts added one by one."""
+"""Corners and edges of two shapes are added in groups, and are the same as contacts added one by one."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import coal
 import numpy as np
@@ -11,7 +13,12 @@ import pin_nonideal as pn
 from pin_nonideal.compilation.lowering import lower
 from pin_nonideal.compilation.resolver import Resolver
 from pin_nonideal.core_loader import core
-from pin_nonideal.description.contacts.pair_of_shapes import CapsulePairs, numbered, split
+from pin_nonideal.description.contacts.pair_of_shapes import (
+    BallContacts,
+    CapsulePairs,
+    numbered,
+    split,
+)
 from pin_nonideal.scene.scene import compiled_scene
 
 EDGES = 12
@@ -43,17 +50,34 @@ def program_of(scene: pn.Scene, one_by_one: bool) -> core.Program:
     return builder.finish()
 
 
-def test_a_pair_of_boxes_adds_its_edges_together() -> None:
+def shapes_on_each_other() -> pn.Scene:
+    """Return a box, a mesh, a cylinder and a cone, each over the one before."""
+    model, shapes = pin.Model(), pin.GeometryModel()
+    mesh = coal.BVHModelOBBRSS()
+    mesh.beginModel(4, 4)
+    mesh.addVertices(0.1 * np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]))
+    mesh.addTriangles(np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]], dtype=np.uint64))
+    mesh.endModel()
+    mesh.buildConvexHull(True, "Qt")
+    solids = (coal.Box(0.2, 0.2, 0.1), mesh.convex, coal.Cylinder(0.1, 0.1), coal.Cone(0.1, 0.1))
+    for k, solid in enumerate(solids):
+        place = pin.SE3(pin.rpy.rpyToMatrix(0.1 * k, 0.2, 0.3), np.array([0.0, 0.0, 0.1 + 0.15 * k]))
+        pn.free_body(model, f"solid {k}", solid, mass=1.0, collision_model=shapes, place=place)
+    contacts = pn.geometry_contacts(model, shapes, mu=0.3)
+    return pn.Scene(model, contacts=contacts, collision_model=shapes)
+
+
+def test_a_pair_of_boxes_adds_its_corners_and_edges_in_groups() -> None:
     pair = compiled_scene(boxes(2)).spec.contacts[-1]
-    assert [len(p) for p in pair.parts if isinstance(p, CapsulePairs)] == [EDGES * EDGES]
-    assert len(pair.parts) == 2 * CORNERS + 1
+    kinds = [(type(part), len(part)) for part in pair.parts]
+    assert kinds == [(BallContacts, CORNERS), (BallContacts, CORNERS), (CapsulePairs, EDGES * EDGES)]
     assert list(pair.names) == [point.name for point in pair.points]
     assert list(pair.names) == [f"{pair.name} {k + 1}" for k in range(2 * CORNERS + EDGES * EDGES)]
 
 
-@pytest.mark.parametrize("mu", [0.0, 0.4])
-def test_the_program_is_that_of_contacts_added_one_by_one(mu: float) -> None:
-    scene = boxes(mu=mu)
+@pytest.mark.parametrize("make", [lambda: boxes(mu=0.0), boxes, shapes_on_each_other])
+def test_the_program_is_that_of_contacts_added_one_by_one(make: Callable[[], pn.Scene]) -> None:
+    scene = make()
     together, single = program_of(scene, False), program_of(scene, True)
     for key in ("block_names", "first_rows", "contacts", "element_names", "law_names", "first_gap", "rows"):
         assert getattr(together, key) == getattr(single, key)
@@ -61,6 +85,9 @@ def test_the_program_is_that_of_contacts_added_one_by_one(mu: float) -> None:
     q = scene.q0[None]
     gaps = [np.asarray(core.gap_values(p, q, np.zeros(1), blocks)) for p in (together, single)]
     np.testing.assert_array_equal(*gaps)
+    elements = list(range(len(together.element_names)))
+    axes = [np.asarray(core.slip_axes(p, q, np.zeros(1), elements)) for p in (together, single)]
+    np.testing.assert_array_equal(*axes)
 
 
 def test_points_are_described_by_name() -> None:
@@ -105,7 +132,7 @@ def test_a_law_with_the_name_of_a_contact_point_is_refused(mu: float) -> None:
             pn.Scene(scene.model, **parts)
 
 
-def test_one_pair_of_capsules_has_no_number() -> None:
+def test_a_group_of_one_contact_has_no_number() -> None:
     pairs = CapsulePairs(pn.CapsuleContact("a", "b", LINE, LINE, 0.1), (LINE,), (LINE,))
     (single,) = numbered([pairs], "pair")
     assert single.name == "pair"

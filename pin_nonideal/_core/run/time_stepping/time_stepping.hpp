@@ -10,7 +10,7 @@
 
 namespace pn {
 
-struct BridgeParameters {
+struct TimeSteppingParameters {
     // Shortest remainder of a step that becomes a step of its own, relative to the step.
     double min_remainder = 1e-9;
     // Shortest part of a step while edges approach each other, relative to the step.
@@ -19,7 +19,7 @@ struct BridgeParameters {
 
 class TimeStepping {
 public:
-    using Parameters = BridgeParameters;
+    using Parameters = TimeSteppingParameters;
     static constexpr Parameters parameters{};
 
     TimeStepping(System& system, Progress& progress, GapWatch& watch, const Options& options, Torques& torques,

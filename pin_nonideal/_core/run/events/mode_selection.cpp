@@ -1,4 +1,4 @@
-#include "run/events/events.hpp"
+#include "run/events/mode_selection.hpp"
 
 #include <algorithm>
 
@@ -86,7 +86,7 @@ bool shares_load(System& system, double t, const std::vector<int>& resting, int 
         shares |=
             w.state.mode[e] == sticking &&
             (e == limit_element ||
-             !holding_force(p, w, e, t, system.q, system.v).is_within(event_handling_parameters.limit_rounding));
+             !holding_force(p, w, e, t, system.q, system.v).is_within(mode_selection_parameters.limit_rounding));
     return shares;
 }
 
@@ -318,8 +318,8 @@ Strike strike_contacts(System& system, double t, VecX& y, bool starts, bool boun
 void remember_directions(System& system, std::vector<double>& slip, int stopped_element) {
     Workspace& w = system.w;
     const auto velocity = [&](int e) { return slip_velocity(w.now, system.p.frictions[e]); };
-    const double min_speed = stopped_element < 0 ? event_handling_parameters.directed_slip
-                                         : std::max(event_handling_parameters.directed_slip,
+    const double min_speed = stopped_element < 0 ? mode_selection_parameters.directed_slip
+                                         : std::max(mode_selection_parameters.directed_slip,
                                                     velocity(stopped_element).norm());
     for (int e : w.now.loaded_elements) {
         const Friction& f = system.p.frictions[e];

@@ -1,4 +1,4 @@
-#include "constraints/system.hpp"
+#include "constraints/row_system.hpp"
 
 #include <algorithm>
 

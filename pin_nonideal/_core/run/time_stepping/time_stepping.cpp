@@ -1,4 +1,4 @@
-#include "run/time_stepping/bridge.hpp"
+#include "run/time_stepping/time_stepping.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 #include "dynamics/acceleration.hpp"
 #include "dynamics/step_start.hpp"
 #include "friction/stick_slip.hpp"
-#include "run/events/events.hpp"
+#include "run/events/mode_selection.hpp"
 
 namespace pn {
 

@@ -9,14 +9,14 @@
 
 namespace pn {
 
-struct EventHandlingParameters {
+struct ModeSelectionParameters {
     // Minimum slip speed [rad/s or m/s] that defines a slip direction.
     double directed_slip = 1e-12;
     // Rounding tolerance of the limit of a sticking element, relative to the limit.
     double limit_rounding = 1e-9;
 };
 
-inline constexpr EventHandlingParameters event_handling_parameters{};
+inline constexpr ModeSelectionParameters mode_selection_parameters{};
 
 // Select new modes at (t, y), and project y onto the constraints. Without an event, as at the start of a run, every
 // element gets its mode from its velocity. On return the workspace is evaluated at (t, y), and dy holds the rate.

@@ -1,4 +1,4 @@
-#include "run/integrators/radau_slip.hpp"
+#include "run/integrators/slip_collocation.hpp"
 
 #include <algorithm>
 #include <cmath>
