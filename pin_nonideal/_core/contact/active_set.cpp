@@ -14,12 +14,6 @@
 
 namespace pn {
 
-namespace {
-
-using Choice = std::vector<char>;  // closed flag by gap
-
-}  // namespace
-
 bool slip_opposes_friction(const Program& p, Workspace& w, const VecX& v) {
     const double min_size =
         active_set_parameters.min_direction_acceleration * (w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm());
@@ -37,6 +31,8 @@ bool slip_opposes_friction(const Program& p, Workspace& w, const VecX& v) {
 
 namespace {
 
+using Choice = std::vector<char>;  // closed flag by gap
+
 bool slides_anywhere(const Program& p, const Workspace& w, const VecX& v) {
     for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e)
         if (slips(w.state.mode[e]) && !at_rest(p, w, e, v)) return true;
@@ -44,7 +40,7 @@ bool slides_anywhere(const Program& p, const Workspace& w, const VecX& v) {
 }
 
 // Active sets tried at one state.
-struct Search {
+struct ActiveSetSearch {
     const Program& p;
     Workspace& w;
     double t;
@@ -124,64 +120,14 @@ struct Search {
     }
 };
 
-}  // namespace
-
-TouchingContacts touching_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, bool starts) {
-    TouchingContacts out{Choice(p.gaps.size(), 0), Choice(p.gaps.size(), 0)};
-    update_kinematics(p, w, t, q, v);
-    const double width = starts ? active_set_parameters.starting_width * scene_size(p, w) : touching_width;
-    std::vector<int> list;
-    for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
-        if (is_bare(p, i)) continue;
-        if (!w.state.closed[i] && !p.is_users(i)) {
-            if (measured_width(p, w, t, v, i) > active_set_parameters.sure_gap) continue;
-        }
-        evaluate_gap(p, w, t, v, i);
-        const bool touches =
-            gap_width(p, w, i) <= std::max(width, -gap_rate(p, w, i) * active_set_parameters.touching_time);
-        if (w.state.closed[i] || touches) list.push_back(i);
-    }
-    if (list.size() > 1) {
-        for (int i : list)
-            if (p.gaps[i].sliding >= 0) evaluate_block(p, w, t, v, p.frictions[p.gaps[i].sliding].block);
-        remove_coincident(p, w, list, [&](int i, int other) {
-            if (opens_later(p, w, i, other) || opens_later(p, w, other, i)) return opens_later(p, w, i, other);
-            return w.state.closed[i] && !w.state.closed[other];
-        });
-    }
-    const double still = rest_rate(v);
-    for (int i : list) {
-        const double rate = gap_rate(p, w, i);
-        out.touch[i] = 1;
-        out.rest[i] = rate <= still;
-        out.strikes |= rate < -still;
-        out.lands |= rate < -still && !w.state.closed[i];
-    }
-    return out;
-}
-
-const TouchingContacts& TouchingCache::at(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
-                                          bool starts) {
-    const bool same = is_set_ && t == t_ && starts == starts_ && q == q_ && v == v_ && same_bytes(closed_, w.state.closed);
-    if (same) return found_;
-    is_set_ = true;
-    t_ = t;
-    starts_ = starts;
-    q_ = q;
-    v_ = v;
-    closed_ = w.state.closed;
-    found_ = touching_contacts(p, w, t, q, v, starts);
-    return found_;
-}
-
 // Check if two motions are equal to rounding.
-static bool are_one(const VecX& a, const VecX& other) {
+bool are_one(const VecX& a, const VecX& other) {
     return (a - other).cwiseAbs().maxCoeff() <=
            active_set_parameters.same_motion * std::max(a.cwiseAbs().maxCoeff(), other.cwiseAbs().maxCoeff());
 }
 
 // Add the current motion to a failure with another one.
-static Failure with_motion(Failure failure, const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
+Failure with_motion(Failure failure, const Program& p, Workspace& w, double t, const VecX& q, const VecX& v) {
     VecX limits(failure.elements.size());
     for (size_t i = 0; i < failure.elements.size(); ++i) {
         const int e = failure.elements[i];
@@ -194,73 +140,104 @@ static Failure with_motion(Failure failure, const Program& p, Workspace& w, doub
     return failure;
 }
 
-// Contacts that share a load are decided together. Other contacts are decided one by one, which tests uniqueness, and
-// together if this does not converge.
-void select_active_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
-                            const OnsetQuery& query, const std::function<void(const OnsetMotion*)>& find_modes) {
-    const RunState before = w.state;
-    const auto solve_jointly = [&] {
+// Selection of the closed contacts at one state.
+struct Selection {
+    const Program& p;
+    Workspace& w;
+    double t;
+    const VecX& q;
+    const VecX& v;
+    const OnsetQuery& query;
+    const std::function<void(const OnsetMotion*)>& find_modes;
+    const RunState before;
+    std::optional<Failure> failure{};  // failure of the first active set without a motion
+
+    // Return the motion of all contacts together, by the cone problem.
+    std::optional<OnsetMotion> solve_jointly() {
         set_closed(p, w, before.closed);
         set_modes(p, w, before.mode);
         w.state = before;
         return onset_motion(p, w, t, q, v, query);
-    };
-    std::optional<Failure> failure;  // failure of the first active set without a motion
-    const auto seek = [&](const Choice& start, const OnsetMotion* joint_motion, bool needs_opposed_friction) {
+    }
+
+    // Search from a choice, or from the closed contacts of a joint motion.
+    void search_from(const Choice& start) { search_from(start, nullptr); }
+    void search_from(const OnsetMotion& joint_motion) { search_from(joint_motion.closed, &joint_motion); }
+    void search_from(const Choice& start, const OnsetMotion* joint_motion) {
+        if (search(start, joint_motion, true) || search(start, joint_motion, false)) return;
+        if (failure) throw *failure;
+        throw Failure(Failure::Kind::not_converged, t);
+    }
+
+    bool search(const Choice& start, const OnsetMotion* joint_motion, bool needs_opposed_friction) {
         Choice first = start;
         if (query.opening_gap >= 0) first[query.opening_gap] = 0;
-        Search search{p, w, t, v, query.rest, find_modes, joint_motion, needs_opposed_friction, {}, {}};
+        ActiveSetSearch search{p, w, t, v, query.rest, find_modes, joint_motion, needs_opposed_friction, {}, {}};
         if (search.pivot(first) || search.enumerate()) return true;
         if (!failure) failure = search.failure;
         return false;
-    };
-    const auto close = [&](const Choice& start, const OnsetMotion* joint_motion) {
-        if (seek(start, joint_motion, true) || seek(start, joint_motion, false)) return;
-        if (failure) throw *failure;
-        throw Failure(Failure::Kind::not_converged, t);
-    };
-    const bool many = std::count(query.rest.begin(), query.rest.end(), char(1)) >= active_set_parameters.may_share;
-    std::optional<OnsetMotion> joint_motion;
-    if (many && query.at_limit.empty()) {
-        joint_motion = solve_jointly();
-        if (joint_motion && joint_motion->closed == query.rest && !joint_motion->slides())
-            return close(joint_motion->closed, &*joint_motion);
-        if (joint_motion && joint_motion->shared) {
-            // The friction of sliding contacts follows loads of minimum norm. The cone problem has other shares, so its
-            // motion is then only a guess.
-            joint_motion->is_initial_guess = joint_motion->slides();
-            return close(joint_motion->closed, &*joint_motion);
-        }
     }
-    const auto unsolved = attempt({Failure::Kind::not_converged, Failure::Kind::paradox}, [&] {
-        close(query.rest, nullptr);
+
+    // Decide contacts that share a load together. Return false if they share none.
+    bool select_shared(std::optional<OnsetMotion>& joint_motion) {
+        joint_motion = solve_jointly();
+        if (!joint_motion) return false;
+        const bool all_stick = joint_motion->closed == query.rest && !joint_motion->slides();
+        if (!all_stick && !joint_motion->shared) return false;
+        // The friction of sliding contacts follows loads of minimum norm. The cone problem has other shares, so its
+        // motion is then only a guess.
+        if (!all_stick) joint_motion->is_initial_guess = joint_motion->slides();
+        search_from(*joint_motion);
+        return true;
+    }
+
+    // Decide contacts one by one, which tests uniqueness.
+    void select_one_by_one(std::optional<OnsetMotion>& joint_motion) {
+        search_from(query.rest);
         // Multipliers of redundant rows do not show if friction at rest is within its cones. Sliding friction follows
         // the minimum-norm loads, unlike the solution of the cone problem.
         const bool are_shared = w.now.rows.redundant && w.state.sticks_anywhere() && !slides_anywhere(p, w, v);
         if (query.prescribed || !(are_shared || !slip_opposes_friction(p, w, v))) return;
         if (!joint_motion) joint_motion = solve_jointly();
-        if (joint_motion) close(joint_motion->closed, &*joint_motion);
-        else close(query.rest, nullptr);
-    });
-    if (!unsolved) return;
-    const bool undecided = unsolved->kind == Failure::Kind::not_converged;
-    if (!undecided && !many) throw *unsolved;
-    joint_motion = solve_jointly();
-    // Modes with a negative determinant belong to one of several motions. The cone problem of all contacts gives
-    // another motion.
-    const bool one_of_several = unsolved->solutions == Failure::Solutions::unproven && !unsolved->accelerations.empty();
-    const bool goes_on = w.continues && unsolved->solutions == Failure::Solutions::several;
-    // If these active sets have no motion, another one may have.
-    const bool has_other = undecided || one_of_several || goes_on || unsolved->solutions == Failure::Solutions::none;
-    if (!joint_motion || !(has_other || joint_motion->shared)) throw *unsolved;
-    if (one_of_several || goes_on) {
-        joint_motion->several = true;
-        joint_motion->several_element = unsolved->elements.front();
+        if (joint_motion) search_from(*joint_motion);
+        else search_from(query.rest);
     }
-    close(joint_motion->closed, &*joint_motion);
-    if (!one_of_several) return;
-    if (are_one(w.now.a, unsolved->accelerations.front())) throw *unsolved;
-    if (!w.continues) throw with_motion(*unsolved, p, w, t, q, v);
+
+    // Decide all contacts together after `unsolved`, the failure of the decisions one by one.
+    void select_after_failure(const Failure& unsolved) {
+        std::optional<OnsetMotion> joint_motion = solve_jointly();
+        // Modes with a negative determinant belong to one of several motions. The cone problem of all contacts gives
+        // another motion.
+        const bool one_of_several = unsolved.solutions == Failure::Solutions::unproven && !unsolved.accelerations.empty();
+        const bool goes_on = w.continues && unsolved.solutions == Failure::Solutions::several;
+        // If these active sets have no motion, another one may have.
+        const bool has_other = unsolved.kind == Failure::Kind::not_converged || one_of_several || goes_on ||
+                               unsolved.solutions == Failure::Solutions::none;
+        if (!joint_motion || !(has_other || joint_motion->shared)) throw unsolved;
+        if (one_of_several || goes_on) {
+            joint_motion->several = true;
+            joint_motion->several_element = unsolved.elements.front();
+        }
+        search_from(*joint_motion);
+        if (!one_of_several) return;
+        if (are_one(w.now.a, unsolved.accelerations.front())) throw unsolved;
+        if (!w.continues) throw with_motion(unsolved, p, w, t, q, v);
+    }
+};
+
+}  // namespace
+
+void select_active_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
+                            const OnsetQuery& query, const std::function<void(const OnsetMotion*)>& find_modes) {
+    Selection selection{p, w, t, q, v, query, find_modes, w.state};
+    const bool many = std::count(query.rest.begin(), query.rest.end(), char(1)) >= active_set_parameters.may_share;
+    std::optional<OnsetMotion> joint_motion;
+    if (many && query.at_limit.empty() && selection.select_shared(joint_motion)) return;
+    const auto unsolved = attempt({Failure::Kind::not_converged, Failure::Kind::paradox},
+                                  [&] { selection.select_one_by_one(joint_motion); });
+    if (!unsolved) return;
+    if (unsolved->kind != Failure::Kind::not_converged && !many) throw *unsolved;
+    selection.select_after_failure(*unsolved);
 }
 
 }  // namespace pn

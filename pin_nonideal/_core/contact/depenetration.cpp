@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "contact/active_set.hpp"
 #include "contact/contact_rows.hpp"
 #include "contact/queries.hpp"
 #include "dynamics/evaluation.hpp"

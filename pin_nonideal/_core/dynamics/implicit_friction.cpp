@@ -61,7 +61,7 @@ struct Implicit : Unknowns {
             attempt({Failure::Kind::paradox}, [&] { is_consistent = alternate_zero_load_sets(y, g); });
         if (is_consistent) return;
         if (failure && failure->solutions == Failure::Solutions::several) throw *failure;
-        decide_over_zero_load_sets(*this, start, y,
+        select_among_zero_load_sets(*this, start, y,
                                    failure.value_or(Failure(Failure::Kind::not_converged, t, elements())));
         image(y, g);
     }
@@ -108,7 +108,7 @@ struct Implicit : Unknowns {
         before = y;
         const bool solved = newton.solve(arrays, y);
         const bool regular = solved && newton.factorize(arrays, y) > uniqueness_parameters.min_determinant;
-        if (!regular || is_due()) decide(*this, arrays, before, y, solved);
+        if (!regular || is_due()) select_solution(*this, arrays, before, y, solved);
         newton.factorize(arrays, y);
         w.scratch.factored_unknowns = n;
         double last = std::numeric_limits<double>::infinity();

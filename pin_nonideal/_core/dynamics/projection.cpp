@@ -183,12 +183,12 @@ bool is_on_constraints(const Program& p, Workspace& w, double t, const VecX& q, 
     return gather_rates(p, w, t, v) <= velocity_floor(w, v);
 }
 
-bool project_position(const Program& p, Workspace& w, double t, VecX& q, const VecX& v, bool configured,
+bool project_position(const Program& p, Workspace& w, double t, VecX& q, const VecX& v, bool is_configured,
                       bool keeps_factors) {
     reset_closing(w);
     double largest = 0.0, floor = 0.0;
     if (!w.now.rows.blocks.empty()) {
-        if (!configured) evaluate_residuals(p, w, t, q, v);
+        if (!is_configured) evaluate_residuals(p, w, t, q, v);
         largest = gather_residuals(p, w);
         floor = position_floor(p, w);
         w.now.projected_gap = std::max(w.now.projected_gap, largest / std::max(floor, projection_parameters.no_floor));
@@ -198,7 +198,7 @@ bool project_position(const Program& p, Workspace& w, double t, VecX& q, const V
         w.now.step_gap = w.scratch.r;
         w.now.awaits_gap = false;
     }
-    configured &= !moves;
+    is_configured &= !moves;  // whether the workspace is configured at q
     int count = 0;      // steps since the factors were taken
     double rate = 1.0;  // ratio of the largest residuals of the last two steps
     for (int it = 0; it < max_projection_iterations && largest > floor; ++it) {
@@ -211,15 +211,16 @@ bool project_position(const Program& p, Workspace& w, double t, VecX& q, const V
         w.now.closing_lam += w.scratch.position_lam_steps[count++];
         w.now.has_closing = true;
         // A step expected to end below rounding is evaluated when the end of the step is configured.
-        configured = count > 1 && largest * rate < projection_parameters.trusted_part * floor;
+        bool reconfigures = count > 1 && largest * rate < projection_parameters.trusted_part * floor;
         double now = largest;
-        if (!configured) {
+        if (!reconfigures) {
             move_position(p, w, q, p.constrained_dofs);  // the other dofs move no row
             evaluate_residuals(p, w, t, q, v);
             now = gather_residuals(p, w);
-            configured = now > floor && needs_new_factors(largest, now, floor);
+            reconfigures = now > floor && needs_new_factors(largest, now, floor);
         }
-        if (configured) {
+        is_configured = reconfigures;
+        if (reconfigures) {
             move_position(p, w, q);
             configure(p, w, t, q, v);
             now = gather_residuals(p, w);
@@ -233,8 +234,8 @@ bool project_position(const Program& p, Workspace& w, double t, VecX& q, const V
     if (count > 0 && static_cast<int>(p.constrained_dofs.size()) < p.mechanism.nv) move_position(p, w, q);
     // In deep trees M and its factor share storage.
     const bool serves = p.affine_rates && w.now.rows.distance >= near_singular_pivot && p.mechanism.deep_dofs.empty();
-    if (!configured && keeps_factors && serves) place(p, w, t, q, v);
-    else if (!configured) configure(p, w, t, q, v);
+    if (!is_configured && keeps_factors && serves) place(p, w, t, q, v);
+    else if (!is_configured) configure(p, w, t, q, v);
     if (moves) ++w.counters.projections;
     return moves;
 }

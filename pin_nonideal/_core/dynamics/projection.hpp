@@ -40,9 +40,9 @@ void follow_constraints(const Program& p, Workspace& w, double h, VecX& move);
 void learn_third_order(const Program& p, Workspace& w, double h);
 
 // Project q. Return false if nothing had to move. The workspace must hold factors near (t, q) and is configured there on
-// return. Only a user's own rows read v. `configured`: the workspace is already configured at (t, q). `keeps_factors`: if
+// return. Only a user's own rows read v. `is_configured`: the workspace is already configured at (t, q). `keeps_factors`: if
 // the old factors are accurate enough, keep them for a velocity projection only. M and the rows are those of q.
-bool project_position(const Program& p, Workspace& w, double t, VecX& q, const VecX& v, bool configured = false,
+bool project_position(const Program& p, Workspace& w, double t, VecX& q, const VecX& v, bool is_configured = false,
                       bool keeps_factors = false);
 // Project v. Return false if nothing had to move. The workspace must be configured at (t, q).
 bool project_velocity(const Program& p, Workspace& w, double t, VecX& v);

@@ -85,7 +85,7 @@ bool pulls(const Unknowns& u, const VecX& y) {
 
 }  // namespace
 
-void decide_over_zero_load_sets(Unknowns& u, const VecX& start, VecX& y, const Failure& failure) {
+void select_among_zero_load_sets(Unknowns& u, const VecX& start, VecX& y, const Failure& failure) {
     const std::vector<std::vector<char>> sets = zero_load_sets(u.p, u.w);
     if (sets.empty()) throw Failure(Failure::Kind::not_converged, u.t, u.elements());
     std::vector<VecX> motions;
@@ -112,7 +112,7 @@ void decide_over_zero_load_sets(Unknowns& u, const VecX& start, VecX& y, const F
     u.w.state.unique = Uniqueness::not_shown;
 }
 
-void decide(Unknowns& u, const ReactionEquation& equation, const VecX& start, VecX& y, bool solved) {
+void select_solution(Unknowns& u, const ReactionEquation& equation, const VecX& start, VecX& y, bool solved) {
     RunState& state = u.w.state;
     MatX L;
     equation.steepest(L);

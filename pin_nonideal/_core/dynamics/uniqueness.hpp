@@ -17,14 +17,14 @@ struct UniquenessParameters {
 
 inline constexpr UniquenessParameters uniqueness_parameters{};
 
-// Decide uniqueness for loads of bearings: g is proven to contract, or all solutions are computed. y is Newton's solution
-// if `solved`. `start` is the motion before, where the search began. If there are several solutions, y becomes the nearest
-// to `start`, or the failure shows two.
-void decide(Unknowns& unknowns, const ReactionEquation& equation, const VecX& start, VecX& y, bool solved);
+// Select a solution for loads of bearings and decide if it is unique: g is proven to contract, or all solutions are
+// computed. y is Newton's solution if `solved`. `start` is the motion before, where the search began. If there are several
+// solutions, y becomes the nearest to `start`, or the failure shows two.
+void select_solution(Unknowns& unknowns, const ReactionEquation& equation, const VecX& start, VecX& y, bool solved);
 
 // Solve for all zero-load sets after one set had no solution. y becomes the solution nearest to `start` in any set. If no
 // set has a solution, throw `failure`.
-void decide_over_zero_load_sets(Unknowns& unknowns, const VecX& start, VecX& y, const Failure& failure);
+void select_among_zero_load_sets(Unknowns& unknowns, const VecX& start, VecX& y, const Failure& failure);
 
 // Search for other solutions with user functions among the unknowns. J is dg/dy at y. Throw a failure if the
 // determinant indicates other solutions and Newton's method finds one. If no solution is found, nothing is proven. If the

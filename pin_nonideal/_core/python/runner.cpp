@@ -12,6 +12,7 @@
 
 #include "constraints/row_length.hpp"
 #include "contact/active_set.hpp"
+#include "contact/touching_contacts.hpp"
 #include "dynamics/evaluation.hpp"
 #include "dynamics/state_projection.hpp"
 #include "dynamics/friction_limit.hpp"

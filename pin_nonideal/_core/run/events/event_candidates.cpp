@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "contact/active_set.hpp"
 #include "contact/queries.hpp"
 #include "dynamics/friction_limit.hpp"
 #include "dynamics/reactions.hpp"

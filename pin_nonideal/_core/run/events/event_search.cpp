@@ -4,7 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "contact/active_set.hpp"
 #include "contact/queries.hpp"
 #include "dynamics/evaluation.hpp"
 #include "dynamics/projection.hpp"

@@ -3,7 +3,6 @@
 #include <cmath>
 #include <limits>
 
-#include "contact/active_set.hpp"
 #include "contact/queries.hpp"
 #include "contact/impact.hpp"
 #include "dynamics/evaluation.hpp"

@@ -172,10 +172,10 @@ void Collocation::solve_turns() {
 // Turn the directions, and update the accelerations.
 void Collocation::turn_directions() {
     for (int i = 0; i < stages; ++i) {
-        turned_[i] = n_[i];
+        n_before_ = n_[i];
         n_[i] += T_[i] * turn_.segment(i * tangents_, tangents_);
         for (const Element& e : elements_) n_[i].segment(e.row, e.dim).normalize();
-        turned_[i] = G_ * (n_[i] - turned_[i]);
+        turned_[i] = G_ * (n_[i] - n_before_);
         F_[i].segment(system_.nq, system_.nv) += turned_[i];
     }
 }
@@ -231,6 +231,23 @@ void Collocation::measure_stiffness() {
                                                   std::abs(sigma_(at, stages - 1)));
 }
 
+// Check if an iteration has changed the stages by `now` tolerances, and the iteration before by `last`, without a chance to
+// converge.
+bool Collocation::diverges(int iteration, double now, double last) const {
+    if (!std::isfinite(now)) return true;
+    if (iteration == 0) return turn_.cwiseAbs().maxCoeff() > parameters.farthest_turn;
+    const double max_ratio = iteration > 1 ? parameters.diverging : parameters.diverging_first;
+    return now / last > max_ratio && now > parameters.rounding_part;
+}
+
+bool Collocation::has_converged(int iteration, double now, double last) const {
+    if (now <= parameters.solved_at_once) return true;
+    if (iteration == 0) return false;
+    const double ratio = now / last;
+    const bool is_rounding = ratio > parameters.diverging && now <= parameters.rounding_part;
+    return is_rounding || now * ratio <= parameters.solved_part * (1.0 - ratio);
+}
+
 void Collocation::advance() {
     const bool again = has_warm_start_;
     if (error_.size() == 0) {  // most runs never solve for directions
@@ -250,14 +267,9 @@ void Collocation::advance() {
         evaluate_stages(it == 0);
         if (it == 0 && !again) find_response();
         correct();
-        const double now = change(), ratio = now / last;
-        if (!std::isfinite(now) || (it == 0 && turn_.cwiseAbs().maxCoeff() > parameters.farthest_turn) ||
-            (it > 0 && ratio > (it > 1 ? parameters.diverging : parameters.diverging_first) &&
-             now > parameters.rounding_part))
-            return;
-        const bool rounding = ratio > parameters.diverging && now <= parameters.rounding_part;
-        converged_ = now <= parameters.solved_at_once ||
-                     (it > 0 && (rounding || now * ratio <= parameters.solved_part * (1.0 - ratio)));
+        const double now = change();
+        if (diverges(it, now, last)) return;
+        converged_ = has_converged(it, now, last);
         last = now;
         if (converged_) break;
     }

@@ -75,6 +75,8 @@ private:
     void turn_directions();
     void move_stages();
     double change();
+    bool diverges(int iteration, double now, double last) const;
+    bool has_converged(int iteration, double now, double last) const;
     void measure_stiffness();
     void add_tangents(int stage);
 
@@ -88,7 +90,7 @@ private:
     std::vector<VecX> F_, Y_, next_;  // rates, states and next states of the stages
     std::vector<VecX> u_, n_;         // slip velocities and directions of all elements, by stage
     std::vector<VecX> turned_;        // change of the accelerations by the last turns
-    VecX start_n_;
+    VecX start_n_, n_before_;
     MatX sigma_;                      // slip speeds: element by stage
     std::vector<MatX> A_;             // rows of the slip velocities by stage
     MatX G_;                          // da/dn, including the loads that follow n

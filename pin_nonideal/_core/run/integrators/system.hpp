@@ -12,7 +12,7 @@
 // unit sphere, so the order is kept. Unit lengths are restored at the step's end.
 #pragma once
 
-#include "contact/active_set.hpp"
+#include "contact/touching_contacts.hpp"
 
 namespace pn {
 
