@@ -10,6 +10,8 @@ from pin_nonideal.errors import InputError, short_repr
 from pin_nonideal.types import Array, GeometryModel, GeometryObject, Model, Placement
 from pin_nonideal.validation import array, positive, text
 
+from .shapes import check_lengths
+
 __all__ = ["free_body", "placement", "shape_color"]
 
 
@@ -120,7 +122,8 @@ def _inertia(who: str, shape: object, density: float | None, mass: float | None)
     """Return the inertia of a homogeneous shape in its own axes, a pinocchio.Inertia.
 
     Raises:
-        InputError: the shape encloses no volume, or not exactly one of density and mass is given.
+        InputError: a length of the shape is not positive, the shape encloses no volume, or not exactly one of
+            density and mass is given.
     """
     import coal
 
@@ -129,6 +132,7 @@ def _inertia(who: str, shape: object, density: float | None, mass: float | None)
         raise InputError(f"{who}: exactly one of density and mass must be given; got {both}")
     if not isinstance(shape, coal.CollisionGeometry):
         raise InputError(f"{who}: shape must be a shape of coal, such as coal.Box; got {short_repr(shape)}")
+    check_lengths(f"{who}: shape", shape)
     volume = float(shape.computeVolume())
     moments = np.array(shape.computeMomentofInertiaRelatedToCOM())
     if volume < 0.0:  # mesh with inverted orientation

@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 
 from pin_nonideal.description.contacts.convex_hull import check_convex, convex_hull
-from pin_nonideal.errors import InputError, UnknownNameError, nearest
+from pin_nonideal.errors import InputError, UnknownNameError, nearest, short_repr
 from pin_nonideal.types import Array, CollisionGeometry, GeometryModel, GeometryObject, Model, Placement
 
 # Corners of a box of half edges 1.
@@ -79,11 +79,12 @@ def shape_of(who: str, item: GeometryObject, model: Model) -> Shape:
         model: pinocchio.Model.
 
     Raises:
-        InputError: the kind is not supported, or a mesh is not convex.
+        InputError: the kind is not supported, a length is not positive, or a mesh is not convex.
     """
     name = str(item.name)
     frame, shape, place = str(model.names[item.parentJoint]), item.geometry, item.placement.copy()
     kind = type(shape).__name__
+    check_lengths(f'{who}: geometry "{name}"', shape)
 
     def located(points: Array) -> Array:
         return np.asarray(points @ place.rotation.T + place.translation)
@@ -109,6 +110,26 @@ def shape_of(who: str, item: GeometryObject, model: Model) -> Shape:
         return Shape(name, kind, frame, place, located(tip), ends=(length, radius, above))
     corners = _corners(f'{who}: geometry "{name}"', shape, np.array(item.meshScale))
     return Shape(name, "convex mesh", frame, place, located(corners), solid=True)
+
+
+def check_lengths(what: str, shape: CollisionGeometry) -> None:
+    """Check that edges, radii and lengths of a shape are positive. Coal accepts other values.
+
+    Args:
+        what: prefix of error messages.
+        shape: shape of coal.
+
+    Raises:
+        InputError: a length is not positive and finite.
+    """
+    for key, factor in (("halfSide", 2.0), ("radii", 1.0), ("radius", 1.0), ("halfLength", 2.0)):
+        lengths = factor * np.array(getattr(shape, key, 1.0), dtype=float)
+        if not (np.isfinite(lengths).all() and (lengths > 0.0).all()):
+            words = {"halfSide": "edges", "radii": "semi-axes", "halfLength": "length"}.get(key, key)
+            raise InputError(
+                f"{what}: {words} of a {type(shape).__name__} must be positive and finite [m]; "
+                f"got {short_repr(lengths.tolist())}"
+            )
 
 
 def _corners(what: str, mesh: CollisionGeometry, scale: Array) -> Array:

@@ -18,6 +18,7 @@ from pin_nonideal.validation import array, by_name, number
 
 from .joint_layout import COS_SIN_JOINTS, configuration, unit_parts
 from .joint_order import describe_order
+from .scales import slides
 
 # A hand-written quaternion within this distance of unit length is normalized; others are errors.
 WRITTEN_UNIT_TOLERANCE = 1e-3
@@ -130,7 +131,8 @@ def named_joint_values(model: Model, joint_values: object, what: str, others: fl
     """Values of the degrees of freedom from numbers or by joint name, (nv,): torques, gains, limits.
 
     A table (a mapping or a pandas Series) holds, by joint name, one number for all degrees of freedom of the
-    joint, or a number for each.
+    joint, or a number for each. A joint that slides and turns needs a number for each, because their units
+    differ; 0 and infinity have no unit.
 
     Args:
         model: pinocchio.Model.
@@ -153,8 +155,25 @@ def named_joint_values(model: Model, joint_values: object, what: str, others: fl
             part = _values(model, j, 1, value, np.full(size, others), words)
         else:
             part = array(words, value, () if np.ndim(value) == 0 else (size,))
+            if size > 1 and part.ndim == 0 and part != 0.0 and np.isfinite(part):
+                _require_one_unit(model, j, words, float(part))
         values[model.idx_vs[j] : model.idx_vs[j] + size] = part
     return values
+
+
+def _require_one_unit(model: Model, joint: int, what: str, value: float) -> None:
+    """Check that one number may stand for all degrees of freedom of a joint.
+
+    Raises:
+        InputError: some degrees of freedom slide and others turn.
+    """
+    size = model.nvs[joint]
+    sliding = slides(model)[model.idx_vs[joint] : model.idx_vs[joint] + size]
+    if sliding.any() and not sliding.all():
+        raise InputError(
+            f"{what} must have {size} numbers, since some of its degrees of freedom slide and others turn; "
+            f"got {value:g}"
+        )
 
 
 def named_joint_samples(model: Model, joint_samples: object, count: int, what: str) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from types import SimpleNamespace
 
+import coal
 import numpy as np
 import pandas as pd
 import pinocchio as pin
@@ -206,6 +207,25 @@ def test_errors_name_the_nearest_joint(robot, make, message):
     with pytest.raises((pn.InputError, pn.UnknownNameError)) as error:
         make(robot)
     assert message in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "actuation",
+    [
+        {"box": 1.0},
+        lambda t, q, v: {"box": 1.0},
+        pn.SampledControl(lambda t, q, v: {"box": 1.0}, 0.005),
+        pn.HoldPosition({"box": 1.0}, {"box": 0.0}),
+    ],
+)
+def test_one_number_has_no_unit_for_a_joint_that_slides_and_turns(actuation):
+    model = pin.Model()
+    pn.free_body(model, "box", coal.Box(0.1, 0.1, 0.1), mass=1.0)
+    with pytest.raises(
+        pn.PinNonidealError, match=r'of "box" must have 6 numbers.*slide and others turn; got 1'
+    ):
+        pn.simulate(pn.Scene(model, actuation=actuation), 0.01)
+    assert pn.simulate(pn.Scene(model, actuation={"box": 0.0}), 0.01).q.shape[1] == 7
 
 
 def test_namespace_is_no_table():

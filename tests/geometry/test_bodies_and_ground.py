@@ -244,6 +244,14 @@ BOX = coal.Box(0.1, 0.1, 0.1)
             'free_body "a": shape must enclose a volume; a Halfspace of 0 m^3 came: give a solid, or',
         ),
         (
+            lambda m, g: pn.free_body(m, "a", coal.Box(-1.0, 1.0, 1.0), 1.0),
+            'free_body "a": shape: edges of a Box must be positive and finite [m]; got [-1.0, 1.0, 1.0]',
+        ),
+        (
+            lambda m, g: pn.free_body(m, "a", coal.Cylinder(-0.1, 1.0), 1.0),
+            'free_body "a": shape: radius of a Cylinder must be positive and finite [m]; got -0.1',
+        ),
+        (
             lambda m, g: pn.free_body(m, "a", "box", 1.0),
             "free_body \"a\": shape must be a shape of coal, such as coal.Box; got 'box'",
         ),

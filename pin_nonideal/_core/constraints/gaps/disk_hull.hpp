@@ -26,6 +26,11 @@ struct DiskHullRow : ShapeGap {
     double support1(const Vec3& direction) const { return rim * std::hypot(direction[0], direction[1]); }
     double support2(const Vec3& direction) const { return solid.support(direction); }
     double max_depth() const { return radius; }
+    // Over a face, the rim may enter the hull up to half of its width. An edge may not pass the disk.
+    template <class Sides>
+    double max_depth(const Sides& s) const {
+        return radius + (NearestOnDisk<Sides>(s, solid, rim).lowest ? solid.half_width() : 0.0);
+    }
     double depth_to_next_face(const Vec3&) const { return HUGE_VAL; }
     template <class Sides>
     auto normal(const Sides& s) const { return NearestOnDisk<Sides>(s, solid, rim).n; }

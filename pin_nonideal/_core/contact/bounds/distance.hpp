@@ -84,13 +84,22 @@ inline bool is_between_lines(const Kind& kind) {
     return is_line;
 }
 
+// Maximum penetration as `rounded_by`, at the state of the workspace: larger for a rim over a face than beside an edge.
+inline double max_depth(const Program& p, const Workspace& w, int gap) {
+    const Kind& kind = p.blocks[p.gaps[gap].block].kind;
+    const auto* rim = std::get_if<DiskHullRow>(&kind);
+    if (!rim) return rounded_by(kind);
+    const Terms& terms = w.now.terms;
+    return rim->max_depth(Sides<Pose>{{p.mechanism, terms, rim->frame1}, {p.mechanism, terms, rim->frame2}, 0.0});
+}
+
 // Further penetration over which the direction out of contact stays defined, for a gap of a width with `rounded_by`.
 inline double depth_left(const Program& p, const Workspace& w, int gap, double width) {
     double depth = HUGE_VAL;
     visit_as<ShapeGap>(p.blocks[p.gaps[gap].block].kind, [&](const auto& k) {
         const Pose one(p.mechanism, w.now.terms, k.frame1), other(p.mechanism, w.now.terms, k.frame2);
         const Vec3 at = transpose_times(other.R, one.x - other.x);
-        depth = std::min(k.max_depth() + std::min(width, 0.0), k.depth_to_next_face(at));
+        depth = std::min(max_depth(p, w, gap) + std::min(width, 0.0), k.depth_to_next_face(at));
     });
     return depth;
 }

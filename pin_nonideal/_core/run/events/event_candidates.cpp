@@ -105,12 +105,13 @@ bool EventCandidates::may_pull(int gap) {
            -load_rounding(p, w, gap);
 }
 
-std::vector<Watch> EventCandidates::find() {
+std::vector<Watch> EventCandidates::find(const std::vector<int>& arrived) {
     std::vector<Watch> list;
     if (stepper_.method.order > 1) add_pulls(list);
     for (int e : w.now.loaded_elements) {
         if (w.state.mode[e] != sticking) {
-            if (may_stop(e)) list.push_back({Watch::Kind::slip, e});
+            const bool has_arrived = std::find(arrived.begin(), arrived.end(), e) != arrived.end();
+            if (!has_arrived && may_stop(e)) list.push_back({Watch::Kind::slip, e});
         } else if (!w.state.is_hyperstatic && may_reach_limit(e)) {
             list.push_back({Watch::Kind::stick, e});
         }

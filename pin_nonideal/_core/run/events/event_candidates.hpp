@@ -47,9 +47,9 @@ public:
     EventCandidates(System& system, Stepper& stepper, const std::vector<char>& pulls, GapSearch& gaps)
         : system_(system), stepper_(stepper), p(system.p), w(system.w), pulls_(pulls), gaps_(gaps) {}
 
-    // Return the margins that are negative at the step's end, or may have crossed zero inside the step. The workspace
-    // must be evaluated at the step's end.
-    std::vector<Watch> find();
+    // Return the margins that are negative at the step's end, or may have crossed zero inside the step. Slip of the
+    // elements `arrived` ends at the step's end. The workspace must be evaluated at the step's end.
+    std::vector<Watch> find(const std::vector<int>& arrived);
     // Return the speed with which an element of deferred sticking may slip against its mode.
     double allowance(int element) const;
 

@@ -161,10 +161,11 @@ std::optional<FoundEvent> EventLocator::locate() {
     const auto event_of = [&](FoundKind kind, int index) {
         return FoundEvent{kind, index, stepper_.t0 + stepper_.h};
     };
-    for (auto e = w.now.slipping.rbegin(); e != w.now.slipping.rend(); ++e)
-        if (has_arrived(*e) || (follows_drives(*e) && is_stopped(*e))) return event_of(FoundKind::rest_or_limit, *e);
+    std::vector<int> arrived;
+    for (int e : w.now.slipping)
+        if (has_arrived(e) || (follows_drives(e) && is_stopped(e))) arrived.push_back(e);
     time_to_rest_.reset();
-    std::optional<Crossing> crossing = search_.first();
+    std::optional<Crossing> crossing = search_.first(arrived);
     if (crossing) step_onto(*crossing);
     for (int k = 0; k < parameters.max_closed_before && crossing; ++k) {
         const std::optional<Crossing> before = search_.deepest_penetration(crossing->watch);
@@ -173,6 +174,7 @@ std::optional<FoundEvent> EventLocator::locate() {
         step_onto(*crossing);
     }
     if (const auto lifted = releases_.lift_together()) return lifted;  // which may be earlier
+    if (!crossing && !arrived.empty()) return event_of(FoundKind::rest_or_limit, arrived.back());
     if (!crossing || time_to_rest_) return releases_.release_together();
     const Watch& watch = crossing->watch;
     const bool reverses = watch.kind == Watch::Kind::slip && passes_by_rest(watch.index);

@@ -213,8 +213,8 @@ Crossing EventSearch::confirmed(const Crossing& interpolated) {
     return part ? Crossing{watch, *part, slope} : cross(watch, Source::evaluation);
 }
 
-std::optional<Crossing> EventSearch::first() {
-    const std::vector<Watch> watches = candidates_.find();
+std::optional<Crossing> EventSearch::first(const std::vector<int>& arrived) {
+    const std::vector<Watch> watches = candidates_.find(arrived);
     if (watches.empty()) return std::nullopt;
     stepper_.make_interpolant();
     std::vector<std::pair<Crossing, bool>> list;  // crossing, and whether it is confirmed

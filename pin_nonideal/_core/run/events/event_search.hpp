@@ -46,9 +46,9 @@ public:
     // `pulls`: true for each contact in tension at the step's start.
     EventSearch(System& system, Stepper& stepper, const std::vector<char>& pulls, GapWatch& watch);
 
-    // Return the first crossing. The workspace must be evaluated at the step's end. If there is no crossing, the
-    // workspace is evaluated at the step's end again.
-    std::optional<Crossing> first();
+    // Return the first crossing, without the slip of the elements `arrived`. The workspace must be evaluated at the
+    // step's end. If there is no crossing, the workspace is evaluated at the step's end again.
+    std::optional<Crossing> first(const std::vector<int>& arrived);
     // Return the deepest penetrating gap at the end of a repeated step, except the gap `touches`. This gap
     // closed before, because the motion differs slightly from the interpolant.
     std::optional<Crossing> deepest_penetration(const Watch& touches);

@@ -130,6 +130,31 @@ bool ContactProjection::close_gaps(const Program& p, Workspace& w, double t, Vec
     return best > 0;
 }
 
+// Open the closed contacts that depart faster than the loads of the step can prevent. Return true if a contact opens. The
+// elements must be posed.
+bool ContactProjection::open_departing_contacts(const Program& p, Workspace& w, double h, const VecX& v) {
+    const double floor = projection_floor * scene_size(p, w), still = rate_floor(v);
+    measure_rates(p, w, v);
+    departing_.clear();
+    for (int e = 0, row = 0; e < static_cast<int>(elements_.size()); row += elements_[e++].dim)
+        if (gap_[row] >= 0 && w.state.closed[gap_[row]] && r_[row] > still && gap_width(p, w, gap_[row]) > floor)
+            departing_.push_back(e);
+    if (departing_.empty()) return false;
+    responses_.resize(elements_.size());
+    least_.problem.own_responses(departing_, responses_);
+    closed_ = w.state.closed;
+    bool opens = false;
+    for (int e : departing_) {
+        const int row = least_.problem.elements[e].row, gap = gap_[row];
+        const double push = h * std::max(0.0, w.state.percussion[p.blocks[p.gaps[gap].block].row]);
+        if (!(r_[row] > parameters.max_pull * push * responses_[e].c[0][0])) continue;
+        closed_[gap] = 0;
+        opens = true;
+    }
+    if (opens) set_closed(p, w, closed_);
+    return opens;
+}
+
 // Check if a closed contact is left open or penetrates.
 bool ContactProjection::is_open(const Program& p, const Workspace& w) const {
     const double allowed = max_projected_gap * scene_size(p, w);
@@ -221,6 +246,7 @@ bool ContactProjection::correct(const Program& p, Workspace& w, double t, double
                                 VecX& v) {
     mass_matrix(p.mechanism, w.now.terms);
     if (!pose(p, w, true)) return false;
+    if (open_departing_contacts(p, w, h, v) && !pose(p, w, true)) return false;
     const auto total = [&] {
         return kinetic_energy(p.mechanism, w.now.terms, v) + potential_energy(p.mechanism, w.now.terms);
     };

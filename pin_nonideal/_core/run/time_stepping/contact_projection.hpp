@@ -17,6 +17,9 @@ struct ContactProjectionParameters {
     double max_lift = 1.01;
     // Maximum number of choices of closed contacts.
     int max_choices = 4;
+    // A contact that departs opens if its rate needs a pull above this multiple of the push of its step. Over an edge of
+    // small rounding the normal turns within a step, and no load holds a body on the edge.
+    double max_pull = 2.0;
 };
 
 class ContactProjection {
@@ -47,6 +50,7 @@ private:
     void measure_open(const Program& p, Workspace& w, double t, const std::vector<int>& near, const VecX& v);
     bool find_penetrating(const Program& p, Workspace& w, double t, const VecX& v, double allowed);
     bool close_gaps(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
+    bool open_departing_contacts(const Program& p, Workspace& w, double h, const VecX& v);
     bool is_open(const Program& p, const Workspace& w) const;
     bool open_blocked_contacts(const Program& p, Workspace& w);
     void meet_rates(const Program& p, Workspace& w, VecX& v);
@@ -61,6 +65,8 @@ private:
     std::vector<int> gap_;  // by row: gap whose residual it closes, -1 for sliding
     VecX r_, move_, q_from_, q_best_, v_best_, q_start_, v_start_;
     std::vector<char> closed_;
+    std::vector<Mat3> responses_;  // own responses of the elements, by element
+    std::vector<int> departing_;   // elements of contacts that depart
     struct Open {
         int gap;
         double width;  // before the projection, at most 0

@@ -61,7 +61,8 @@ public:
 
 private:
     bool has_known_direction(int gap, double width) const {
-        return width > -MoreauContacts::parameters.nearly_all * rounded_by_[gap];
+        constexpr double nearly_all = MoreauContacts::parameters.nearly_all;
+        return width > -nearly_all * rounded_by_[gap] || width > -nearly_all * max_depth(p, w, gap);
     }
     void select(const std::vector<char>& closed, const std::vector<Mode>& modes, bool flies);
     void begin_sweeps(double t, JointDrives::Step& drives);
