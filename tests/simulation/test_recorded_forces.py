@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -13,7 +14,7 @@ from oracles.reactions import CutTree
 from pin_nonideal.errors import InputError, UnknownNameError
 
 from ..core.friction.test_stiff_friction import sledge
-from ..support.mechanisms import body, empty, frame
+from ..support.mechanisms import GRAVITY, body, empty, frame
 from ..support.refusals import refuses
 from ..support.same_run import assert_same_run
 from ..support.scenes import kinds
@@ -284,6 +285,41 @@ def closed_at_coupler(lengths, ground):
 
 
 # --- Recorded, saved and requested --------------------------------------------------------------------------
+
+
+def held_box(seed):
+    """Return a box between two pads that press too little to hold it, its mass and its acceleration."""
+    rng = np.random.default_rng(seed)
+    mass, press = rng.uniform(0.8, 1.5), rng.uniform(3.0, 6.0)
+    mu = rng.uniform(0.1, 0.9) * mass * GRAVITY / (2.0 * press)
+    model, shapes = pin.Model(), pin.GeometryModel()
+    for name, side in (("left", -1.0), ("right", 1.0)):
+        place = pin.SE3(np.eye(3), np.array([side * 0.04, 0.0, 0.0]))
+        joint = model.addJoint(0, pin.JointModelPX(), place, name)
+        model.appendBodyToJoint(joint, pin.Inertia.FromBox(0.2, 0.02, 0.06, 0.3), pin.SE3.Identity())
+        pad = pin.GeometryObject(name, joint, pin.SE3.Identity(), coal.Box(0.02, 0.06, 0.3))
+        shapes.addGeometryObject(pad)
+    pn.free_body(
+        model, "box", coal.Box(0.06, 0.05, 0.05), mass=mass, collision_model=shapes, place=(0, 0, 0.1)
+    )
+    contacts = [pn.GeometryContact(pad, "box", mu=mu) for pad in ("left", "right")]
+    pressing = pn.Table([0.0], {"left": [press], "right": [-press]})
+    scene = pn.Scene(model, contacts=contacts, collision_model=shapes, actuation=pressing)
+    return scene, mass, 2.0 * mu * press / mass - GRAVITY
+
+
+@pytest.mark.parametrize(("method", "dt"), [("dop853", None), ("moreau", 1e-3)])
+@pytest.mark.parametrize("seed", range(6))
+def test_a_box_slips_out_of_pads_as_its_friction_says(seed, method, dt):
+    """Slip has no direction at the start, and has one from the first step on."""
+    scene, mass, acceleration = held_box(seed)
+    run = pn.simulate(scene, 0.02, method=method, dt=dt, output_dt=1e-3, record=("a", "forces"))
+    np.testing.assert_allclose(run.joint("box").a[:, 2], acceleration, rtol=1e-9)
+    friction = sum(
+        (1.0 if run.contact(name).bodies[0] == "box" else -1.0) * run.contact_forces[name]
+        for name in scene.contact_names
+    )
+    np.testing.assert_allclose(friction[:, 2], mass * (acceleration + GRAVITY), rtol=1e-9)
 
 
 def test_nothing_is_recorded_that_was_not_asked_for():

@@ -22,6 +22,15 @@ void follow_velocity(const Program& p, Workspace& w, int e, ModeQuery& query) {
     if (p.frictions[e].dim > 1) w.state.slip_direction[e] = w.state.last_direction[e] = u.normalized();
 }
 
+void follow_slip(const Program& p, Workspace& w, const VecX& v) {
+    const double min_speed = min_directed_speed * (1.0 + v.cwiseAbs().maxCoeff());
+    for (int e : w.now.slipping) {
+        if (p.frictions[e].dim == 1) continue;
+        const Vec3 u = slip_velocity(w.now, p.frictions[e]);
+        if (u.norm() > min_speed) w.state.slip_direction[e] = w.state.last_direction[e] = u.normalized();
+    }
+}
+
 void follow_projection(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
                        const std::vector<int>& at_rest) {
     if (!w.state.solves_directions) return;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "dynamics/acceleration.hpp"
+#include "dynamics/evaluation.hpp"
 #include "dynamics/step_start.hpp"
 #include "friction/stick_slip.hpp"
 #include "run/events/mode_selection.hpp"
@@ -161,8 +162,8 @@ void TimeStepping::take(double end, double t_end) {
     progress_.is_stationary = y == y_from;
 }
 
-// Elements at rest take their modes from the end of a first step, which costs far less than a solution for
-// accelerations.
+// Elements at rest take their modes and slip directions from the end of a first step, which costs far less than a solution
+// for accelerations.
 void TimeStepping::begin(double size) {
     system_.read(progress_.y);
     std::vector<char> closed = system_.touching.at(p, w, progress_.t, system_.q, system_.v, true).rest;
@@ -173,10 +174,17 @@ void TimeStepping::begin(double size) {
     moreau_contacts_.step(progress_.t, size, y, numerical_energy, impact_energy);
     for (size_t i = 0; i < closed.size(); ++i) closed[i] = closed[i] && w.state.closed[i];
     const std::vector<Mode> modes = w.state.mode;
+    system_.read(y);
+    update_kinematics(p, w, progress_.t + size, system_.q, system_.v);
+    follow_slip(p, w, system_.v);
+    const std::vector<Vec3> directions = w.state.slip_direction;
     set_closed(p, w, closed);
     system_.read(progress_.y);
     ModeQuery first = make_first_mode_query(p, w, progress_.t, system_.q, system_.v);
-    for (int e : first.at_rest) first.modes[e] = modes[e];
+    for (int e : first.at_rest) {
+        first.modes[e] = modes[e];
+        w.state.slip_direction[e] = w.state.last_direction[e] = directions[e];
+    }
     set_contacts(p, w, closed, first.modes);
     if (reads_forces_ || !moreau_contacts_.is_separate())
         system_.evaluate_step_end(progress_.t, progress_.y, progress_.rate, true);
