@@ -10,7 +10,6 @@
 #include "dynamics/reactions.hpp"
 #include "dynamics/friction_limit.hpp"
 #include "dynamics/step_start.hpp"
-#include "friction/mode_query.hpp"
 #include "tree/lie_group.hpp"
 #include "math/tolerances.hpp"
 
@@ -147,7 +146,6 @@ void System::evaluate_step_end(double t, const VecX& y, VecX& dy, bool may_lack_
     read_law_states(y);
     w.now.no_motion = false;
     begin_rows(p, w, t, q, v);
-    follow_slip(p, w, v);  // which may have reversed since the step's start
     // Closed contacts that others hold apart may contradict each other.
     const bool has_motion = attempt_motion(t, may_lack_motion, [&] {
         assemble_forces(p, w, t, v);

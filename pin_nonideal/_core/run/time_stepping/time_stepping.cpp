@@ -108,7 +108,10 @@ void TimeStepping::try_part(double h, double end, double t_end) {
     const bool needs_forces_here = progress_.has_forces = whole && needs_forces(end, t_end);
     if (moreau_contacts_.project(t, progress_.y, progress_.numerical_energy)) {
         progress_.has_forces = needs_forces_here && reads_forces_;
-        if (progress_.has_forces) system_.evaluate_step_end(t, progress_.y, progress_.rate, true);
+        if (!progress_.has_forces) return;
+        const bool bridges = options_.method.scheme != Method::Scheme::moreau;
+        if (!bridges) follow_slip(p, w, system_.v);  // slip may have reversed in the step
+        system_.evaluate_step_end(t, progress_.y, progress_.rate, true);
         return;
     }
     system_.settle(t, progress_.y, progress_.rate, needs_forces_here, true);
