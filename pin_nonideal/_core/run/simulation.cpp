@@ -151,8 +151,8 @@ Simulation::Proposal Simulation::propose() {
     return {size, stop, last};
 }
 
-// Steps without error control are searched always, other steps after a rejection,
-// as a hand-over causes one. Contacts of bodies without a load open at once: near a hand-over their rows can turn singular.
+// Steps without error control are searched always, other steps after a rejection, as a hand-over causes one. Contacts of
+// bodies without a load open at once: near a hand-over their rows can turn singular.
 std::optional<double> Simulation::pass_hand_overs() {
     const bool adaptive = options.method.adaptive();
     hand_over_ahead = false;
