@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from types import SimpleNamespace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pin_nonideal.types import Array, Placement
+
+from .missing_array import MissingArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,8 +99,27 @@ class Stats:
     rounding: float = 0.0
 
 
-@dataclass(frozen=True, eq=False)
-class LawRecord:
+class _Record:
+    """Record with a name, whose text states the shapes of its arrays instead of their numbers."""
+
+    name: str
+
+    def __repr__(self) -> str:
+        shown = [entry.name for entry in fields(self) if entry.repr and entry.name != "name"]  # type: ignore[arg-type]
+        parts = ", ".join(f"{name} {_size(getattr(self, name))}" for name in shown)
+        return f'<{type(self).__name__} "{self.name}": {parts}>'
+
+
+def _size(value: object) -> str:
+    if isinstance(value, np.ndarray):
+        return str(value.shape)
+    if isinstance(value, MissingArray):
+        return "not recorded"
+    return str(len(value)) if isinstance(value, list) else repr(value)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LawRecord(_Record):
     """Force, power, limit and mode of one law over a run.
 
     Arrays that the run did not record are false in a condition; other uses raise an InputError.
@@ -130,8 +151,8 @@ class LawRecord:
         return self._slip()
 
 
-@dataclass(frozen=True, eq=False)
-class UserEventRecord:
+@dataclass(frozen=True, eq=False, repr=False)
+class UserEventRecord(_Record):
     """Zeros of a function of the user.
 
     Attributes:
@@ -151,8 +172,8 @@ class Sample(SimpleNamespace):
     """Run at one instant: the recorded fields of a Trajectory, each without its first axis."""
 
 
-@dataclass(frozen=True, eq=False)
-class JointRecord:
+@dataclass(frozen=True, eq=False, repr=False)
+class JointRecord(_Record):
     """Motion of one joint over a run; arrays (nt,) for one degree of freedom, else (nt, n).
 
     Arrays that the run did not record are false in a condition; other uses raise an InputError.
@@ -173,8 +194,8 @@ class JointRecord:
     tau: Array
 
 
-@dataclass(frozen=True, eq=False)
-class ContactPoints:
+@dataclass(frozen=True, eq=False, repr=False)
+class ContactPoints(_Record):
     """Points of one contact over a run.
 
     Attributes:
@@ -195,8 +216,8 @@ class ContactPoints:
     forces: Array
 
 
-@dataclass(frozen=True, eq=False)
-class ContactRecord:
+@dataclass(frozen=True, eq=False, repr=False)
+class ContactRecord(_Record):
     """Resultant of one contact over a run, of all of its contact points.
 
     Attributes:
@@ -225,8 +246,8 @@ class ContactRecord:
     gap: Array
 
 
-@dataclass(frozen=True, eq=False)
-class FrameRecord:
+@dataclass(frozen=True, eq=False, repr=False)
+class FrameRecord(_Record):
     """Motion of one frame over a run.
 
     Attributes:

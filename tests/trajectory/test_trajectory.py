@@ -339,3 +339,14 @@ def test_other_archives(tmp_path):
     path.write_bytes(buffer.getvalue())
     with cannot_read_because(path):
         pn.Trajectory.load(path)
+
+
+def test_records_show_shapes_instead_of_numbers(run):
+    scene, n = run.scene, len(run)
+    joint, frame = scene.model.names[1], scene.model.frames[-1].name
+    arrays = f"q {(n,)}, v {(n,)}, a {(n,)}, tau {(n,)}"
+    assert repr(run.joint(joint)) == f'<JointRecord "{joint}": {arrays}>'
+    arrays = f"translation {(n, 3)}, rotation {(n, 3, 3)}, velocity {(n, 6)}"
+    assert repr(run.frame(frame)) == f'<FrameRecord "{frame}": {arrays}>'
+    plain = pn.simulate(scene, 0.1, output_dt=0.1).joint(joint)
+    assert repr(plain).endswith("a not recorded, tau not recorded>")
