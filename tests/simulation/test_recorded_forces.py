@@ -287,8 +287,11 @@ def closed_at_coupler(lengths, ground):
 # --- Recorded, saved and requested --------------------------------------------------------------------------
 
 
-def held_box(seed):
-    """Return a box between two pads that press too little to hold it, its mass and its acceleration."""
+def held_box(seed, fixed=False):
+    """Return a box between two pads that press too little to hold it, its mass and its acceleration.
+
+    One pad is `fixed` by a prescribed motion, or presses too.
+    """
     rng = np.random.default_rng(seed)
     mass, press = rng.uniform(0.8, 1.5), rng.uniform(3.0, 6.0)
     mu = rng.uniform(0.1, 0.9) * mass * GRAVITY / (2.0 * press)
@@ -304,15 +307,17 @@ def held_box(seed):
     )
     contacts = [pn.GeometryContact(pad, "box", mu=mu) for pad in ("left", "right")]
     pressing = pn.Table([0.0], {"left": [press], "right": [-press]})
-    scene = pn.Scene(model, contacts=contacts, collision_model=shapes, actuation=pressing)
+    fixing = [pn.PrescribedMotion("left", pn.polynomial([0.0]))] if fixed else []
+    scene = pn.Scene(model, contacts=contacts, collision_model=shapes, actuation=pressing, constraints=fixing)
     return scene, mass, 2.0 * mu * press / mass - GRAVITY
 
 
+@pytest.mark.parametrize("fixed", [False, True])
 @pytest.mark.parametrize(("method", "dt"), [("dop853", None), ("moreau", 1e-3)])
 @pytest.mark.parametrize("seed", range(6))
-def test_a_box_slips_out_of_pads_as_its_friction_says(seed, method, dt):
+def test_a_box_slips_out_of_pads_as_its_friction_says(seed, method, dt, fixed):
     """Slip has no direction at the start, and has one from the first step on."""
-    scene, mass, acceleration = held_box(seed)
+    scene, mass, acceleration = held_box(seed, fixed)
     run = pn.simulate(scene, 0.02, method=method, dt=dt, output_dt=1e-3, record=("a", "forces"))
     np.testing.assert_allclose(run.joint("box").a[:, 2], acceleration, rtol=1e-9)
     friction = sum(

@@ -241,7 +241,7 @@ void Program::finish() {
     for (const Angle& angle : mechanism.angles)
         if (constrained[angle.joint]) constrained_angles.push_back(angle);
     driven = !forces.empty() || !std::holds_alternative<NoActuation>(actuation);
-    calls_functions = std::holds_alternative<TorqueFunction>(actuation) || user_laws > 0 || moves_in_time;
+    calls_functions = std::holds_alternative<TorqueFunction>(actuation) || user_laws > 0;
     for (const Friction& f : frictions) calls_functions |= f.user_limit != nullptr;
     for (const GivenForce& each : forces)
         std::visit([&](const auto& f) {

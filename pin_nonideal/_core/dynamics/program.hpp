@@ -86,7 +86,9 @@ struct Program {
     bool driven_exactly = false;   // some constraint does, and all rates are exact derivatives, not differences
     std::vector<double> breaks;    // known break times of the functions of time, ascending
     bool searches_breaks = false;  // some user function of time does not declare its breaks
-    bool calls_functions = false;  // user functions may change the forces while nothing moves
+    bool calls_functions = false;  // the forces depend on user functions
+    // Check if forces may change while nothing moves.
+    bool changes_at_rest() const { return calls_functions || moves_in_time; }
     bool has_user_rows = false;    // some rows come from user functions, A and b together
     bool affine_rates = true;      // the rate of every row is A(q, t) v + phi_t
     std::vector<int> constrained_joints;     // joints whose bodies the constraints tie, and their ancestors in the tree

@@ -43,10 +43,29 @@ static double unseen(const Program& p, Workspace& w, const VecX& v) {
                          (scaled_length(p, w, w.now.a) + speed * v.cwiseAbs().maxCoeff());
 }
 
+// Largest centripetal acceleration along a rounded edge of the closed contacts. The terms of a gap's bias are as large, and
+// may cancel.
+static double centripetal_acceleration(const Program& p, const Workspace& w) {
+    double largest = 0.0;
+    for (int gap : w.now.closed_gaps) {
+        const int i = p.gaps[gap].block;
+        const Block& block = p.blocks[i];
+        double radius = HUGE_VAL;
+        visit_as<ShapeGap>(block.kind, [&](const auto& k) { radius = k.max_depth(); });
+        if (!(radius < HUGE_VAL) || block.kept.empty()) continue;
+        const Vec3& point = w.now.values[i].wrench[0].point;
+        const auto velocity = [&](int joint) {
+            return joint == 0 ? Vec3(Vec3::Zero()) : velocity_at(w.now.terms.body[joint], point);
+        };
+        largest = std::max(largest, (velocity(block.joint1) - velocity(block.joint2)).squaredNorm() / radius);
+    }
+    return largest;
+}
+
 // Find the block with the largest residual of its dependent rows. Return -1 if the motion satisfies all dependent rows.
 static int contradicting_block(const Program& p, Workspace& w, const VecX& v, double& worst) {
     int worst_block = -1;
-    double excess = 1.0;
+    double excess = 1.0, turning = 0.0;
     std::optional<double> lacking;  // for a row of unit length
     const double reach = w.now.a.cwiseAbs().maxCoeff() + p.mechanism.gravity.norm() +
                          step_start_parameters.background;  // scale of accelerations
@@ -66,8 +85,12 @@ static int contradicting_block(const Program& p, Workspace& w, const VecX& v, do
             double allowed =
                 step_start_parameters.consistency_tolerance * (size + step_start_parameters.background * reach);
             if (std::abs(sum) <= allowed * excess) continue;
-            if (!lacking) lacking = unseen(p, w, v);
-            allowed += *lacking / w.now.rows.chosen_scale[row];
+            if (!lacking) {
+                lacking = unseen(p, w, v);
+                turning = step_start_parameters.consistency_tolerance * step_start_parameters.background *
+                          centripetal_acceleration(p, w);
+            }
+            allowed += *lacking / w.now.rows.chosen_scale[row] + turning;
             if (std::abs(sum) > allowed * excess) {
                 excess = std::abs(sum) / allowed;
                 worst = sum;
@@ -182,16 +205,16 @@ void project_into_modes(const Program& p, Workspace& w, double t, VecX& q, VecX&
     project(p, w, t, q, v);
 }
 
-bool begin_step_on_rates(const Program& p, Workspace& w, double t, VecX& v, bool chosen, bool evaluates) {
+bool meet_rates(const Program& p, Workspace& w, double t, VecX& v) {
     if (w.state.steps_since != undecided_steps) ++w.state.steps_since;
-    const bool moved = project_velocity(p, w, t, v);
-    if (evaluates) continue_step(p, w, t, v, chosen);
-    return moved;
+    return project_velocity(p, w, t, v);
 }
 
 bool begin_step_on_rates(const Program& p, Workspace& w, double t, VecX& v) {
     const bool chosen = configure_step(p, w);
-    return begin_step_on_rates(p, w, t, v, chosen, true);
+    const bool moved = meet_rates(p, w, t, v);
+    continue_step(p, w, t, v, chosen);
+    return moved;
 }
 
 }  // namespace pn

@@ -36,9 +36,8 @@ bool configure_step(const Program& p, Workspace& w, int max_rank = INT_MAX);
 int max_rank_near(const Workspace& w);
 // Choose the rows in a configured workspace, project v onto A v + phi_t = 0, and evaluate. Return true if v changed.
 bool begin_step_on_rates(const Program& p, Workspace& w, double t, VecX& v);
-// Do the same without a choice of rows: `chosen` is true if the rows were just chosen. Skip the evaluation unless
-// `evaluates`.
-bool begin_step_on_rates(const Program& p, Workspace& w, double t, VecX& v, bool chosen, bool evaluates);
+// Do the same without the choice and without the evaluation.
+bool meet_rates(const Program& p, Workspace& w, double t, VecX& v);
 // Keep bodies moving after a change of modes. If newly chosen rows would stop the motion, rows of closed contacts and
 // sticking elements that nearly depend on others count as dependent from now on. The workspace is evaluated at (q, v)
 // before and after the call.

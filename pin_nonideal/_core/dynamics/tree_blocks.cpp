@@ -13,7 +13,8 @@ constexpr double max_pivot_ratio = 1e6;
 // number, and rounding by the fourth power of the depth.
 constexpr int max_deep_dofs = 200;
 
-TreeBlocks::TreeBlocks(const Program& p) : size_(p.mechanism.nv, 0), node_(p.mechanism.nv, -1) {
+TreeBlocks::TreeBlocks(const Program& p)
+    : size_(p.mechanism.nv, 0), is_held_(p.mechanism.nv, 0), node_(p.mechanism.nv, -1) {
     const Mechanism& m = p.mechanism;
     for (int dof = 0; dof < m.nv; ++dof) {
         const int root = m.dof_parent[dof] < 0 ? dof : root_[m.dof_parent[dof]];
@@ -21,6 +22,28 @@ TreeBlocks::TreeBlocks(const Program& p) : size_(p.mechanism.nv, 0), node_(p.mec
         local_.push_back(size_[root]++);
         applies_ = applies_ && root + local_[dof] == dof && (!m.is_deep[dof] || size_[root] <= max_deep_dofs);
     }
+}
+
+void TreeBlocks::hold_prescribed(const Program& p) {
+    for (int i = 0; i < p.first_gap; ++i) {
+        const Block& block = p.blocks[i];
+        if (block.kept.empty()) continue;
+        const MotionRows* motion = std::get_if<MotionRows>(&block.kind);
+        const int dof = motion ? p.mechanism.joints[motion->joint].iv : -1;
+        applies_ = applies_ && motion && !is_held_[dof];  // two motions of one dof may contradict each other
+        if (!applies_) return;
+        held_.push_back({i, dof});
+        is_held_[dof] = 1;
+    }
+}
+
+void TreeBlocks::add_held(const VecX& x, VecX& rows) const {
+    for (const HeldEntry& entry : held_entries_) rows[entry.row] += entry.value * x[entry.dof];
+}
+
+// Check if the row of a block moves a dof that is not held.
+bool TreeBlocks::moves(const Block& block) const {
+    return std::any_of(block.support().begin(), block.support().end(), [&](int dof) { return !is_held_[dof]; });
 }
 
 // Check the ratio of the pivots of a tree, in units of its dofs. Pivots of different trees may differ by any factor.
@@ -50,14 +73,21 @@ int TreeBlocks::node_of(const Program& p, const Workspace& w, int root, BlockPro
     BlockMap M = problem.add_node(size_[root], root);
     if (p.mechanism.is_deep[root]) {
         mass_matrix_articulated(p.mechanism, w.now.terms, root, size_[root], composite_, M.data());
-        return node;
-    }
-    for (int dof = root; dof < root + size_[root]; ++dof) {
-        const int begin = p.mechanism.row_offset[dof];
-        for (int s = 0; s <= p.mechanism.depth[dof]; ++s) {
-            const int j = local_[p.mechanism.ancestors[begin + s]];
-            M(local_[dof], j) = M(j, local_[dof]) = w.now.terms.M[begin + s];
+    } else {
+        for (int dof = root; dof < root + size_[root]; ++dof) {
+            const int begin = p.mechanism.row_offset[dof];
+            for (int s = 0; s <= p.mechanism.depth[dof]; ++s) {
+                const int j = local_[p.mechanism.ancestors[begin + s]];
+                M(local_[dof], j) = M(j, local_[dof]) = w.now.terms.M[begin + s];
+            }
         }
+    }
+    for (const Held& held : held_) {
+        if (root_[held.dof] != root) continue;
+        const int i = local_[held.dof];
+        M.row(i).setZero();
+        M.col(i).setZero();
+        M(i, i) = 1.0;
     }
     return node;
 }
@@ -65,6 +95,7 @@ int TreeBlocks::node_of(const Program& p, const Workspace& w, int root, BlockPro
 bool TreeBlocks::fill(const Program& p, const Workspace& w, const std::vector<StepRow>& rows,
                       const std::vector<ConeElement>& cones, BlockProblem& problem) {
     problem.clear();
+    held_entries_.clear();
     std::fill(node_.begin(), node_.end(), -1);
     size_t at = 0;
     for (const ConeElement& cone : cones) {
@@ -72,7 +103,7 @@ bool TreeBlocks::fill(const Program& p, const Workspace& w, const std::vector<St
         for (int k = 0; k < cone.dim; ++k)
             for (int dof : p.blocks[rows[at + k].block].support()) {
                 const int root = root_[dof];
-                if (root == trees[0] || root == trees[1]) continue;
+                if (is_held_[dof] || root == trees[0] || root == trees[1]) continue;
                 if (trees[1] >= 0) return false;
                 trees[trees[0] >= 0] = root;
             }
@@ -84,9 +115,11 @@ bool TreeBlocks::fill(const Program& p, const Workspace& w, const std::vector<St
         BlockElement& e = problem.elements[problem.add_element(cone, first, second)];
         for (int k = 0; k < cone.dim; ++k, ++at) {
             const Block& block = p.blocks[rows[at].block];
+            if (!held_.empty() && !moves(block)) return false;
             const double* entry = w.now.A.data() + block.offset + rows[at].k;
             for (int dof : block.support()) {
-                problem.jacobian(e, root_[dof] != trees[0])(k, local_[dof]) = *entry;
+                if (is_held_[dof]) held_entries_.push_back({static_cast<int>(at), dof, *entry});
+                else problem.jacobian(e, root_[dof] != trees[0])(k, local_[dof]) = *entry;
                 entry += block.kept.size();
             }
             if (cone.dim == 1 && block.dof >= 0) e.column = local_[block.dof];

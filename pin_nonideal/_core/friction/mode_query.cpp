@@ -22,10 +22,10 @@ void follow_velocity(const Program& p, Workspace& w, int e, ModeQuery& query) {
     if (p.frictions[e].dim > 1) w.state.slip_direction[e] = w.state.last_direction[e] = u.normalized();
 }
 
-void follow_slip(const Program& p, Workspace& w, const VecX& v) {
+void follow_slip(const Program& p, Workspace& w, const VecX& v, const std::vector<int>& at_rest) {
     const double min_speed = min_directed_speed * (1.0 + v.cwiseAbs().maxCoeff());
     for (int e : w.now.slipping) {
-        if (p.frictions[e].dim == 1) continue;
+        if (p.frictions[e].dim == 1 || std::find(at_rest.begin(), at_rest.end(), e) != at_rest.end()) continue;
         const Vec3 u = slip_velocity(w.now, p.frictions[e]);
         if (u.norm() > min_speed) w.state.slip_direction[e] = w.state.last_direction[e] = u.normalized();
     }
@@ -35,12 +35,7 @@ void follow_projection(const Program& p, Workspace& w, double t, const VecX& q, 
                        const std::vector<int>& at_rest) {
     if (!w.state.solves_directions) return;
     update_kinematics(p, w, t, q, v);
-    const double min_speed = min_directed_speed * (1.0 + v.cwiseAbs().maxCoeff());
-    for (int e : w.now.slipping) {
-        if (p.frictions[e].dim == 1 || std::find(at_rest.begin(), at_rest.end(), e) != at_rest.end()) continue;
-        const Vec3 u = slip_velocity(w.now, p.frictions[e]);
-        if (u.norm() > min_speed) w.state.slip_direction[e] = w.state.last_direction[e] = u.normalized();
-    }
+    follow_slip(p, w, v, at_rest);
 }
 
 ModeQuery make_mode_query(const Program& p, Workspace& w, const VecX& v, int also) {

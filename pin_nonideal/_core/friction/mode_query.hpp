@@ -27,8 +27,9 @@ ModeQuery make_mode_query(const Program& p, Workspace& w, const VecX& v, int als
 ModeQuery make_first_mode_query(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 // Set the mode of a moving element from its slip velocity in the rows last evaluated.
 void follow_velocity(const Program& p, Workspace& w, int element, ModeQuery& query);
-// Set the slip directions of moving elements from their slip velocities in the rows last evaluated.
-void follow_slip(const Program& p, Workspace& w, const VecX& v);
+// Set the slip directions of moving elements from their slip velocities in the rows last evaluated, except for elements at
+// rest.
+void follow_slip(const Program& p, Workspace& w, const VecX& v, const std::vector<int>& at_rest = {});
 // Set the slip directions of moving elements again after a projection, if steps solve for directions. The explicit method
 // reads the slip velocities themselves. Updates the kinematics.
 void follow_projection(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,

@@ -128,7 +128,7 @@ Simulation::Proposal Simulation::propose() {
         stop = std::min(stop, options.t0 + (whole_lengths(progress.t - options.t0, options.dt) + 1.0) * options.dt);
     const double remaining = stop - progress.t;
     double size = adaptive ? progress.h : remaining;
-    if (adaptive && p.calls_functions && (system.velocity(progress.y).array() == 0.0).all()) {
+    if (adaptive && p.changes_at_rest() && (system.velocity(progress.y).array() == 0.0).all()) {
         const double since = out.events.empty() ? options.t0 : out.events.back().time;
         size = std::min(size, std::max(parameters.rest_step, parameters.rest_part_step * (progress.t - since)));
     }
@@ -305,7 +305,7 @@ bool Simulation::locate_event(const Proposal& proposal) {
 // acceleration at the step's end.
 bool Simulation::leaves_rate(const Proposal& proposal) const {
     return stops_there && proposal.last && proposal.stop >= t_end && !options.method.adaptive() &&
-           !system.has_events() && system.nz == 0 && !p.calls_functions && value_events.empty() &&
+           !system.has_events() && system.nz == 0 && !p.changes_at_rest() && value_events.empty() &&
            !options.record.evaluates() && !options.record.dense && !options.callback && !options.save;
 }
 

@@ -19,9 +19,11 @@ ConeStatus ConeComplementarity::solve(const Eigen::Ref<const MatX>& W, const Eig
     if (!is_solved && brief_) return ConeStatus::failed;
     const ConeStatus status = is_solved ? ConeStatus::solved : find_certificate(problem_, certificate_);
     if (status == ConeStatus::failed) is_solved = random_restarts(x, [] { return true; });
-    if (is_solved && uniform_compliance_) compliance_continuation(x);
+    const int needed = newton_.steps() - steps;
+    const bool as_it_was = warm && may_keep_shares && needed == 0;
+    const bool continues = warm && (newton_.regular() || needed <= parameters.few_steps);
+    if (is_solved && uniform_compliance_ && !continues) compliance_continuation(x);
     unique_shares_ = newton_.regular();
-    const bool as_it_was = warm && may_keep_shares && newton_.steps() == steps;
     if (is_solved && !unique_shares_ && !as_it_was) {
         auto even = f_.vector(n);
         even = x;

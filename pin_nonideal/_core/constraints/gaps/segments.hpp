@@ -11,7 +11,8 @@ namespace pn {
 // Largest squared sine of the angle between segments that count as parallel.
 constexpr double parallel_segments = 1e-12;
 
-// Segments x + s e, |s| <= half, of frames 1 and 2 along their z axes.
+// Segments x + s e, |s| <= half, of frames 1 and 2 along their z axes. The direction between points inside both segments is
+// perpendicular to both lines. If the lines are close to each other, the difference of the points is mostly rounding.
 template <class Sides>
 struct NearestPoints {
     using Vec = typename Sides::Vec;
@@ -20,6 +21,7 @@ struct NearestPoints {
     Vec n;                     // from the second point to the first
     Scalar distance;
     bool free1 = false, free2 = false;  // the point lies inside its segment, not at an end
+    Scalar sine = 0.0;  // of the angle between the lines if n is perpendicular to both, else 0
 
     PN_INLINE NearestPoints(const Sides& s, double half1, double half2)
         : e1(s.a.R * Vec3::UnitZ()), e2(s.b.R * Vec3::UnitZ()) {
@@ -39,7 +41,13 @@ struct NearestPoints {
         c2 = s.b.x + s2 * e2;
         const Vec d = c1 - c2;
         distance = d.norm();
-        n = distance > 0.0 ? Vec(d / distance) : Vec(Vec3::UnitZ());
+        if (free1 && free2 && square > parallel_segments) {
+            const Vec across = e1.cross(e2);
+            sine = across.norm();
+            n = Vec(across / (d.dot(across) < 0.0 ? -sine : sine));
+        } else {
+            n = distance > 0.0 ? Vec(d / distance) : Vec(Vec3::UnitZ());
+        }
     }
 
 private:
@@ -77,8 +85,14 @@ struct NearestMotion {
         }
         along1 = rate1 * p.e1;
         along2 = rate2 * p.e2;
-        const Vec dd = u + along1 - along2;
-        if (p.distance > 0.0) dn = (dd - p.n.dot(dd) * p.n) / p.distance;
+        if (p.sine > 0.0) {
+            const Vec across = s.a.omega().cross(p.e1).cross(p.e2) + p.e1.cross(s.b.omega().cross(p.e2));
+            const Vec turn = (p.n.dot(p.e1.cross(p.e2)) < 0.0 ? -across : across) / p.sine;
+            dn = turn - p.n.dot(turn) * p.n;
+        } else if (p.distance > 0.0) {
+            const Vec dd = u + along1 - along2;
+            dn = (dd - p.n.dot(dd) * p.n) / p.distance;
+        }
     }
 };
 

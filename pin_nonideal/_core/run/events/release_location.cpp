@@ -118,7 +118,7 @@ double ReleaseLocator::release_part(double rate, const std::vector<Mode>& modes,
 // Check sticking elements inside a step at rest, and end the step at the first place of release. Return their slip
 // acceleration there. Steps at rest can be long relative to changes of user functions.
 std::optional<double> ReleaseLocator::release_rate_inside(const std::vector<Mode>& modes, ModeQuery& mode_query) {
-    if (!p.calls_functions || (system_.velocity(stepper_.y1).array() != 0.0).any()) return std::nullopt;
+    if (!p.changes_at_rest() || (system_.velocity(stepper_.y1).array() != 0.0).any()) return std::nullopt;
     const double whole = stepper_.h;
     for (int k = 1; k < parameters.places_inside; ++k) {
         const double t = stepper_.t0 + whole * k / parameters.places_inside;

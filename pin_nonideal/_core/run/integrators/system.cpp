@@ -10,6 +10,7 @@
 #include "dynamics/reactions.hpp"
 #include "dynamics/friction_limit.hpp"
 #include "dynamics/step_start.hpp"
+#include "friction/mode_query.hpp"
 #include "tree/lie_group.hpp"
 #include "math/tolerances.hpp"
 
@@ -25,7 +26,7 @@ System::System(const Program& program, Workspace& workspace, bool with_energy)
       q(VecX::Zero(nq)), v(VecX::Zero(nv)), q_before_(q) {}
 
 bool System::stands(const VecX& y, const VecX& dy) const {
-    const bool in_time = p.calls_functions || p.moves_in_time || p.torque_table() != nullptr;
+    const bool in_time = p.changes_at_rest() || p.torque_table() != nullptr;
     return !in_time && (velocity(y).array() == 0.0).all() && (dy.head(ns).array() == 0.0).all();
 }
 
@@ -154,7 +155,7 @@ void System::evaluate_step_end(double t, const VecX& y, VecX& dy, bool may_lack_
     write_rate(t, dy, has_motion && !may_lack_motion);
 }
 
-void System::settle(double t, VecX& y, VecX& dy, bool evaluates, bool may_lack_motion) {
+void System::settle(double t, VecX& y, VecX& dy, bool evaluates, bool may_lack_motion, SlipDirection directions) {
     read(y);
     read_law_states(y);
     numerical_energy = 0.0;
@@ -185,8 +186,12 @@ void System::settle(double t, VecX& y, VecX& dy, bool evaluates, bool may_lack_m
     require_closed(p, w, t);
     if (past_sticking || (moved && evaluates)) chosen = configure_step(p, w);
     moved |= past_sticking;
-    const bool has_motion =
-        attempt_motion(t, may_lack_motion, [&] { moved |= begin_step_on_rates(p, w, t, v, chosen, evaluates); });
+    const bool has_motion = attempt_motion(t, may_lack_motion, [&] {
+        moved |= meet_rates(p, w, t, v);
+        if (!evaluates) return;
+        if (directions == SlipDirection::of_end) follow_slip(p, w, v);
+        continue_step(p, w, t, v, chosen);
+    });
     moved |= !has_motion;
     write(y);
     if (evaluates) write_rate(t, dy, has_motion && !may_lack_motion);

@@ -64,7 +64,8 @@ struct System {
     // Project the end of a step of time stepping, whose modes have just been set. Evaluate only if `evaluates`.
     // `may_lack_motion`: the run locates no events, and if these modes have no motion, slipping elements keep the
     // friction of the step.
-    void settle(double t, VecX& y, VecX& dy, bool evaluates, bool may_lack_motion);
+    enum class SlipDirection { of_step, of_end };  // directions of slip at which the end is evaluated
+    void settle(double t, VecX& y, VecX& dy, bool evaluates, bool may_lack_motion, SlipDirection directions);
     // Evaluate the projected end of such a step.
     void evaluate_step_end(double t, const VecX& y, VecX& dy, bool may_lack_motion);
     // Check if y needs no projection. The quantities of a sample at y are then evaluated.

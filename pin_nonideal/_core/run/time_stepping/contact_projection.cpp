@@ -19,6 +19,7 @@ static void hold_locked(const Program& p, const Workspace& w, VecX& x) {
 ContactProjection::ContactProjection(const Program& p)
     : blocks_(p), flyers_(MeanVelocity::flyers(p)), r_(VecX::Zero(p.layout.rows)), move_(VecX::Zero(p.mechanism.nv)) {
     least_.lever = p.mechanism.lever;
+    blocks_.hold_prescribed(p);
     for (const Joint& joint : p.mechanism.joints) weight_ += joint.mass * p.mechanism.gravity.norm();
 }
 
@@ -84,11 +85,13 @@ double ContactProjection::measure_rates(const Program& p, Workspace& w, const Ve
     return largest;
 }
 
-static double rate_floor(const VecX& v) { return projection_floor * std::max(1.0, v.cwiseAbs().maxCoeff()); }
+ContactRounding::ContactRounding(const Program& p, const Workspace& w, const VecX& v)
+    : gap(projection_floor * scene_size(p, w)), rate(projection_floor * std::max(1.0, v.cwiseAbs().maxCoeff())) {}
 
 // Check if gaps and rates are zero up to rounding, and no tree is slow enough to come to rest.
 bool ContactProjection::is_projected(const Program& p, Workspace& w, const VecX& v) {
-    return measure_gaps(p, w) <= projection_floor * scene_size(p, w) && measure_rates(p, w, v) <= rate_floor(v) &&
+    const ContactRounding rounding(p, w, v);
+    return measure_gaps(p, w) <= rounding.gap && measure_rates(p, w, v) <= rounding.rate &&
            !blocks_.has_slow_tree(v, immobile_speed);
 }
 
@@ -133,11 +136,12 @@ bool ContactProjection::close_gaps(const Program& p, Workspace& w, double t, Vec
 // Open the closed contacts that depart faster than the loads of the step can prevent. Return true if a contact opens. The
 // elements must be posed.
 bool ContactProjection::open_departing_contacts(const Program& p, Workspace& w, double h, const VecX& v) {
-    const double floor = projection_floor * scene_size(p, w), still = rate_floor(v);
+    const ContactRounding rounding(p, w, v);
     measure_rates(p, w, v);
     departing_.clear();
     for (int e = 0, row = 0; e < static_cast<int>(elements_.size()); row += elements_[e++].dim)
-        if (gap_[row] >= 0 && w.state.closed[gap_[row]] && r_[row] > still && gap_width(p, w, gap_[row]) > floor)
+        if (gap_[row] >= 0 && w.state.closed[gap_[row]] && r_[row] > rounding.rate &&
+            gap_width(p, w, gap_[row]) > rounding.gap)
             departing_.push_back(e);
     if (departing_.empty()) return false;
     responses_.resize(elements_.size());
@@ -146,8 +150,8 @@ bool ContactProjection::open_departing_contacts(const Program& p, Workspace& w, 
     bool opens = false;
     for (int e : departing_) {
         const int row = least_.problem.elements[e].row, gap = gap_[row];
-        const double push = h * std::max(0.0, w.state.percussion[p.blocks[p.gaps[gap].block].row]);
-        if (!(r_[row] > parameters.max_pull * push * responses_[e].c[0][0])) continue;
+        const double impulse = h * w.state.percussion[p.blocks[p.gaps[gap].block].row];
+        if (!departs(r_[row], impulse, responses_[e].c[0][0])) continue;
         closed_[gap] = 0;
         opens = true;
     }
@@ -203,7 +207,7 @@ bool ContactProjection::find_penetrating(const Program& p, Workspace& w, double 
 
 void ContactProjection::meet_rates(const Program& p, Workspace& w, VecX& v) {
     double last = HUGE_VAL;
-    const double floor = rate_floor(v);
+    const double floor = ContactRounding(p, w, v).rate;
     for (int k = 0; k < parameters.max_moves; ++k) {
         const double largest = measure_rates(p, w, v);
         if (k > parameters.sure_moves && largest > parameters.stall_ratio * last) return;
@@ -222,6 +226,29 @@ void ContactProjection::rest(const Program& p, Workspace& w, VecX& v) {
             v.segment(node.first, node.size).setZero();
     }
     hold_locked(p, w, v);
+    for (const TreeBlocks::Held& held : blocks_.held()) v[held.dof] = -w.now.values[held.block].phi_t[0];
+}
+
+// Set the positions and velocities of prescribed motions.
+void ContactProjection::meet_prescribed(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
+    if (blocks_.held().empty()) return;
+    const auto total = [&] {
+        mass_matrix(p.mechanism, w.now.terms);
+        return kinetic_energy(p.mechanism, w.now.terms, v) + potential_energy(p.mechanism, w.now.terms);
+    };
+    const double before = energy ? total() : 0.0;
+    move_.setZero();
+    for (const TreeBlocks::Held& held : blocks_.held()) {
+        move_[held.dof] = -w.now.values[held.block].residual[0];
+        v[held.dof] = -w.now.values[held.block].phi_t[0];
+    }
+    if (move_.any()) {
+        q_from_ = q;
+        retract(p.mechanism, q_from_.data(), move_.data(), q.data());
+        place_bodies(p.mechanism, w.now.terms, q);
+        place_rows(p, w, t, v);
+    }
+    if (energy) moved_energy_ = total() - before;
 }
 
 bool ContactProjection::project(const Program& p, Workspace& w, double t, double h, const std::vector<int>& near, VecX& q,
@@ -232,9 +259,16 @@ bool ContactProjection::project(const Program& p, Workspace& w, double t, double
     w.now.renew();
     place_bodies(p.mechanism, w.now.terms, q);
     place_rows(p, w, t, v);
+    q_before_ = q;
+    v_before_ = v;
+    meet_prescribed(p, w, t, q, v);
     gather(p, w, true);
     if (is_projected(p, w, v)) hold_locked(p, w, v);
-    else if (!correct(p, w, t, h, near, q, v)) return false;
+    else if (!correct(p, w, t, h, near, q, v)) {
+        q = q_before_;
+        v = v_before_;
+        return false;
+    }
     move_bodies(p.mechanism, w.now.terms, v);
     for (int e : w.now.slipping) move_block(p, w, t, v, p.frictions[e].block);
     ++w.counters.projections;
@@ -278,7 +312,7 @@ bool ContactProjection::correct(const Program& p, Workspace& w, double t, double
     else if (moves) blocks_.fill(p, w, rows_, elements_, least_.problem);
     meet_rates(p, w, v);
     rest(p, w, v);
-    if (energy) moved_energy_ = total() - before;
+    if (energy) moved_energy_ += total() - before;
     return true;
 }
 

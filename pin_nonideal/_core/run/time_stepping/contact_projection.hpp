@@ -1,4 +1,5 @@
-// Projection after a time step onto closed contacts and sticking friction, on trees that no constraint joins.
+// Projection after a time step onto closed contacts, sticking friction and prescribed motions, on trees that no other
+// constraint joins.
 #pragma once
 
 #include "complementarity/blocks/least_move.hpp"
@@ -22,6 +23,12 @@ struct ContactProjectionParameters {
     double max_pull = 2.0;
 };
 
+// Rounding of the gaps and rates of closed contacts at the end of a step with velocity v.
+struct ContactRounding {
+    double gap, rate;
+    ContactRounding(const Program& p, const Workspace& w, const VecX& v);
+};
+
 class ContactProjection {
 public:
     using Parameters = ContactProjectionParameters;
@@ -35,7 +42,13 @@ public:
     // hold, with a velocity of rounding, comes to rest. Return false, with q and v unchanged, if the trees cannot be
     // projected one by one.
     bool project(const Program& p, Workspace& w, double t, double h, const std::vector<int>& near, VecX& q, VecX& v);
+    bool has_prescribed() const { return !blocks_.held().empty(); }  // prescribed motions, which the projection meets
     double numerical_energy() const { return moved_energy_; }  // energy that the last projection added, if `energy`
+    // Check if a closed contact that opens at this rate must open, for the impulse that pushed it in the step and its
+    // response to a unit impulse.
+    static bool departs(double rate, double impulse, double response) {
+        return rate > parameters.max_pull * std::max(0.0, impulse) * response;
+    }
 
     bool energy = false;  // measure the energy
 
@@ -46,6 +59,7 @@ private:
     double measure_gaps(const Program& p, const Workspace& w);
     double measure_rates(const Program& p, Workspace& w, const VecX& v);
     bool is_projected(const Program& p, Workspace& w, const VecX& v);
+    void meet_prescribed(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
     bool correct(const Program& p, Workspace& w, double t, double h, const std::vector<int>& near, VecX& q, VecX& v);
     void measure_open(const Program& p, Workspace& w, double t, const std::vector<int>& near, const VecX& v);
     bool find_penetrating(const Program& p, Workspace& w, double t, const VecX& v, double allowed);
@@ -63,7 +77,7 @@ private:
     std::vector<StepRow> rows_;
     std::vector<ConeElement> elements_;
     std::vector<int> gap_;  // by row: gap whose residual it closes, -1 for sliding
-    VecX r_, move_, q_from_, q_best_, v_best_, q_start_, v_start_;
+    VecX r_, move_, q_from_, q_best_, v_best_, q_start_, v_start_, q_before_, v_before_;
     std::vector<char> closed_;
     std::vector<Mat3> responses_;  // own responses of the elements, by element
     std::vector<int> departing_;   // elements of contacts that depart

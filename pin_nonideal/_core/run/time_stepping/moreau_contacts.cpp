@@ -112,14 +112,38 @@ void MoreauContacts::step(double t, double h, VecX& y, double& numerical_energy,
 }
 
 bool MoreauContacts::project(double t, VecX& y, double& numerical_energy) {
-    if (!forces_.is_separate()) return false;
+    if (!forces_.is_separate()) {
+        open_departing_contacts(t, y);
+        return false;
+    }
     const bool rests = (v0_.array() == 0.0).all() && (v1_.array() == 0.0).all() && same_bytes(closed_, was_closed_);
-    if (rests || (w.now.closed_gaps.empty() && w.now.loaded_elements.empty())) return true;
+    const bool is_free = rests || (w.now.closed_gaps.empty() && w.now.loaded_elements.empty());
+    if (is_free && !projection_.has_prescribed()) return true;
     system_.read(y);
     if (!projection_.project(p, w, t, h_, watch_.gaps.monitored_gaps, system_.q, system_.v)) return false;
     system_.write(y);
     numerical_energy += projection_.numerical_energy();
     return true;
+}
+
+// As ContactProjection::open_departing_contacts, with the responses of the step under the constraints.
+void MoreauContacts::open_departing_contacts(double t, const VecX& y) {
+    if (w.now.closed_gaps.empty()) return;
+    system_.read(y);
+    kinematics(p.mechanism, w.now.terms, system_.q, system_.v);
+    const ContactRounding rounding(p, w, system_.v);
+    bool opens = false;
+    for (size_t e = 0, at = 0; e < elements_.parts.size(); at += elements_.cones[e++].dim) {
+        const int gap = elements_.parts[e].gap;
+        if (gap < 0 || !closed_[gap]) continue;
+        follow_gap(p, w, t, system_.v, gap);
+        const double rate = gap_rate(p, w, gap);
+        if (!(rate > rounding.rate && gap_width(p, w, gap) > rounding.gap)) continue;
+        if (!ContactProjection::departs(rate, h_ * forces_.f[at], forces_.response(static_cast<int>(at)))) continue;
+        closed_[gap] = 0;
+        opens = true;
+    }
+    if (opens) set_closed(p, w, closed_);
 }
 
 const std::vector<char>& MoreauContacts::open_gaps(const VecX& y) {

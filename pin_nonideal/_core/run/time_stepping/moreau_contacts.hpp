@@ -48,7 +48,7 @@ public:
     // The next step is another attempt from the state of the last step: the loads before the first attempt count.
     void repeat() { repeats_ = true; }
     // Project the end y of the last step, at t, tree by tree. Return false if constraints join the trees: the caller
-    // must then project the end onto all rows of the scene.
+    // must then project the end onto all rows of the scene. Contacts that depart open in both cases.
     bool project(double t, VecX& y, double& numerical_energy);
 
     // Return the gaps that are open at the end y of the last step, by gap. Narrow open gaps may be missing.
@@ -64,6 +64,7 @@ private:
         constexpr double nearly_all = MoreauContacts::parameters.nearly_all;
         return width > -nearly_all * rounded_by_[gap] || width > -nearly_all * max_depth(p, w, gap);
     }
+    void open_departing_contacts(double t, const VecX& y);
     void select(const std::vector<char>& closed, const std::vector<Mode>& modes, bool flies);
     void begin_sweeps(double t, JointDrives::Step& drives);
     void sweep(double t, JointDrives::Step& drives, bool first);

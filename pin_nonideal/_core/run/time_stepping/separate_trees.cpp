@@ -3,32 +3,31 @@
 #include <algorithm>
 
 #include "math/tolerances.hpp"
+#include "tree/mass_factor.hpp"
 
 namespace pn {
 
-SeparateTrees::SeparateTrees(const Program& p) : blocks_(p) {}
+SeparateTrees::SeparateTrees(const Program& p) : blocks_(p) { blocks_.hold_prescribed(p); }
 
-// Check if the scene can be solved tree by tree now: no constraints act, and the inertia of every tree is a matrix.
+// Check if the scene can be solved tree by tree now: no dof is locked, and the inertia of every tree is a matrix.
 bool SeparateTrees::applies(const Workspace& w) const {
     const std::vector<char>& locked = w.now.terms.locked;
-    return blocks_.applies() && w.now.rows.blocks.empty() &&
-           std::find(locked.begin(), locked.end(), char(1)) == locked.end();
+    return blocks_.applies() && std::find(locked.begin(), locked.end(), char(1)) == locked.end();
 }
 
 bool SeparateTrees::pose(const Program& p, const Workspace& w, const std::vector<StepRow>& rows,
                          const std::vector<ConeElement>& cones, const VecX& a_free, const VecX& offset) {
     BlockProblem& problem = solver_.problem;
     if (!applies(w) || !blocks_.fill(p, w, rows, cones, problem)) return false;
-    problem.offset = offset.head(problem.rows);
     f_.setZero(problem.rows);
-    a_free_ = a_free;
-    is_moved_ = false;
+    release(a_free, offset);
     return solver_.pose();
 }
 
 void SeparateTrees::release(const VecX& a_free, const VecX& offset) {
     a_free_ = a_free;
     solver_.problem.offset = offset.head(solver_.problem.rows);
+    blocks_.add_held(a_free, solver_.problem.offset);
     is_moved_ = false;
 }
 
@@ -69,6 +68,25 @@ void SeparateTrees::move(const VecX& middle, const VecX& f, VecX& a, VecX& w) {
     a = a_free_;
     solver_.motion(a);
     w.head(solver_.problem.rows) = solver_.w();
+}
+
+void SeparateTrees::add_multipliers(const Program& p, Workspace& w, const std::vector<StepRow>& rows, const VecX& f,
+                                    const VecX& a, VecX& lam) {
+    if (blocks_.held().empty()) return;
+    force_.setZero(p.mechanism.nv);
+    rows_.setZero(p.layout.rows);
+    for (size_t i = 0; i < rows.size(); ++i) {
+        const Block& block = p.blocks[rows[i].block];
+        rows_[block.row + rows[i].k] = f[i];
+        if (i + 1 < rows.size() && rows[i + 1].block == rows[i].block) continue;
+        add_transpose(block, w.now.A, rows_, force_);
+        rows_.segment(block.row, block.kept.size()).setZero();
+    }
+    change_ = a - a_free_;
+    inertia_.resize(p.mechanism.nv);
+    multiply_M(p.mechanism, w.now.terms, change_, inertia_);
+    for (const TreeBlocks::Held& held : blocks_.held())
+        lam[p.blocks[held.block].row] += inertia_[held.dof] - force_[held.dof];
 }
 
 // Compute the largest of the terms that cancel in the acceleration of each tree: the acceleration without forces, and

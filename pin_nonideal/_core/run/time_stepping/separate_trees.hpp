@@ -1,4 +1,5 @@
-// Contacts and dry friction of a time step on trees that no constraint joins, as a block problem.
+// Contacts and dry friction of a time step on trees that no constraint joins, as a block problem. Motions may be
+// prescribed to joints.
 #pragma once
 
 #include "complementarity/blocks/solver.hpp"
@@ -23,6 +24,9 @@ public:
     void hold(const VecX& middle, VecX& f);
     // Compute the acceleration a and the rows w under the forces f. `middle` as in `solve`.
     void move(const VecX& middle, const VecX& f, VecX& a, VecX& w);
+    // Add the multipliers of the constraints due to the forces f of the rows, at the acceleration a under these forces.
+    void add_multipliers(const Program& p, Workspace& w, const std::vector<StepRow>& rows, const VecX& f, const VecX& a,
+                         VecX& lam);
     // Set the velocity v1 of trees to zero that were at rest, v0 = 0, and whose forces cancel over the step h.
     void keep_rest(double h, const VecX& v0, VecX& v1);
     // Check if the accelerations a of the trees under the forces of the last motion are rounding.
@@ -40,6 +44,7 @@ private:
     TreeBlocks blocks_;
     BlockSolver solver_;
     VecX a_free_, f_, middle_;
+    VecX force_, rows_, change_, inertia_;  // in `add_multipliers`
     VecX f_moved_;           // forces of the last motion
     bool is_moved_ = false;  // the motion of f_moved_ is known
     std::vector<double> balanced_;  // by node: largest acceleration that forces cancel

@@ -11,6 +11,7 @@ StepForces::StepForces(const Program& program, Workspace& workspace, const StepE
     : f(VecX::Zero(program.layout.rows)), end_rows(f), p(program), w(workspace), elements_(elements), trees_(program),
       responses_(program), free_rows_(f), offset_(f), middle_(f), a_(VecX::Zero(program.mechanism.nv)) {
     solver_.accept_residual(parameters.max_residual);
+    solver_.use_uniform_compliance(true);
 }
 
 void StepForces::pose(const MeanVelocity& mean, double h, const VecX& a_free, bool anew) {
@@ -86,8 +87,9 @@ void StepForces::add_motion(VecX& a) {
     else responses_.add_motion(p, w, f, static_cast<int>(elements_.rows.size()), a);
 }
 
-void StepForces::add_multipliers(VecX& lam) const {
-    responses_.add_multipliers(f, static_cast<int>(elements_.rows.size()), lam);
+void StepForces::add_multipliers(VecX& lam) {
+    if (separate_) trees_.add_multipliers(p, w, elements_.rows, f, w.now.a, lam);
+    else responses_.add_multipliers(f, static_cast<int>(elements_.rows.size()), lam);
 }
 
 namespace {

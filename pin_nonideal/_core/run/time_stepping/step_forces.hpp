@@ -1,7 +1,7 @@
 // Forces of the contacts and the dry friction in one step of time stepping: the cone problem of its elements.
 //
-// Trees that no constraint joins are solved one by one. If this fails, or if constraints join the trees, the responses of
-// all rows are used.
+// If there are no constraints but prescribed motions, the trees are solved one by one. If this fails, and with other
+// constraints, the responses of all rows are used.
 #pragma once
 
 #include "complementarity/cone/solver.hpp"
@@ -56,6 +56,8 @@ public:
     void drop_prevented_slip();
     // Compute the rows at the step's end under the forces.
     void measure_end();
+    // Response of a row to its own force under the constraints, if these join the trees.
+    double response(int row) const { return responses_.diagonal(row); }
     // Error of the rows at, ..., at + dim - 1 of an element at the step's end, if the forces satisfy the laws.
     double row_error(int at, int dim) const;
     // Errors of the laws for the forces.
@@ -64,7 +66,7 @@ public:
     // Add the acceleration due to the forces, and the multipliers of the constraints, to the motion without these
     // forces.
     void add_motion(VecX& a);
-    void add_multipliers(VecX& lam) const;
+    void add_multipliers(VecX& lam);
     // Set the velocity v1 of trees that rest over the step to zero.
     void stop_resting_trees(double h, const VecX& v0, VecX& v1) {
         if (separate_) trees_.keep_rest(h, v0, v1);

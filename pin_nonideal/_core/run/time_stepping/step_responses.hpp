@@ -17,6 +17,7 @@ public:
     void find(const Program& p, Workspace& w, const std::vector<StepRow>& rows);
     // Response of the first n rows to the forces of these rows. Rows that the constraints hold do not respond.
     auto matrix(int n) const { return W_.topLeftCorner(n, n); }
+    double diagonal(int row) const { return W_(row, row); }
     // Add the acceleration by the first n forces.
     void add_motion(const Program& p, Workspace& w, const VecX& f, int n, VecX& a);
     // Add the multipliers of the constraints by the first n forces.

@@ -16,14 +16,14 @@ namespace {
 // Check if another step from the same state may have another result. Reasons are time, user functions, or steps of
 // another method in between.
 bool may_differ(const Program& p, const Options& options) {
-    return options.method.scheme != Method::Scheme::moreau || p.calls_functions || p.moves_in_time || options.callback ||
+    return options.method.scheme != Method::Scheme::moreau || p.changes_at_rest() || options.callback ||
            std::holds_alternative<SampledTorque>(p.actuation) || p.torque_table() != nullptr;
 }
 
 // Check if accelerations and forces are read at the end of every step, whatever the samples record.
 bool reads_forces_always(const Program& p, const Options& options) {
     return options.record.dense || options.callback || !options.events.empty() || !p.contacts.empty() ||
-           p.calls_functions;
+           p.calls_functions || p.has_user_rows;
 }
 
 }  // namespace
@@ -36,7 +36,9 @@ TimeStepping::TimeStepping(System& system, Progress& progress, GapWatch& watch, 
       moreau_contacts_(system, watch), is_autonomous_(!may_differ(system.p, options)),
       samples_every_step_(options.method.scheme != Method::Scheme::moreau || options.output_dt == 0.0 ||
                           reads_forces_always(system.p, options)),
-      reads_forces_(options.record.evaluates() || reads_forces_always(system.p, options)) {}
+      reads_forces_(options.record.evaluates() || reads_forces_always(system.p, options)),
+      directions_(options.method.scheme == Method::Scheme::moreau ? System::SlipDirection::of_end
+                                                                  : System::SlipDirection::of_step) {}
 
 // End of a step of this size: at a stop, a jump of the actuation or a due sample before it. Times that differ only by
 // rounding count as one end, the latest time.
@@ -109,12 +111,11 @@ void TimeStepping::try_part(double h, double end, double t_end) {
     if (moreau_contacts_.project(t, progress_.y, progress_.numerical_energy)) {
         progress_.has_forces = needs_forces_here && reads_forces_;
         if (!progress_.has_forces) return;
-        const bool bridges = options_.method.scheme != Method::Scheme::moreau;
-        if (!bridges) follow_slip(p, w, system_.v);  // slip may have reversed in the step
+        if (directions_ == System::SlipDirection::of_end) follow_slip(p, w, system_.v);
         system_.evaluate_step_end(t, progress_.y, progress_.rate, true);
         return;
     }
-    system_.settle(t, progress_.y, progress_.rate, needs_forces_here, true);
+    system_.settle(t, progress_.y, progress_.rate, needs_forces_here, true, directions_);
     progress_.numerical_energy += system_.numerical_energy;
 }
 
@@ -149,7 +150,7 @@ void TimeStepping::take(double end, double t_end) {
     const bool held = was_at_rest && std::equal(before.begin(), before.end(), w.state.mode.begin());
     if (!held) {
         const bool bridges = options_.method.scheme != Method::Scheme::moreau;
-        system_.settle(t, y, progress_.rate, needs_forces(end, t_end), bridges);
+        system_.settle(t, y, progress_.rate, needs_forces(end, t_end), bridges, directions_);
         progress_.numerical_energy += system_.numerical_energy;
         return;
     }

@@ -57,6 +57,7 @@ private:
     // True if records or user code read accelerations and forces. Otherwise steps of separate trees do not evaluate
     // them.
     const bool reads_forces_;
+    const System::SlipDirection directions_;
     VecX y_from_;
     Modes before_, before_step_;
     std::vector<char> closed_before_, closed_before_step_;

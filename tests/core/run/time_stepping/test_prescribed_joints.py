@@ -1,0 +1,127 @@
+"""Contacts beside prescribed motions in time stepping: belts, lifts, turntables and grippers on lifts."""
+
+from __future__ import annotations
+
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import pin_nonideal as pn
+
+GRAVITY = 9.81
+SHORT, ALL = 6, 40
+SEEDS = [seed if seed < SHORT else pytest.param(seed, marks=pytest.mark.slow) for seed in range(ALL)]
+DT = 1e-3
+TABLE_MASS, BOX = 5.0, (0.1, 0.08, 0.05)
+
+
+def on_table(joint: object, motion: object, rate: float, places: list[pin.SE3], mu: float) -> pn.Scene:
+    """Return boxes that start at rest on a table of prescribed motion, which starts with a rate."""
+    model, shapes = pin.Model(), pin.GeometryModel()
+    table = model.addJoint(0, joint, pin.SE3.Identity(), "table")
+    model.appendBodyToJoint(table, pin.Inertia.FromBox(TABLE_MASS, 4.0, 4.0, 0.1), pin.SE3.Identity())
+    place = pin.SE3(np.eye(3), np.array([0.0, 0.0, -0.05]))
+    shapes.addGeometryObject(pin.GeometryObject("table", table, place, coal.Box(4.0, 4.0, 0.1)))
+    for i, at in enumerate(places):
+        pn.free_body(model, f"box {i}", coal.Box(*BOX), mass=1.0, collision_model=shapes, place=at)
+    contacts = [pn.GeometryContact(f"box {i}", "table", mu=mu) for i in range(len(places))]
+    v0 = np.r_[rate, np.zeros(6 * len(places))]
+    moves = [pn.PrescribedMotion("table", motion, name="drive")]
+    return pn.Scene(model, contacts=contacts, collision_model=shapes, constraints=moves, v0=v0)
+
+
+def in_a_row(count: int) -> list[pin.SE3]:
+    return [pin.SE3(np.eye(3), np.array([0.0, 0.3 * i, BOX[2] / 2.0])) for i in range(count)]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_belt_carries_boxes_along(seed: int) -> None:
+    """Boxes slide with the acceleration mu g until they have the speed of the belt.
+
+    The force of the drive is the friction of all boxes while they slide.
+    """
+    rng = np.random.default_rng(seed)
+    count, mu, speed = rng.integers(1, 4), rng.uniform(0.1, 0.5), rng.uniform(0.3, 0.8)
+    start = pn.polynomial([0.0, speed])
+    scene = on_table(pin.JointModelPX(), start, speed, in_a_row(count), mu)
+    caught = speed / (mu * GRAVITY)
+    run = pn.simulate(scene, 1.5 * caught, method="moreau", dt=DT, record=("forces", "energy"))
+    slides = (run.t > 0.0) & (run.t < caught - 2.0 * DT)
+    np.testing.assert_allclose(run.joint("table").q, speed * run.t, rtol=0, atol=1e-13)
+    for i in range(count):
+        travel = run.joint(f"box {i}").q[:, 0]
+        np.testing.assert_allclose(travel[slides], mu * GRAVITY * run.t[slides] ** 2 / 2.0, atol=1e-9)
+        np.testing.assert_allclose(travel[-1], speed * (run.t[-1] - caught / 2.0), atol=speed * DT)
+    np.testing.assert_allclose(run.lam[slides, 0], mu * GRAVITY * count, rtol=1e-9)
+    assert np.abs(run.energy["balance"]).max() < 1e-12
+    work = count * mu * GRAVITY * speed * caught
+    np.testing.assert_allclose(run.energy["constraints"][-1], work, rtol=2.0 * DT / caught)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_lift_carries_a_box_without_a_gap(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    omega = rng.uniform(3.0, 10.0)
+    height = rng.uniform(0.2, 0.9) * GRAVITY / omega**2
+    scene = on_table(pin.JointModelPZ(), pn.sinusoid(height, omega), height * omega, in_a_row(1), mu=0.5)
+    v0 = np.array(scene.v0)
+    v0[3] = height * omega
+    run = pn.simulate(scene, 1.0, v=v0, method="moreau", dt=DT, record=("a", "forces"))
+    lift = run.joint("table")
+    np.testing.assert_allclose(lift.q, height * np.sin(omega * run.t), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(run.joint("box 0").q[:, 2], lift.q, rtol=0, atol=1e-12)
+    load = GRAVITY - height * omega**2 * np.sin(omega * run.t)
+    np.testing.assert_allclose(run.contact("box 0 on table").normal_force, load, atol=1e-8)
+    np.testing.assert_allclose(run.lam[:, 0], (TABLE_MASS + 1.0) * load, atol=1e-7)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_turntable_turns_boxes_that_stick(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    turn, omega = rng.uniform(0.2, 0.6), rng.uniform(1.0, 2.0)
+    places = [
+        pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, rng.uniform(-3.0, 3.0)), np.array([0.3, y, BOX[2] / 2.0]))
+        for y in (-0.2, 0.2)
+    ]
+    scene = on_table(pin.JointModelRZ(), pn.sinusoid(turn, omega, np.pi / 2.0), 0.0, places, mu=0.9)
+    run = pn.simulate(scene, 1.0, method="moreau", dt=DT, output_dt=0.1)
+    for i, place in enumerate(places):
+        for q, angle in zip(
+            run.joint(f"box {i}").q, run.joint("table").q - run.joint("table").q[0], strict=True
+        ):
+            now = place * pin.XYZQUATToSE3(q)
+            carried = pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.0, angle), np.zeros(3)) * place
+            assert np.abs(pin.log6(now.actInv(carried)).vector).max() < 1e-6
+
+
+@pytest.mark.parametrize("order", [1, -1])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_box_slips_out_of_a_gripper_that_rises(seed: int, order: int) -> None:
+    """Two driven fingers on a lift press too little to hold the box."""
+    rng = np.random.default_rng(seed)
+    mass, press, rise = rng.uniform(0.2, 1.0), rng.uniform(2.0, 8.0), rng.uniform(0.0, 3.0)
+    mu = rng.uniform(0.1, 0.9) * mass * (GRAVITY + rise) / (2.0 * press)
+    model, shapes = pin.Model(), pin.GeometryModel()
+    lift = model.addJoint(0, pin.JointModelPZ(), pin.SE3.Identity(), "lift")
+    above = pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.3]))
+    model.appendBodyToJoint(lift, pin.Inertia.FromBox(1.0, 0.1, 0.1, 0.1), above)
+    for name, side in (("left", -1.0), ("right", 1.0)):
+        place = pin.SE3(np.eye(3), np.array([side * 0.04, 0.0, 0.0]))
+        joint = model.addJoint(lift, pin.JointModelPX(), place, name)
+        model.appendBodyToJoint(joint, pin.Inertia.FromBox(0.2, 0.02, 0.06, 0.3), pin.SE3.Identity())
+        pad = pin.GeometryObject(name, joint, pin.SE3.Identity(), coal.Box(0.02, 0.06, 0.3))
+        shapes.addGeometryObject(pad)
+    solid = coal.Box(0.06, 0.05, 0.05)
+    pn.free_body(model, "box", solid, mass=mass, collision_model=shapes, place=(0.0, 0.0, 0.1))
+    scene = pn.Scene(
+        model,
+        contacts=[pn.GeometryContact(pad, "box", mu=mu) for pad in ("left", "right")[::order]],
+        collision_model=shapes,
+        actuation=pn.Table([0.0], {"left": [press], "right": [-press]}),
+        constraints=[pn.PrescribedMotion("lift", pn.polynomial([0.0, 0.0, rise / 2.0]))],
+    )
+    run = pn.simulate(scene, 0.04, method="moreau", dt=DT, output_dt=0.01)
+    expected = np.zeros((len(run), 6))
+    expected[:, 2] = (2.0 * mu * press / mass - GRAVITY) * run.t
+    np.testing.assert_allclose(run.joint("box").v, expected, atol=2e-6)
