@@ -107,6 +107,9 @@ bool TreeBlocks::fill(const Program& p, const Workspace& w, const std::vector<St
                 if (trees[1] >= 0) return false;
                 trees[trees[0] >= 0] = root;
             }
+        // The joint of a prescribed motion does not respond to its own friction. A contact must be able to open.
+        if (trees[0] < 0 && !held_.empty() && cone.is(ConeKind::box))
+            trees[0] = root_[p.blocks[rows[at].block].support().front()];
         if (trees[0] < 0) return false;
         for (int root : trees)
             if (root >= 0 && !is_well_conditioned(p, w, root)) return false;
@@ -115,7 +118,7 @@ bool TreeBlocks::fill(const Program& p, const Workspace& w, const std::vector<St
         BlockElement& e = problem.elements[problem.add_element(cone, first, second)];
         for (int k = 0; k < cone.dim; ++k, ++at) {
             const Block& block = p.blocks[rows[at].block];
-            if (!held_.empty() && !moves(block)) return false;
+            if (!held_.empty() && cone.is(ConeKind::contact) && !moves(block)) return false;
             const double* entry = w.now.A.data() + block.offset + rows[at].k;
             for (int dof : block.support()) {
                 if (is_held_[dof]) held_entries_.push_back({static_cast<int>(at), dof, *entry});

@@ -28,8 +28,8 @@ public:
     // Add the part of the held dofs, in an acceleration or velocity x, to the rows of the last problem.
     void add_held(const VecX& x, VecX& rows) const;
     // Set the nodes, elements and blocks of a problem in a workspace with M and the rows A. `rows`: rows of the
-    // elements, in sequence. Return false if an element moves more than two trees, if a row moves nothing but held dofs, or
-    // if a tree is ill-conditioned.
+    // elements, in sequence. Return false if an element moves more than two trees, if a row of a contact moves nothing but
+    // held dofs, or if a tree is ill-conditioned.
     bool fill(const Program& p, const Workspace& w, const std::vector<StepRow>& rows,
               const std::vector<ConeElement>& cones, BlockProblem& problem);
     // Check if the velocity of a tree is not zero and at most `most`.

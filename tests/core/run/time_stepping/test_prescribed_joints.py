@@ -16,8 +16,13 @@ DT = 1e-3
 TABLE_MASS, BOX = 5.0, (0.1, 0.08, 0.05)
 
 
-def on_table(joint: object, motion: object, rate: float, places: list[pin.SE3], mu: float) -> pn.Scene:
-    """Return boxes that start at rest on a table of prescribed motion, which starts with a rate."""
+def on_table(
+    joint: object, motion: object, rate: float, places: list[pin.SE3], mu: float, rough: float = 0.0
+) -> pn.Scene:
+    """Return boxes that start at rest on a table of prescribed motion, which starts with a rate.
+
+    `rough` is the dry friction of the table's joint.
+    """
     model, shapes = pin.Model(), pin.GeometryModel()
     table = model.addJoint(0, joint, pin.SE3.Identity(), "table")
     model.appendBodyToJoint(table, pin.Inertia.FromBox(TABLE_MASS, 4.0, 4.0, 0.1), pin.SE3.Identity())
@@ -28,23 +33,25 @@ def on_table(joint: object, motion: object, rate: float, places: list[pin.SE3], 
     contacts = [pn.GeometryContact(f"box {i}", "table", mu=mu) for i in range(len(places))]
     v0 = np.r_[rate, np.zeros(6 * len(places))]
     moves = [pn.PrescribedMotion("table", motion, name="drive")]
-    return pn.Scene(model, contacts=contacts, collision_model=shapes, constraints=moves, v0=v0)
+    laws = [pn.JointFriction("table", coulomb=rough)] if rough > 0.0 else []
+    return pn.Scene(model, contacts=contacts, collision_model=shapes, constraints=moves, laws=laws, v0=v0)
 
 
 def in_a_row(count: int) -> list[pin.SE3]:
     return [pin.SE3(np.eye(3), np.array([0.0, 0.3 * i, BOX[2] / 2.0])) for i in range(count)]
 
 
+@pytest.mark.parametrize("rough", [0.0, 2.0])
 @pytest.mark.parametrize("seed", SEEDS)
-def test_a_belt_carries_boxes_along(seed: int) -> None:
+def test_a_belt_carries_boxes_along(seed: int, rough: float) -> None:
     """Boxes slide with the acceleration mu g until they have the speed of the belt.
 
-    The force of the drive is the friction of all boxes while they slide.
+    The force of the drive is the friction of all boxes while they slide, and of the joint.
     """
     rng = np.random.default_rng(seed)
     count, mu, speed = rng.integers(1, 4), rng.uniform(0.1, 0.5), rng.uniform(0.3, 0.8)
     start = pn.polynomial([0.0, speed])
-    scene = on_table(pin.JointModelPX(), start, speed, in_a_row(count), mu)
+    scene = on_table(pin.JointModelPX(), start, speed, in_a_row(count), mu, rough)
     caught = speed / (mu * GRAVITY)
     run = pn.simulate(scene, 1.5 * caught, method="moreau", dt=DT, record=("forces", "energy"))
     slides = (run.t > 0.0) & (run.t < caught - 2.0 * DT)
@@ -53,9 +60,9 @@ def test_a_belt_carries_boxes_along(seed: int) -> None:
         travel = run.joint(f"box {i}").q[:, 0]
         np.testing.assert_allclose(travel[slides], mu * GRAVITY * run.t[slides] ** 2 / 2.0, atol=1e-9)
         np.testing.assert_allclose(travel[-1], speed * (run.t[-1] - caught / 2.0), atol=speed * DT)
-    np.testing.assert_allclose(run.lam[slides, 0], mu * GRAVITY * count, rtol=1e-9)
+    np.testing.assert_allclose(run.lam[slides, 0], mu * GRAVITY * count + rough, rtol=1e-9)
     assert np.abs(run.energy["balance"]).max() < 1e-12
-    work = count * mu * GRAVITY * speed * caught
+    work = count * mu * GRAVITY * speed * caught + rough * speed * run.t[-1]
     np.testing.assert_allclose(run.energy["constraints"][-1], work, rtol=2.0 * DT / caught)
 
 
