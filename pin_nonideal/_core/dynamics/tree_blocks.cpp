@@ -66,22 +66,21 @@ bool TreeBlocks::has_slow_tree(const VecX& v, double most) const {
     return false;
 }
 
-int TreeBlocks::node_of(const Program& p, const Workspace& w, int root, BlockProblem& problem) {
-    int& node = node_[root];
-    if (node >= 0) return node;
-    node = static_cast<int>(problem.nodes.size());
-    BlockMap M = problem.add_node(size_[root], root);
-    if (p.mechanism.is_deep[root]) {
-        mass_matrix_articulated(p.mechanism, w.now.terms, root, size_[root], composite_, M.data());
-    } else {
-        for (int dof = root; dof < root + size_[root]; ++dof) {
-            const int begin = p.mechanism.row_offset[dof];
-            for (int s = 0; s <= p.mechanism.depth[dof]; ++s) {
-                const int j = local_[p.mechanism.ancestors[begin + s]];
-                M(local_[dof], j) = M(j, local_[dof]) = w.now.terms.M[begin + s];
-            }
+// Fill the inertia matrix of a tree.
+void TreeBlocks::fill_inertia(const Program& p, const Workspace& w, int root, BlockMap M) {
+    if (p.mechanism.is_deep[root])
+        return mass_matrix_articulated(p.mechanism, w.now.terms, root, size_[root], composite_, M.data());
+    for (int dof = root; dof < root + size_[root]; ++dof) {
+        const int begin = p.mechanism.row_offset[dof];
+        for (int s = 0; s <= p.mechanism.depth[dof]; ++s) {
+            const int j = local_[p.mechanism.ancestors[begin + s]];
+            M(local_[dof], j) = M(j, local_[dof]) = w.now.terms.M[begin + s];
         }
     }
+}
+
+// Remove the held dofs of a tree from its inertia matrix.
+void TreeBlocks::hold(int root, BlockMap M) const {
     for (const Held& held : held_) {
         if (root_[held.dof] != root) continue;
         const int i = local_[held.dof];
@@ -89,7 +88,33 @@ int TreeBlocks::node_of(const Program& p, const Workspace& w, int root, BlockPro
         M.col(i).setZero();
         M(i, i) = 1.0;
     }
+}
+
+int TreeBlocks::node_of(const Program& p, const Workspace& w, int root, BlockProblem& problem) {
+    int& node = node_[root];
+    if (node >= 0) return node;
+    node = static_cast<int>(problem.nodes.size());
+    const BlockMap M = problem.add_node(size_[root], root);
+    fill_inertia(p, w, root, M);
+    hold(root, M);
     return node;
+}
+
+void TreeBlocks::follow_held(const Program& p, const Workspace& w, VecX& x) {
+    for (size_t k = 0; k < held_.size(); ++k) {
+        const int root = root_[held_[k].dof], size = size_[root];
+        const auto is_of_tree = [&](const Held& held) { return root_[held.dof] == root; };
+        if (size == 1 || std::any_of(held_.begin(), held_.begin() + k, is_of_tree)) continue;
+        inertia_.assign(static_cast<size_t>(size) * size, 0.0);
+        const BlockMap M(inertia_.data(), size, size);
+        fill_inertia(p, w, root, M);
+        auto own = x.segment(root, size);
+        VecX force = -M * own;
+        for (const Held& held : held_)
+            if (is_of_tree(held)) force[local_[held.dof]] = x[held.dof];
+        hold(root, M);
+        own = M.llt().solve(force);
+    }
 }
 
 bool TreeBlocks::fill(const Program& p, const Workspace& w, const std::vector<StepRow>& rows,

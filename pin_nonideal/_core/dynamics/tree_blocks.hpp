@@ -25,6 +25,9 @@ public:
     // no other constraint acts.
     void hold_prescribed(const Program& p);
     const std::vector<Held>& held() const { return held_; }
+    // Complete a displacement or a change of the velocity x, given on the held dofs and zero elsewhere, by the least change
+    // of the other dofs of their trees in the metric of M. The workspace must hold M.
+    void follow_held(const Program& p, const Workspace& w, VecX& x);
     // Add the part of the held dofs, in an acceleration or velocity x, to the rows of the last problem.
     void add_held(const VecX& x, VecX& rows) const;
     // Set the nodes, elements and blocks of a problem in a workspace with M and the rows A. `rows`: rows of the
@@ -37,6 +40,8 @@ public:
 
 private:
     bool moves(const Block& block) const;
+    void fill_inertia(const Program& p, const Workspace& w, int root, BlockMap M);
+    void hold(int root, BlockMap M) const;
     bool is_well_conditioned(const Program& p, const Workspace& w, int root) const;
     int node_of(const Program& p, const Workspace& w, int root, BlockProblem& problem);
 
@@ -51,6 +56,7 @@ private:
     std::vector<HeldEntry> held_entries_;   // entries of the last problem's rows on held dofs
     std::vector<int> node_;                 // node of a tree by first dof, -1 if it takes no part
     std::vector<ArticulatedInertia> composite_;
+    std::vector<double> inertia_;           // of one tree
 };
 
 }  // namespace pn

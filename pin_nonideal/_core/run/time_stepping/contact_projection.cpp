@@ -16,6 +16,10 @@ static void hold_locked(const Program& p, const Workspace& w, VecX& x) {
         if (w.now.terms.locked[dof]) x[dof] = 0.0;
 }
 
+static double prescribed_rate(const Workspace& w, const TreeBlocks::Held& held) {
+    return -w.now.values[held.block].phi_t[0];
+}
+
 ContactProjection::ContactProjection(const Program& p)
     : blocks_(p), flyers_(MeanVelocity::flyers(p)), r_(VecX::Zero(p.layout.rows)), move_(VecX::Zero(p.mechanism.nv)) {
     least_.lever = p.mechanism.lever;
@@ -226,28 +230,35 @@ void ContactProjection::rest(const Program& p, Workspace& w, VecX& v) {
             v.segment(node.first, node.size).setZero();
     }
     hold_locked(p, w, v);
-    for (const TreeBlocks::Held& held : blocks_.held()) v[held.dof] = -w.now.values[held.block].phi_t[0];
+    for (const TreeBlocks::Held& held : blocks_.held()) v[held.dof] = prescribed_rate(w, held);
 }
 
-// Set the positions and velocities of prescribed motions.
+// Move the joints of prescribed motions to their positions and velocities. The other joints of their trees follow. The
+// workspace then holds M.
 void ContactProjection::meet_prescribed(const Program& p, Workspace& w, double t, VecX& q, VecX& v) {
     if (blocks_.held().empty()) return;
     const auto total = [&] {
-        mass_matrix(p.mechanism, w.now.terms);
         return kinetic_energy(p.mechanism, w.now.terms, v) + potential_energy(p.mechanism, w.now.terms);
     };
+    mass_matrix(p.mechanism, w.now.terms);
     const double before = energy ? total() : 0.0;
     move_.setZero();
-    for (const TreeBlocks::Held& held : blocks_.held()) {
-        move_[held.dof] = -w.now.values[held.block].residual[0];
-        v[held.dof] = -w.now.values[held.block].phi_t[0];
-    }
+    for (const TreeBlocks::Held& held : blocks_.held()) move_[held.dof] = -w.now.values[held.block].residual[0];
     if (move_.any()) {
+        blocks_.follow_held(p, w, move_);
         q_from_ = q;
         retract(p.mechanism, q_from_.data(), move_.data(), q.data());
         place_bodies(p.mechanism, w.now.terms, q);
         place_rows(p, w, t, v);
+        mass_matrix(p.mechanism, w.now.terms);
     }
+    move_.setZero();
+    for (const TreeBlocks::Held& held : blocks_.held()) move_[held.dof] = prescribed_rate(w, held) - v[held.dof];
+    if (move_.any()) {
+        blocks_.follow_held(p, w, move_);
+        v += move_;
+    }
+    for (const TreeBlocks::Held& held : blocks_.held()) v[held.dof] = prescribed_rate(w, held);
     if (energy) moved_energy_ = total() - before;
 }
 
@@ -278,7 +289,7 @@ bool ContactProjection::project(const Program& p, Workspace& w, double t, double
 // Move q and v onto the rows. Return false if the trees cannot be projected one by one.
 bool ContactProjection::correct(const Program& p, Workspace& w, double t, double h, const std::vector<int>& near, VecX& q,
                                 VecX& v) {
-    mass_matrix(p.mechanism, w.now.terms);
+    if (!has_prescribed()) mass_matrix(p.mechanism, w.now.terms);
     if (!pose(p, w, true)) return false;
     if (open_departing_contacts(p, w, h, v) && !pose(p, w, true)) return false;
     const auto total = [&] {

@@ -132,3 +132,58 @@ def test_a_box_slips_out_of_a_gripper_that_rises(seed: int, order: int) -> None:
     expected = np.zeros((len(run), 6))
     expected[:, 2] = (2.0 * mu * press / mass - GRAVITY) * run.t
     np.testing.assert_allclose(run.joint("box").v, expected, atol=2e-6)
+
+
+def arm_on_a_cart(joint: object, arm: object, hold: float = 0.0) -> pn.Scene:
+    """Return a free or held arm on a driven cart, with a box at rest elsewhere and a ball on the cart."""
+    model, shapes = pin.Model(), pin.GeometryModel()
+    cart = model.addJoint(0, joint, pin.SE3.Identity(), "cart")
+    model.appendBodyToJoint(cart, pin.Inertia.FromBox(1.0, 0.1, 0.1, 0.1), pin.SE3.Identity())
+    link = model.addJoint(cart, arm, pin.SE3(np.eye(3), np.array([0.2, 0.0, 0.0])), "arm")
+    place = pin.SE3(np.eye(3), np.array([0.1, 0.02, -0.1]))
+    model.appendBodyToJoint(link, pin.Inertia.FromBox(0.3, 0.1, 0.05, 0.05), place)
+    below = pin.SE3(np.eye(3), np.array([0.0, 0.0, -1.05]))
+    shapes.addGeometryObject(pin.GeometryObject("floor", 0, below, coal.Box(9.0, 9.0, 0.1)))
+    solid = coal.Box(0.1, 0.1, 0.1)
+    pn.free_body(model, "box", solid, mass=1.0, collision_model=shapes, place=(2.0, 0.0, -0.95))
+    return pn.Scene(
+        model,
+        contacts=[pn.GeometryContact("box", "floor", mu=0.3)],
+        collision_model=shapes,
+        constraints=[pn.PrescribedMotion("cart", pn.sinusoid(0.3, 6.0))],
+        actuation=pn.HoldPosition(kp={"arm": hold}, kd={"arm": 0.1}) if hold > 0.0 else None,
+        v0=np.r_[1.8, np.zeros(7)],
+    )
+
+
+JOINTS = {
+    "slide": (pin.JointModelPX, pin.JointModelRY),
+    "turntable": (pin.JointModelRZ, pin.JointModelRZ),
+    "swing": (pin.JointModelRX, pin.JointModelRY),
+    "unbounded": (pin.JointModelRUBZ, pin.JointModelPX),
+}
+
+
+@pytest.mark.parametrize("kind", JOINTS)
+def test_an_arm_on_a_driven_cart_follows_to_second_order(kind: str) -> None:
+    joint, arm = JOINTS[kind]
+    scene = arm_on_a_cart(joint(), arm())
+    nv = scene.model.joints[1].nq + 1
+    exact = pn.simulate(scene, 1.0, rtol=1e-11, atol=1e-13, output_dt=1.0).q[-1, :nv]
+    runs = [pn.simulate(scene, 1.0, method="moreau", dt=dt, output_dt=1.0) for dt in (2e-3, 1e-3)]
+    coarse, fine = (np.abs(run.q[-1, :nv] - exact).max() for run in runs)
+    assert coarse / fine > 3.6
+    assert fine < 5e-5
+
+
+@pytest.mark.parametrize("kind", JOINTS)
+@pytest.mark.parametrize("hold", [0.0, 5.0])
+def test_records_of_a_driven_arm_change_nothing_and_balance(kind: str, hold: float) -> None:
+    joint, arm = JOINTS[kind]
+    scene = arm_on_a_cart(joint(), arm(), hold)
+    steps = {"method": "moreau", "dt": DT, "output_dt": 0.1}
+    plain = pn.simulate(scene, 0.5, **steps)
+    run = pn.simulate(scene, 0.5, record=("forces", "energy"), **steps)
+    np.testing.assert_array_equal(run.q, plain.q)
+    assert np.abs(run.energy["balance"]).max() < 1e-4
+    assert np.abs(run.energy["projection"]).max() < 1e-2
