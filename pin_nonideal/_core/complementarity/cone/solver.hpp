@@ -59,7 +59,7 @@ public:
 
     // Use a uniform compliance. If friction depends on shares of a load that W does not determine, several motions may
     // solve the problem. This option selects the motion of equally compliant elements, in the limit of stiff ones. This
-    // motion does not depend on the order of the elements. A motion near a guess, or with unique shares, continues it.
+    // motion does not depend on the order of the elements. From a guess, a solution near it or with unique shares is kept.
     void use_uniform_compliance(bool on) { uniform_compliance_ = on; }
 
     // Limit the search to Newton's method from the guess, from zero and from the end of the central path.

@@ -11,8 +11,8 @@ namespace pn {
 // Largest squared sine of the angle between segments that count as parallel.
 constexpr double parallel_segments = 1e-12;
 
-// Segments x + s e, |s| <= half, of frames 1 and 2 along their z axes. The direction between points inside both segments is
-// perpendicular to both lines. If the lines are close to each other, the difference of the points is mostly rounding.
+// Segments x + s e, |s| <= half, of frames 1 and 2 along their z axes. If both points lie inside their segments, n follows
+// from the directions of the lines. The difference of points that nearly coincide would be inaccurate.
 template <class Sides>
 struct NearestPoints {
     using Vec = typename Sides::Vec;
@@ -21,7 +21,7 @@ struct NearestPoints {
     Vec n;                     // from the second point to the first
     Scalar distance;
     bool free1 = false, free2 = false;  // the point lies inside its segment, not at an end
-    Scalar sine = 0.0;  // of the angle between the lines if n is perpendicular to both, else 0
+    Scalar sine = 0.0;  // e1 x e2 = sine n if n is perpendicular to both lines, else 0
 
     PN_INLINE NearestPoints(const Sides& s, double half1, double half2)
         : e1(s.a.R * Vec3::UnitZ()), e2(s.b.R * Vec3::UnitZ()) {
@@ -43,8 +43,8 @@ struct NearestPoints {
         distance = d.norm();
         if (free1 && free2 && square > parallel_segments) {
             const Vec across = e1.cross(e2);
-            sine = across.norm();
-            n = Vec(across / (d.dot(across) < 0.0 ? -sine : sine));
+            sine = d.dot(across) < 0.0 ? -across.norm() : across.norm();
+            n = Vec(across / sine);
         } else {
             n = distance > 0.0 ? Vec(d / distance) : Vec(Vec3::UnitZ());
         }
@@ -85,10 +85,9 @@ struct NearestMotion {
         }
         along1 = rate1 * p.e1;
         along2 = rate2 * p.e2;
-        if (p.sine > 0.0) {
-            const Vec across = s.a.omega().cross(p.e1).cross(p.e2) + p.e1.cross(s.b.omega().cross(p.e2));
-            const Vec turn = (p.n.dot(p.e1.cross(p.e2)) < 0.0 ? -across : across) / p.sine;
-            dn = turn - p.n.dot(turn) * p.n;
+        if (p.sine != 0.0) {
+            const Vec turn = s.a.omega().cross(p.e1).cross(p.e2) + p.e1.cross(s.b.omega().cross(p.e2));
+            dn = (turn - p.n.dot(turn) * p.n) / p.sine;
         } else if (p.distance > 0.0) {
             const Vec dd = u + along1 - along2;
             dn = (dd - p.n.dot(dd) * p.n) / p.distance;

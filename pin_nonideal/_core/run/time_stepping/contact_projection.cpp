@@ -270,16 +270,10 @@ bool ContactProjection::project(const Program& p, Workspace& w, double t, double
     w.now.renew();
     place_bodies(p.mechanism, w.now.terms, q);
     place_rows(p, w, t, v);
-    q_before_ = q;
-    v_before_ = v;
     meet_prescribed(p, w, t, q, v);
     gather(p, w, true);
     if (is_projected(p, w, v)) hold_locked(p, w, v);
-    else if (!correct(p, w, t, h, near, q, v)) {
-        q = q_before_;
-        v = v_before_;
-        return false;
-    }
+    else if (!correct(p, w, t, h, near, q, v)) return false;
     move_bodies(p.mechanism, w.now.terms, v);
     for (int e : w.now.slipping) move_block(p, w, t, v, p.frictions[e].block);
     ++w.counters.projections;

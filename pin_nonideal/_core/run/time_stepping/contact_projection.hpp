@@ -39,10 +39,11 @@ public:
     // After a step of length h, project q and v onto the closed contacts and sticking elements of the workspace: gaps
     // close, and v satisfies their rows. Contacts open if other contacts hold their bodies apart. The move penetrates open
     // contacts of the list `near` by at most the travel of the step or the largest gap that closes. A tree that the rows
-    // hold, with a velocity of rounding, comes to rest. Return false, with q and v unchanged, if the trees cannot be
-    // projected one by one.
+    // hold, with a velocity of rounding, comes to rest. Return false if the trees cannot be projected one by one. The
+    // state (q, v) is then undefined.
     bool project(const Program& p, Workspace& w, double t, double h, const std::vector<int>& near, VecX& q, VecX& v);
-    bool has_prescribed() const { return !blocks_.held().empty(); }  // prescribed motions, which the projection meets
+    // Check if motions are prescribed to joints.
+    bool has_prescribed() const { return !blocks_.held().empty(); }
     double numerical_energy() const { return moved_energy_; }  // energy that the last projection added, if `energy`
     // Check if a closed contact that opens at this rate must open, for the impulse that pushed it in the step and its
     // response to a unit impulse.
@@ -77,7 +78,7 @@ private:
     std::vector<StepRow> rows_;
     std::vector<ConeElement> elements_;
     std::vector<int> gap_;  // by row: gap whose residual it closes, -1 for sliding
-    VecX r_, move_, q_from_, q_best_, v_best_, q_start_, v_start_, q_before_, v_before_;
+    VecX r_, move_, q_from_, q_best_, v_best_, q_start_, v_start_;
     std::vector<char> closed_;
     std::vector<Mat3> responses_;  // own responses of the elements, by element
     std::vector<int> departing_;   // elements of contacts that depart
