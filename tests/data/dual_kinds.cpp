@@ -22,6 +22,7 @@ bool operator<(const Dual& a, const Dual& b) { return a.x < b.x; }
 bool operator>(const Dual& a, const Dual& b) { return a.x > b.x; }
 bool operator>=(const Dual& a, const Dual& b) { return a.x >= b.x; }
 bool operator<=(const Dual& a, const Dual& b) { return a.x <= b.x; }
+bool operator!=(const Dual& a, const Dual& b) { return a.x != b.x; }
 Dual sqrt(const Dual& a) { return {std::sqrt(a.x), 0.5 * a.d / std::sqrt(a.x)}; }
 Dual atan2(const Dual& y, const Dual& x) {
     return {std::atan2(y.x, x.x), (y.d * x.x - y.x * x.d) / (x.x * x.x + y.x * y.x)};
