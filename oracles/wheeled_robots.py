@@ -42,16 +42,16 @@ class Robot:
     swivels: list[str] = field(default_factory=list)
 
     def reference(self, duration):
-        """Return (x, y, heading, swivels) at the end, and the path length."""
+        """Return (x, y, heading, swivels) at the end, and the larger of path length and angle turned."""
 
         def rate(t, y):
-            slopes = self.rate(t, y[:-1])
-            return [*slopes, np.hypot(slopes[0], slopes[1])]
+            slopes = self.rate(t, y[:-2])
+            return [*slopes, np.hypot(slopes[0], slopes[1]), abs(slopes[2])]
 
         run = solve_ivp(
-            rate, (0.0, duration), [*self.y0, 0.0], method="DOP853", rtol=REFERENCE, atol=REFERENCE
+            rate, (0.0, duration), [*self.y0, 0.0, 0.0], method="DOP853", rtol=REFERENCE, atol=REFERENCE
         )
-        return run.y[:-1, -1], run.y[-1, -1]
+        return run.y[:-2, -1], run.y[-2:, -1].max()
 
     def place(self, q):
         """Return (x, y, heading, swivels) of a configuration."""
@@ -62,7 +62,7 @@ class Robot:
         return np.array([q[0], q[1], np.arctan2(R[1, 0], R[0, 0]), *angles])
 
     def miss(self, q, duration):
-        """Return the largest difference from the reference, over max(1, path length)."""
+        """Return the largest difference from the reference, over max(1, path length, angle turned)."""
         end, way = self.reference(duration)
         apart = self.place(q) - end
         apart[2] = np.angle(np.exp(1j * apart[2]))

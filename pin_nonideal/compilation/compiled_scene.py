@@ -8,7 +8,7 @@ from functools import cached_property
 
 from pin_nonideal.core_loader import core
 from pin_nonideal.description.actuation import SampledControl
-from pin_nonideal.description.constraints import UserConstraint
+from pin_nonideal.description.constraints import PrescribedMotion, UserConstraint
 from pin_nonideal.description.contacts.pair_of_shapes import ContactGroup, PairOfShapes, contact_parts
 from pin_nonideal.description.contacts.point_names import ContactOfPoint, UsedNames
 from pin_nonideal.description.drive_kinds import delayed_control, switching_drives
@@ -217,9 +217,14 @@ class CompiledScene:
         except core.CoreFailure as failure:
             raise self.named(failure) from None
 
-    def named(self, failure: core.CoreFailure) -> RunError:
-        """Convert a failure of the core to an exception that names the elements involved."""
-        return named_failure(failure, self.model, self.program, self._circumstances())
+    def named(self, failure: core.CoreFailure, method: str = "") -> RunError:
+        """Convert a failure of the core to an exception that names the elements involved.
+
+        Args:
+            failure: the core's CoreFailure.
+            method: method of the run, empty outside of runs.
+        """
+        return named_failure(failure, self.model, self.program, self._circumstances(method))
 
     @property
     def explicit_only(self) -> str:
@@ -243,17 +248,19 @@ class CompiledScene:
         """Return the number of a point among the points of its contact."""
         return self.points[self.contact_of[name]].index(name) if name in self.contact_of else 0
 
-    def _circumstances(self) -> Circumstances:
+    def _circumstances(self, method: str) -> Circumstances:
         """Return the names of the parts of the scene that error messages of its runs need."""
         spec = self.spec
         sources = ("the actuation", _quote("force", spec.forces), _quote("law", spec.laws))
         used_names = UsedNames()
-        unique_names(spec.constraints, used_names)
+        constraint_names = unique_names(spec.constraints, used_names)
+        described = zip(constraint_names, spec.constraints, strict=True)
+        moving = [name for name, c in described if isinstance(c, PrescribedMotion)]
         names = unique_names(spec.contacts, used_names)
         pairs = {
             name: _frames_of(c) for name, c in zip(names, spec.contacts, strict=True) if any(_frames_of(c))
         }
-        return Circumstances(self.explicit_only, sources, pairs, self.contact_of)
+        return Circumstances(self.explicit_only, sources, pairs, self.contact_of, moving, method)
 
 
 def _frames_of(contact: object) -> tuple[str, str]:

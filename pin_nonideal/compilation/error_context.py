@@ -75,12 +75,16 @@ class Circumstances(NamedTuple):
         sources: names of the actuation, the applied forces and the laws.
         pairs: frames of each contact by its name, the second one empty for the world.
         contact_of: contact of each point of a pair of shapes.
+        moving: names of the prescribed motions.
+        method: method of the run, empty outside of runs.
     """
 
     explicit_only: str
     sources: tuple[str, str, str]
     pairs: dict[str, tuple[str, str]]
     contact_of: Mapping[str, str]
+    moving: Sequence[str] = ()
+    method: str = ""
 
 
 def named_failure(
@@ -104,7 +108,9 @@ def named_failure(
     if kind is kinds.inconsistent:
         names = named([*program.block_names, *program.element_names], failure.elements)
         rubs = not set(names).isdisjoint(program.element_names)
-        return _inconsistent(names, value, t, model, around.pairs, rubs)
+        if value == 0.0:  # the failure of an impact has no residual
+            return _inseparable(names, t, model, around)
+        return _inconsistent(names, value, t, rubs)
     if kind is kinds.not_finite:
         return NonFiniteError(f"acceleration is not finite at t = {t:.4g} s", time=t)
     if kind is kinds.paradox:
@@ -112,7 +118,8 @@ def named_failure(
         return _paradox(elements or contact_names(program.law_names, around.contact_of), failure)
     if kind is kinds.not_converged:
         names = named(program.element_names, failure.elements)
-        return _modes_error(names or named(program.block_names, program.contacts), t)
+        names = names or named(program.block_names, program.contacts)
+        return _modes_error(names, t, around.method)
     if kind is kinds.unmet_law:
         law, index = failure.elements
         dof_names = [str(model.names[joint_of(model, i)]) for i in range(model.nv)]
@@ -278,12 +285,12 @@ def _paradox(names: Sequence[str], failure: core.CoreFailure) -> RunError:
     )
 
 
-def _modes_error(names: Sequence[str], t: float) -> RunError:
+def _modes_error(names: Sequence[str], t: float, method: str) -> RunError:
+    remedy = "take shorter steps" if method == "moreau" else 'tighten rtol, use method="moreau"'
+    whose = f" of {_list_names(names)}" if names else ""
     return FrictionConvergenceError(
-        f"the modes (stick or slip) of {_list_names(names)} were not found at t = {t:.4g} s, although a "
-        "motion may exist; change an initial value a little, "
-        'tighten rtol, use method="moreau", or give modes to '
-        "solve",
+        f"the modes (stick or slip){whose} were not found at t = {t:.4g} s, although a motion may exist; "
+        f"change an initial value a little, {remedy}, or give modes to solve",
         element=", ".join(names),
         time=t,
     )
@@ -314,23 +321,30 @@ def _stuck(steps: float, t: float, explicit_only: str) -> RunError:
     )
 
 
-def _inconsistent(
-    names: Sequence[str],
-    residual: float,
-    t: float,
-    model: Model,
-    pairs: dict[str, tuple[str, str]],
-    rubs: bool,
-) -> RunError:
-    quoted = _list_names(names)
-    if residual == 0.0:  # the failure of an impact has no residual
-        bodies = _contact_bodies(model, names, pairs)
-        return InconsistentConstraintsError(
-            f"the bodies at {quoted}{bodies} cannot separate with their restitution at t = {t:.2f} s: "
-            "other constraints keep them from moving apart; lower restitution, or use "
-            'Scene(..., impact="poisson")',
-            time=t,
+def _inseparable(names: Sequence[str], t: float, model: Model, around: Circumstances) -> RunError:
+    """Return the error of contacts that no forces keep apart."""
+    if around.moving:
+        why = (
+            f"prescribed motion ({_list_names(around.moving)}) may drive them into each other: end it before "
+            "they touch, or drive the joint by a force, such as actuation=HoldPosition"
         )
+    elif around.method == "moreau":
+        why = "other constraints or contacts keep them from moving apart: take shorter steps, or reduce mu"
+    else:
+        why = (
+            "other constraints keep them from moving apart; lower restitution, or use "
+            'Scene(..., impact="poisson")'
+        )
+    how = "" if around.method == "moreau" else " with their restitution"
+    bodies = f"the bodies at {_list_names(names)}{_contact_bodies(model, names, around.pairs)}"
+    return InconsistentConstraintsError(
+        f"{bodies} cannot separate{how} at t = {t:.2f} s: {why}",
+        time=t,
+    )
+
+
+def _inconsistent(names: Sequence[str], residual: float, t: float, rubs: bool) -> RunError:
+    quoted = _list_names(names)
     if len(names) > 1:
         blame, remedy = f"constraints {quoted} contradict each other", "leave one of them out"
     else:

@@ -100,7 +100,7 @@ def finish(
         error = singular
         error.args = (f"{error}; {TRAJECTORY_HINT}",)
     elif isinstance(stopped, core.CoreFailure):
-        error = compiled.named(stopped)
+        error = compiled.named(stopped, options.method)
         error.args = (f"{error}{_overflow_hint(error, options)}; {TRAJECTORY_HINT}", *error.args[1:])
     elif isinstance(stopped, KeyboardInterrupt):
         error = RunInterrupted(f"the run was interrupted at t = {last:.4g} s; {TRAJECTORY_HINT}", time=last)

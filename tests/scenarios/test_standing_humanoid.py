@@ -21,7 +21,7 @@ SOLES = ("left_sole_link", "right_sole_link")
 KEPT = 1e-9
 
 
-def standing(coulomb: float, kp: float, kd: float) -> pn.Scene:
+def standing(coulomb: float, kp: float, kd: float, **more) -> pn.Scene:
     """Talos, held by a controller of positions."""
     talos = pn.load("talos")
     model = talos.model
@@ -31,6 +31,7 @@ def standing(coulomb: float, kp: float, kd: float) -> pn.Scene:
         laws=[pn.JointFriction(name, coulomb=coulomb) for name in list(model.names)[2:]],
         actuation=pn.HoldPosition(kp=kp, kd=kd),
         q0=talos.q0,
+        **more,
     )
 
 
@@ -90,6 +91,16 @@ def test_time_stepping_stands_still() -> None:
     np.testing.assert_array_equal(run.modes, stepped.modes)
     np.testing.assert_allclose(run.energy["total"], stepped.energy["total"], rtol=0, atol=1e-8)
     assert run.stats.evaluations < stepped.stats.evaluations
+
+
+def test_a_far_contact_changes_no_step() -> None:
+    """Friction forces of closed legs are not unique; a contact elsewhere leaves their solution alone."""
+    scene = standing(20.0, 500.0, 20.0)
+    far = standing(20.0, 500.0, 20.0, contacts=[pn.PointContact("gripper_left_base_link", height=-9.0)])
+    bent = np.concatenate([np.zeros(6), 0.02 * np.random.default_rng(3).standard_normal(scene.model.nv - 6)])
+    q, v = scene.project(pin.integrate(scene.model, scene.q0, bent), np.zeros(scene.model.nv))
+    run, beside = (pn.simulate(each, 0.1, q, v, **MOREAU, output_dt=0.1) for each in (scene, far))
+    np.testing.assert_allclose(beside.q, run.q, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("late", ["table", "stepper", "wrench"])

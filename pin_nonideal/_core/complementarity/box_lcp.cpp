@@ -55,7 +55,7 @@ bool BoxProgram::solve_regular(int n) {
 
 // Compute the minimum-norm x of W_FF x = r_F on the free elements F. Other elements, and elements without response, have x
 // = 0.
-void BoxProgram::solve_free(const MatX& W) {
+void BoxProgram::solve_free(const MatrixView& W) {
     list_.clear();
     for (int i = 0; i < r_.size(); ++i)
         if (is_free_[i] && W(i, i) > 0.0) list_.push_back(i);
@@ -76,7 +76,7 @@ void BoxProgram::solve_free(const MatX& W) {
 }
 
 // Compute the acceleration scale of each element. The scale of a light finger does not apply to a leg.
-void BoxProgram::measure(const MatX& W, const VecX& alpha0, const VecX& forces) {
+void BoxProgram::measure(const MatrixView& W, const VecX& alpha0, const VecX& forces) {
     size_ = alpha0.cwiseAbs();
     for (int j = 0; j < forces.size(); ++j) size_ += std::abs(forces[j]) * W.col(j).cwiseAbs();
     noise_ = parameters.noise_of_others * size_.maxCoeff();
@@ -96,7 +96,7 @@ void BoxProgram::start(const VecX& s, const VecX* initial) {
 // Primal active-set method. Steps from f lower f^T W f / 2 + alpha0^T f and stay in the box. Redundant elements cannot
 // all stick if no forces cause the accelerations that they would have to cancel. The program then decreases without end
 // along a direction with W d = 0, until one of the elements is at its limit and slips.
-void BoxProgram::descend(const MatX& W, const VecX& alpha0, const VecX& s) {
+void BoxProgram::descend(const MatrixView& W, const VecX& alpha0, const VecX& s) {
     const int n = static_cast<int>(s.size());
     measure(W, alpha0, s);
     for (int it = 0; it < 20 * (n + 1) * (n + 1); ++it) {
@@ -143,7 +143,7 @@ void BoxProgram::descend(const MatX& W, const VecX& alpha0, const VecX& s) {
 // Projected Gauss-Seidel sweeps: each element in turn takes the force within its limits that is nearest to zero slip
 // acceleration, with the forces of the others fixed. If block pivoting makes no progress, the elements that are at their
 // limits after a few sweeps are a better start for it.
-void BoxProgram::relax(const MatX& W, const VecX& alpha0, const VecX& s) {
+void BoxProgram::relax(const MatrixView& W, const VecX& alpha0, const VecX& s) {
     const int n = static_cast<int>(s.size());
     f_ = f_.cwiseMin(s).cwiseMax(-s);
     for (int sweep = 0; sweep < parameters.relaxing_sweeps; ++sweep)
@@ -156,7 +156,7 @@ void BoxProgram::relax(const MatX& W, const VecX& alpha0, const VecX& s) {
 // Block principal pivoting. If the pivoting makes no progress, it starts again from relaxed forces. After the last of
 // these starts it exchanges one element at a time (largest index). Return false if the free elements cannot all stick,
 // or if pivoting does not end.
-bool BoxProgram::pivot_blocks(const MatX& W, const VecX& alpha0, const VecX& s) {
+bool BoxProgram::pivot_blocks(const MatrixView& W, const VecX& alpha0, const VecX& s) {
     const int n = static_cast<int>(s.size());
     int fewest = n + 1, patience = parameters.max_stalled_rounds, relaxations = parameters.max_relaxations;
     for (int it = 0; it < 200 + 50 * n; ++it) {
@@ -197,7 +197,7 @@ bool BoxProgram::pivot_blocks(const MatX& W, const VecX& alpha0, const VecX& s) 
     return false;
 }
 
-void BoxProgram::solve(const MatX& W, const VecX& alpha0, const VecX& s, const VecX* initial, VecX& f) {
+void BoxProgram::solve(const MatrixView& W, const VecX& alpha0, const VecX& s, const VecX* initial, VecX& f) {
     const int n = static_cast<int>(s.size());
     if (initial) initial_ = *initial;
     else initial_.setZero(n);
@@ -216,7 +216,7 @@ void BoxProgram::solve(const MatX& W, const VecX& alpha0, const VecX& s, const V
     f = f_;
 }
 
-void BoxProgram::solve_all(const MatX& W, const VecX& r, VecX& x) {
+void BoxProgram::solve_all(const MatrixView& W, const VecX& r, VecX& x) {
     is_free_.assign(r.size(), 1);
     r_ = r;
     solve_free(W);

@@ -29,21 +29,22 @@ class BoxProgram {
 public:
     using Parameters = BoxLcpParameters;
     static constexpr Parameters parameters{};
+    using MatrixView = Eigen::Ref<const MatX>;
 
     // Solve for f. `initial` holds the forces of a similar program (warm start), and its set of forces at their limits is
     // tried first. f may be the same vector as `initial`.
-    void solve(const MatX& W, const VecX& alpha0, const VecX& s, const VecX* initial, VecX& f);
+    void solve(const MatrixView& W, const VecX& alpha0, const VecX& s, const VecX* initial, VecX& f);
     // Compute the minimum-norm x with W x = r, for a symmetric positive semidefinite W. If this equation has no
     // solution, the residual of x is not zero.
-    void solve_all(const MatX& W, const VecX& r, VecX& x);
+    void solve_all(const MatrixView& W, const VecX& r, VecX& x);
 
 private:
     void start(const VecX& s, const VecX* initial);
-    void relax(const MatX& W, const VecX& alpha0, const VecX& s);
-    bool pivot_blocks(const MatX& W, const VecX& alpha0, const VecX& s);
-    void descend(const MatX& W, const VecX& alpha0, const VecX& s);
-    void solve_free(const MatX& W);
-    void measure(const MatX& W, const VecX& alpha0, const VecX& forces);
+    void relax(const MatrixView& W, const VecX& alpha0, const VecX& s);
+    bool pivot_blocks(const MatrixView& W, const VecX& alpha0, const VecX& s);
+    void descend(const MatrixView& W, const VecX& alpha0, const VecX& s);
+    void solve_free(const MatrixView& W);
+    void measure(const MatrixView& W, const VecX& alpha0, const VecX& forces);
     bool solve_regular(int n);
 
     std::vector<char> is_free_;

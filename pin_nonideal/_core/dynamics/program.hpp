@@ -102,6 +102,9 @@ struct Program {
         return constraints < static_cast<int>(blocks.size()) ? blocks[constraints].row : layout.rows;
     }
 
+    // Number of rows of constraints and bilateral contacts, which precede the rows of gaps.
+    int bilateral_rows() const { return gaps.empty() ? constraint_rows() : blocks[first_gap].row; }
+
     // Multiplier of one row of a block's description for multipliers by kept row, see `share_multipliers`.
     double share(const Block& block, int row, const VecX& lam) const { return described.share(block.user_row + row, lam); }
     // Multipliers of all rows of constraints and contacts in the user's numbering.

@@ -114,12 +114,11 @@ static void select_contacts(const Program& p, Workspace& w) {
 }
 
 void select_rows(const Program& p, Workspace& w) {
-    const int before_gaps = p.gaps.empty() ? p.constraint_rows() : p.blocks[p.first_gap].row;
     for (int row : w.now.rows.envelope.row_at) {
         w.now.rows.required[row] = 0;
         w.now.lam[row] = 0.0;  // rows that go out of use keep no force
     }
-    std::fill_n(w.now.rows.required.begin(), before_gaps, char(1));
+    std::fill_n(w.now.rows.required.begin(), p.bilateral_rows(), char(1));
     select_contacts(p, w);
     for (int i : w.now.closed_gaps) {
         const Block& block = p.blocks[p.gaps[i].block];

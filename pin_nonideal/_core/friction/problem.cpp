@@ -1,10 +1,10 @@
 #include "friction/problem.hpp"
 
 #include <cmath>
+#include <utility>
 
 #include "dynamics/acceleration.hpp"
 #include "math/decompositions.hpp"
-#include "math/lanes.hpp"
 #include "math/tolerances.hpp"
 #include "tree/mass_factor.hpp"
 
@@ -28,7 +28,7 @@ void FrictionProblem::each_unit_force(const Program& p, const Workspace& w, cons
     }
 }
 
-FrictionProblem::FrictionProblem(const Program& p, const std::vector<int>& list) : elements(list) {
+FrictionProblem::FrictionProblem(const Program& p, Workspace& w, std::vector<int> list) : elements(std::move(list)) {
     for (int e : elements) {
         dims.push_back(p.frictions[e].dim);
         rows += dims.back();
@@ -39,13 +39,6 @@ FrictionProblem::FrictionProblem(const Program& p, const std::vector<int>& list)
     free = VecX::Zero(rows);
     force = VecX::Zero(p.mechanism.nv);
     unit = lam = none = VecX::Zero(p.layout.rows);
-}
-
-FrictionProblem::FrictionProblem(const Program& p, Workspace& w, std::vector<int> list) : FrictionProblem(p, list) {
-    respond(p, w);
-}
-
-void FrictionProblem::respond(const Program& p, Workspace& w) {
     VecX a(p.mechanism.nv);
     each_unit_force(p, w, [&](int column) {
         solve_acceleration(p, w, force, none, a, lam);
@@ -53,29 +46,6 @@ void FrictionProblem::respond(const Program& p, Workspace& w) {
         multipliers.col(column) = lam;
         W.col(column) = along(p, w, a);
     });
-}
-
-// If pivots of M differ much, use refined solutions.
-void FrictionProblem::respond_in_step(const Program& p, Workspace& w) {
-    scaled = !w.now.rows.refine;
-    if (!scaled) return respond(p, w);
-    each_unit_force(p, w, [&](int column) {
-        free[column] = solve_scaled(p, w, force, nullptr, none, lam);
-        response.col(column) = force;
-        multipliers.col(column) = lam;
-    });
-    gram(response, rows, W);
-}
-
-PN_WIDE void gram(const MatX& X, int n, MatX& W) {
-    const int length = static_cast<int>(X.rows());
-    for (int i = 0; i < n; ++i)
-        for (int j = 0; j <= i; ++j) W(i, j) = W(j, i) = dot(X.col(i).data(), X.col(j).data(), length);
-}
-
-void FrictionProblem::acceleration(const Program& p, Workspace& w, const VecX& f, VecX& a) const {
-    a.noalias() = response * f;
-    if (scaled) solve_Rt(p.mechanism, w.now.terms, a);
 }
 
 bool FrictionProblem::has_unique_forces() const {
@@ -91,17 +61,13 @@ bool FrictionProblem::has_unique_forces() const {
 
 VecX FrictionProblem::along(const Program& p, Workspace& w, const VecX& x) const {
     VecX out(rows);
-    along(p, w, x, out);
-    return out;
-}
-
-void FrictionProblem::along(const Program& p, Workspace& w, const VecX& x, VecX& out) const {
     int row = 0;
     for (int e : elements) {
         const Block& block = block_of(p, e);
         multiply(block, w.now.A, x, w.scratch.r);
         for (size_t k = 0; k < block.kept.size(); ++k) out[row++] = w.scratch.r[block.row + k];
     }
+    return out;
 }
 
 VecX FrictionProblem::slip_accelerations(const Program& p, Workspace& w) const {
@@ -126,15 +92,13 @@ void FrictionProblem::add_forces(const Program& p, Workspace& w, const VecX& f, 
 }
 
 void FrictionProblem::clean(const Program& p, Workspace& w) {
-    if (scaled) {
-        for (int i = 0; i < rows; ++i) drop_held(i, free[i]);
-        return;
-    }
     W = (0.5 * (W + W.transpose())).eval();
     each_unit_force(p, w, [&](int i) {
         solve_R(p.mechanism, w.now.terms, force);
         free[i] = force.squaredNorm();
-        drop_held(i, free[i]);
+        if (W(i, i) > min_constrained_response * free[i]) return;  // else the response is rounding
+        W.row(i).setZero();
+        W.col(i).setZero();
     });
 }
 
@@ -147,13 +111,6 @@ void FrictionProblem::unload_held(const Program& p, Workspace& w) {
         const double noise = relative_acceleration_rounding * (of_motion + std::sqrt(free[i]) * of_forces);
         if (W(i, i) == 0.0 && std::abs(alpha0[i]) <= noise) alpha0[i] = 0.0;
     }
-}
-
-// Set row and column i of W to zero if its response is rounding compared to the unconstrained response.
-void FrictionProblem::drop_held(int i, double unconstrained) {
-    if (W(i, i) > min_constrained_response * unconstrained) return;
-    W.row(i).setZero();
-    W.col(i).setZero();
 }
 
 }  // namespace pn

@@ -16,27 +16,19 @@ struct FrictionProblem {
 
     std::vector<int> elements, dims;  // element i has dims[i] consecutive rows of alpha and f
     int rows = 0;
-    VecX alpha0;       // without any friction of these elements
-    MatX W;            // alpha for a unit of each friction force
-    MatX response, multipliers;  // a and lam for a unit of each friction force
-    VecX free;                   // squared scaled response to each force without constraints
+    VecX alpha0;  // without any friction of these elements
+    MatX W;       // alpha for a unit of each friction force
+    MatX response, multipliers;   // a and lam for a unit of each friction force
+    VecX free;                    // squared scaled response to each force without constraints
     VecX unit, force, lam, none;  // work arrays
-    bool scaled = false;         // the response is a_s = R^T a
 
     // Set up the problem for the factors in the workspace. These elements do not stick there. The caller sets alpha0.
     FrictionProblem(const Program& p, Workspace& w, std::vector<int> elements);
-    // Allocate a problem that changes with every step.
-    FrictionProblem(const Program& p, const std::vector<int>& elements);
-    // Compute the responses at half the cost, if few forces need their motion: W = X^T X for scaled responses X.
-    void respond_in_step(const Program& p, Workspace& w);
     // Check if the accelerations determine the forces, except along directions that the constraints hold.
     bool has_unique_forces() const;
-    // Compute the acceleration due to friction forces f.
-    void acceleration(const Program& p, Workspace& w, const VecX& f, VecX& a) const;
 
     // Compute the rows A x of the elements' directions.
     VecX along(const Program& p, Workspace& w, const VecX& x) const;
-    void along(const Program& p, Workspace& w, const VecX& x, VecX& out) const;
     // Slip accelerations A a - b of the current motion.
     VecX slip_accelerations(const Program& p, Workspace& w) const;
     // Add A^T f to C and store each element's part of f as its slip force.
@@ -51,11 +43,6 @@ struct FrictionProblem {
 private:
     template <class Act>
     void each_unit_force(const Program& p, const Workspace& w, const Act& act);
-    void respond(const Program& p, Workspace& w);
-    void drop_held(int row, double unconstrained);
 };
-
-// Compute W = X^T X of the first n columns.
-void gram(const MatX& X, int n, MatX& W);
 
 }  // namespace pn

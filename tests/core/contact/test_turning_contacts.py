@@ -245,4 +245,4 @@ def test_loads_of_time_stepping(tie):
         for dt in (1e-3, 2.5e-4)
     ]
     assert missed[0] < 0.05
-    assert missed[1] < missed[0] / 3.0
+    assert missed[1] < max(missed[0] / 3.0, 1e-11)  # the work of the sliding ball is exact to rounding

@@ -2,304 +2,457 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <utility>
 
+#include "contact/queries.hpp"
 #include "dynamics/evaluation.hpp"
 #include "dynamics/power.hpp"
-#include "dynamics/friction_limit.hpp"
+#include "dynamics/projection.hpp"
 #include "dynamics/acceleration.hpp"
 #include "dynamics/step_start.hpp"
-#include "complementarity/socp_mode_newton.hpp"
 #include "friction/stick_slip.hpp"
-#include "math/decompositions.hpp"
 #include "run/time_stepping/end_modes.hpp"
 #include "tree/lie_group.hpp"
+#include "tree/terms.hpp"
 
 namespace pn {
 
-namespace {
-
-// Return all elements of a scene without unilateral contacts, else none. MoreauContacts treats other scenes.
-std::vector<int> all_elements(const System& system) {
-    std::vector<int> list(system.ng > 0 ? 0 : system.ne);
-    std::iota(list.begin(), list.end(), 0);
-    return list;
+Moreau::Moreau(System& system, GapWatch& watch)
+    : system_(system), p(system.p), w(system.w), mean_(p), drives_(p), flight_(p, drives_), opposed_(p), watch_(watch),
+      elements_(p), forces_(p, w, elements_), was_closed_(system.ng, 0), closed_(system.ng, 0), open_(system.ng, 0),
+      modes_(system.ne, unloaded), unloaded_(modes_), q_mid_(VecX::Zero(system.nq)), v0_(VecX::Zero(system.nv)), v1_(v0_),
+      a_free_(v0_), power_(VecX::Zero(system.nw)), projection_(system.p), tangent_(v0_) {
+    projection_.energy = system.energy;
+    for (const Gap& gap : p.gaps) rounded_by_.push_back(rounded_by(p.blocks[gap.block].kind));
+    rounded_ = std::any_of(rounded_by_.begin(), rounded_by_.end(), [](double r) { return r < HUGE_VAL; });
+    lam_free_ = VecX::Zero(p.layout.rows);
+    touching_.reserve(system.ng);
 }
 
-}  // namespace
-
-Moreau::Moreau(System& system)
-    : system_(system), p(system.p), w(system.w), problem_(p, all_elements(system)), modes_(system.ne, unloaded),
-      unloaded_(modes_), mean_(p), drives_(p), flight_(p, drives_), q_mid_(VecX::Zero(system.nq)),
-      power_(VecX::Zero(system.nw)), limit_(system.ne, problem_.rows),
-      force_limit_(limit_) {
-    problem_.alpha0 = alpha_ = initial_force_ = VecX::Zero(problem_.rows);
-    for (int dim : problem_.dims) boxes_ = boxes_ && dim == 1;
-    all_rows_.resize(problem_.rows);
-    std::iota(all_rows_.begin(), all_rows_.end(), 0);
+double Moreau::allowed(double t, double h, const VecX& y) {
+    near_edges_.clear();
+    if (!rounded_) return h;
+    bool placed = false;
+    double shortest = h;
+    for (int i : watch_.gaps.monitored_gaps) {
+        if (!(rounded_by_[i] < HUGE_VAL) || w.state.closed[i] || watch_.stays_open_in_step(i)) continue;
+        if (!placed) {
+            system_.read(y);
+            kinematics(p.mechanism, w.now.terms, system_.q, system_.v);
+            placed = true;
+        }
+        follow_gap(p, w, t, system_.v, i);
+        const double width = gap_width(p, w, i), rate = gap_rate(p, w, i);
+        if (!has_known_direction(i, width)) continue;
+        near_edges_.push_back(i);
+        if (!(rate < 0.0)) continue;
+        const double reach = std::max(width, 0.0) + (width > 0.0 ? 0.5 : 1.0) * depth_left(p, w, i, width);
+        shortest = std::min(shortest, reach / -rate);
+    }
+    return shortest;
 }
 
-void Moreau::step(double t, double h, VecX& y, double& numerical_energy) {
+bool Moreau::passes_edge(double t, const VecX& y) {
+    if (near_edges_.empty()) return false;
+    system_.read(y);
+    place_bodies(p.mechanism, w.now.terms, system_.q);
+    return std::any_of(near_edges_.begin(), near_edges_.end(), [&](int i) {
+        if (w.state.closed[i]) return false;
+        measure_gap(p, w, t, system_.v, i);
+        return !has_known_direction(i, gap_width(p, w, i));
+    });
+}
+
+void Moreau::step(double t, double h, VecX& y, double& numerical_energy, double& impact_energy) {
     const Mechanism& m = p.mechanism;
     h_ = h;
     v0_ = system_.velocity(y);
-    move_ = 0.5 * h * v0_;
-    retract(m, y.data(), move_.data(), q_mid_.data());
+    tangent_ = 0.5 * h * v0_;
+    retract(m, y.data(), tangent_.data(), q_mid_.data());
     const double middle = t + 0.5 * h;
+    const bool watched = system_.watches();
+    if (watched || had_contacts_) {
+        std::copy(w.state.mode.begin(), w.state.mode.end(), modes_.begin());
+        was_closed_ = w.state.closed;
+    }
+    had_contacts_ |= watched;
+    forces_.clear_miss();
+    if (watch_.gaps.current || q_sampled_.size() == 0) {
+        q_sampled_ = y.head(system_.nq);
+        has_unknown_percussions_ = true;
+        watch_.begin_time_steps(parameters.width_rounding * scene_size(p, w));
+    }
+    if (!std::exchange(repeats_, false)) find_loaded();
     t0_ = t;
     q0_ = y.head(system_.nq);
-    holds_.clear();
-    for (const Mode mode : w.state.mode) holds_.push_back(mode == sticking);
-    set_modes(p, w, unloaded_);
+    select(open_, unloaded_, true);
     mean_.begin(h, v0_, w.state.last_rates);
     system_.read(y);
     system_.read_law_states(y);
     JointDrives::Step drives(drives_, p, w, t, h, system_.q, v0_);
-    sweep(middle, drives, true);
-    while (mean_.move(false)) sweep(middle, drives, p.has_user_rows);
+    begin_sweeps(middle, drives);
+    while (mean_.move(!touching_.empty()) && correct(middle, drives)) {}
     mean_.keep_rate(w.state.last_rates);
+    flight_.begin();
+    for (const StepRow& row : elements_.rows) flight_.touch(p.blocks[row.block]);
     flight_.move(p, w, h, y.data(), v0_, mean_.value(), v1_);
     if (system_.energy) {
         numerical_energy += drives.energy(mean_.start(), mean_.finish());
-        book_work(y, numerical_energy);
+        book_work(y, numerical_energy, impact_energy);
     }
-    set_modes(p, w, modes_);
+    select(closed_, modes_, elements_.rows.empty());
+    had_contacts_ = watched || !elements_.rows.empty();
     if (system_.nz > 0) y.segment(system_.nq + system_.nv, system_.nz) += h * w.now.dz;
-    move_ = 0.5 * h * v1_;
-    retract(m, q_mid_.data(), move_.data(), y.data());
+    tangent_ = 0.5 * h * v1_;
+    retract(m, q_mid_.data(), tangent_.data(), y.data());
     flight_.place(p, y.data());
     y.segment(system_.nq, system_.nv) = v1_;
 }
 
-// Solve the step with the forces at the mean velocity found so far. `anew`: the rows have changed.
-void Moreau::sweep(double t, JointDrives::Step& drives, bool anew) {
-    if (anew) begin_rows_inside(p, w, t0_, q0_, t, q_mid_, mean_.value());
+bool Moreau::project(double t, VecX& y, double& numerical_energy) {
+    if (!forces_.is_separate()) {
+        open_departing_contacts(t, y);
+        return false;
+    }
+    const bool rests = (v0_.array() == 0.0).all() && (v1_.array() == 0.0).all() && same_bytes(closed_, was_closed_);
+    const bool is_free = rests || (w.now.closed_gaps.empty() && w.now.loaded_elements.empty());
+    if (is_free && !projection_.has_prescribed()) return true;
+    system_.read(y);
+    if (!projection_.project(p, w, t, h_, watch_.gaps.monitored_gaps, system_.q, system_.v)) return false;
+    system_.write(y);
+    numerical_energy += projection_.numerical_energy();
+    return true;
+}
+
+// As ContactProjection::open_departing_contacts, with the responses of the step under the constraints.
+void Moreau::open_departing_contacts(double t, const VecX& y) {
+    if (w.now.closed_gaps.empty()) return;
+    system_.read(y);
+    kinematics(p.mechanism, w.now.terms, system_.q, system_.v);
+    const ContactRounding rounding(p, w, system_.v);
+    bool opens = false;
+    for (size_t e = 0, at = 0; e < elements_.parts.size(); at += elements_.cones[e++].dim) {
+        const int gap = elements_.parts[e].gap;
+        if (gap < 0 || !closed_[gap]) continue;
+        follow_gap(p, w, t, system_.v, gap);
+        const double rate = gap_rate(p, w, gap);
+        if (!(rate > rounding.rate && gap_width(p, w, gap) > rounding.gap)) continue;
+        if (!ContactProjection::departs(rate, h_ * forces_.f[at], forces_.response(static_cast<int>(at)))) continue;
+        closed_[gap] = 0;
+        opens = true;
+    }
+    if (opens) set_closed(p, w, closed_);
+}
+
+const std::vector<char>& Moreau::open_gaps(const VecX& y) {
+    if (q_sampled_.size() == 0) return open_;  // no step was taken yet: no gap is known to be open
+    const VecX change = y.head(system_.nq) - q_sampled_;
+    ambient_to_tangent(p.mechanism, q_sampled_.data(), change.data(), tangent_.data());
+    tangent_ = tangent_.cwiseAbs().cwiseMax(0.5 * h_ * v1_.cwiseAbs());
+    return watch_.open_after(tangent_);
+}
+
+// Solve a sweep. Return its failure if no motion satisfies the laws.
+std::optional<Failure> Moreau::attempt_sweep(double t, JointDrives::Step& drives, bool first) {
+    return attempt({Failure::Kind::not_converged, Failure::Kind::inconsistent}, [&] { sweep(t, drives, first); });
+}
+
+// Solve the step with the forces at the predicted mean velocity. If no motion is found, or only a relaxed one, solve it at
+// the velocity of the start.
+void Moreau::begin_sweeps(double t, JointDrives::Step& drives) {
+    const auto failure = attempt_sweep(t, drives, true);
+    if (failure && !mean_.is_predicted()) throw *failure;
+    if (!mean_.is_predicted() || (!failure && forces_.law_miss().block < 0)) return;
+    forces_.clear_miss();
+    mean_.begin(h_, v0_, VelocityRates());
+    sweep(t, drives, false);
+}
+
+// Solve the step with the forces at the mean velocity found so far.
+void Moreau::sweep(double t, JointDrives::Step& drives, bool first) {
+    if (first || p.has_user_rows) begin_rows_inside(p, w, t0_, q0_, t, q_mid_, mean_.value());
+    if (first) gather(t);
     drives.move(mean_.start(), mean_.value());
-    solve_without_friction(t);
-    if (anew) respond();
-    pose_problem();
-    if (mean_.is_first()) find_rest();
-    do solve_friction(t);
-    while (give_way());
+    solve_free(t);
+    if (!first || mean_.is_predicted()) move_touching(t);
+    forces_.pose(mean_, h_, a_free_, first || p.has_user_rows);
+    solve(t);
     end_velocity();
 }
 
-// Solve the motion without friction of the elements, with constraints satisfied at the step's end.
-void Moreau::solve_without_friction(double t) {
+// Solve the step again with the forces at the mean velocity. If no motion is found, or only a relaxed one, return false
+// with the motion of the first sweep.
+bool Moreau::correct(double t, JointDrives::Step& drives) {
+    const bool relaxed_before = forces_.law_miss().block >= 0;
+    const bool is_solved = !attempt_sweep(t, drives, false);
+    if (is_solved && (relaxed_before || forces_.law_miss().block < 0)) return true;
+    if (!relaxed_before) forces_.clear_miss();
+    mean_.restart();
+    sweep(t, drives, false);
+    return false;
+}
+
+// Set contacts and modes, with their rows. During most of a flight nothing changes. `flies`: no contact is closed and
+// no element active in the new modes.
+void Moreau::select(const std::vector<char>& closed, const std::vector<Mode>& modes, bool flies) {
+    for (const StepRow& row : elements_.rows) w.now.lam[p.blocks[row.block].row + row.k] = 0.0;
+    if (flies && !system_.watches() && !w.now.rows.redundant && !w.now.rows.orthogonal) w.now.renew();
+    else set_contacts(p, w, closed, modes);
+}
+
+// Solve the motion without contacts and dry friction, with constraints satisfied at the step's end.
+void Moreau::solve_free(double t) {
     assemble_forces(p, w, t, mean_.value());
     solve_dynamics(p, w, t, mean_.value());
     a_free_ = w.now.a;
-    lam_free_ = w.now.lam;
-    if (w.now.rows.blocks.empty()) return;
+    if (w.now.rows.blocks.empty()) {
+        w.now.rows.distance = 1.0;
+        return;
+    }
     b_ = w.now.b;
     mean_.meet_at_end(p, w, b_);
+    lam_free_.head(p.bilateral_rows()) = w.now.lam.head(p.bilateral_rows());
     solve_motion(p, w, p.has_laws(), b_, a_free_, lam_free_);
 }
 
-void Moreau::respond() {
-    problem_.respond_in_step(p, w);
-    problem_.clean(p, w);
-    find_dependent();
+// Return the travel of each dof since the last sample of the gaps, including projections. The integral of the velocity
+// is a lower bound of the travel, because differences of angles omit full turns.
+const VecX& Moreau::path_since_last() {
+    q_sampled_ -= q_mid_;
+    ambient_to_tangent(p.mechanism, q_mid_.data(), q_sampled_.data(), v1_.data());
+    tangent_ = v1_.cwiseAbs().cwiseMax(h_ * v0_.cwiseAbs());
+    q_sampled_ = q_mid_;
+    return tangent_;
 }
 
-// Check if some forces of the elements do not move the bodies. Loads, and the limits by them, are then not unique.
-void Moreau::find_dependent() {
-    are_dependent_ = false;
-    if (!p.needs_reactions || w.now.rows.blocks.empty()) return;
-    are_dependent_ = SharedFriction::are_dependent(problem_.W, all_rows_);
+// Collect the elements that take part, with the rates at the step's start. A velocity after a strike is not predicted.
+void Moreau::gather(double t) {
+    move_bodies(p.mechanism, w.now.terms, mean_.start());
+    find_touching(t);
+    elements_.gather(p, w, touching_, was_closed_, modes_, loaded_, mean_);
+    if (elements_.strike()) mean_.begin(h_, v0_, VelocityRates());
 }
 
-// Set up the friction problem. Slip velocities at the step's end over h replace slip accelerations.
-void Moreau::pose_problem() {
-    problem_.along(p, w, a_free_, problem_.alpha0);
-    int at = 0;
-    for (const Friction& friction : p.frictions) {
-        const Block& block = p.blocks[friction.block];
-        mean_.start_rates(p, w, friction.block);
-        for (int k = 0; k < friction.dim; ++k)
-            problem_.alpha0[at++] += w.scratch.r[block.row + k] / h_ + 0.5 * w.now.values[friction.block].bias[k];
+// Find the contacts with a load in the last step.
+void Moreau::find_loaded() {
+    loaded_.clear();
+    const auto add = [&](int block) {
+        if (!p.blocks[block].kept.empty() && w.state.percussion[p.blocks[block].row] > 0.0) loaded_.push_back(block);
+    };
+    if (has_unknown_percussions_)
+        for (const Gap& gap : p.gaps) add(gap.block);
+    else
+        for (const StepRow& row : rows_of_percussions_)
+            if (row.k == 0) add(row.block);
+    std::sort(loaded_.begin(), loaded_.end());
+}
+
+// Find the contacts whose gap is closed at the step's middle, and contacts that were closed before. Their loads decide
+// if they stay closed.
+void Moreau::find_touching(double t) {
+    touching_.clear();
+    const double uncertainty = parameters.width_rounding * scene_size(p, w);
+    for (int i : watch_.advance(path_since_last())) {
+        const double width = measured_width(p, w, t, mean_.start(), i);
+        const bool touches = was_closed_[i] || (width <= 0.0 && has_known_direction(i, width));
+        if (touches) touching_.push_back(i);
+        watch_.gaps.width[i] = touches ? 0.0 : width - uncertainty;  // guaranteed width
     }
-    unload_held();
-}
-
-// Remove the slip that constraints prevent, of elements that no prescribed motion moves.
-void Moreau::drop_prevented_slip() {
-    std::vector<int> rows;
-    for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e)
-        for (int k = 0; k < problem_.dims[e]; ++k)
-            if (!p.follows_drives(e) && problem_.W(at + k, at + k) > 0.0) rows.push_back(at + k);
-    SharedFriction::drop_prevented_slip(problem_.W, rows, problem_.alpha0);
-}
-
-// Remove friction from elements that the constraints alone hold. The rounding of their slip has no sign.
-void Moreau::unload_held() {
-    if (problem_.W.diagonal().all()) return;
-    const double rounding = mean_.held_slip(p, a_free_);
-    for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e) {
-        const int dim = problem_.dims[e];
-        if (problem_.W.diagonal().segment(at, dim).any()) continue;
-        if (problem_.alpha0.segment(at, dim).norm() > rounding) continue;
-        problem_.alpha0.segment(at, dim).setZero();
-        w.state.percussion.segment(p.blocks[p.frictions[e].block].row, dim).setZero();
+    watch_.skip_wide();
+    for (int i : touching_) {
+        evaluate_block(p, w, t, mean_.start(), p.gaps[i].block);
+        for (int e : p.gaps[i].elements) evaluate_block(p, w, t, mean_.start(), p.frictions[e].block);
+    }
+    if (touching_.size() > 1) {
+        opposed_.drop(p, w, was_closed_, touching_);
+        remove_coincident(p, w, touching_, [&](int i, int other) { return was_closed_[i] && !was_closed_[other]; });
     }
 }
 
-// Find the elements without slip at the step's start. Static friction may hold them.
-void Moreau::find_rest() {
-    for (int e = 0; e < system_.ne; ++e) holds_[e] = holds_[e] || mean_.starts_at_rest(p, w, p.frictions[e]);
-}
-
-// Replace static by kinetic friction where static friction does not hold. Return true if it does.
-bool Moreau::give_way() {
-    bool changes = false;
-    alpha_ = problem_.alpha0;
-    alpha_.noalias() += problem_.W * force_;
-    for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e) {
-        if (!holds_[e] || p.frictions[e].static_ratio == 1.0 || is_within_limit(e, at)) continue;
-        if (alpha_.segment(at, problem_.dims[e]).norm() <= slip_rounding()) continue;
-        holds_[e] = false;
-        changes = true;
+// Evaluate the contacts that take part at a new mean velocity.
+void Moreau::move_touching(double t) {
+    for (int i : touching_) {
+        move_block(p, w, t, mean_.value(), p.gaps[i].block);
+        for (int e : p.gaps[i].elements) move_block(p, w, t, mean_.value(), p.frictions[e].block);
     }
-    return changes;
+    elements_.move(p, w);
 }
 
-// Check if the force of an element is below its limit. Its forces start at row `at`.
-bool Moreau::is_within_limit(int e, int at) {
-    const int dim = problem_.dims[e];
-    shifted_ = force_.segment(at, dim);
-    if (dim == 1) shifted_[0] -= force_limit_.middle[at];
-    return shifted_.norm() < force_limit_[e] * (1.0 - parameters.limit_rounding);
+// Set the multipliers of the constraints for the forces f. In a step all contacts are open: their other rows have none.
+void Moreau::begin_multipliers() {
+    if (w.now.rows.blocks.empty()) return;
+    const int rows = p.bilateral_rows();
+    w.now.lam.head(rows) = lam_free_.head(rows);
+    forces_.add_multipliers(w.now.lam);
 }
 
-// Rounding of slip accelerations.
-double Moreau::slip_rounding() const {
-    return parameters.slip_rest_rounding * problem_.alpha0.lpNorm<Eigen::Infinity>();
-}
-
-// Compute the motion under the friction forces.
-void Moreau::apply_forces() {
-    problem_.acceleration(p, w, force_, a_friction_);
-    w.now.a = a_free_ + a_friction_;
-    w.now.lam = lam_free_;
-    w.now.lam.noalias() += problem_.multipliers * force_;
-    for (int e = 0, at = 0; e < system_.ne; ++e) {
-        Vec3& force = w.now.slip_force.change(e);
-        force = Vec3::Zero();
-        for (int k = 0; k < problem_.dims[e]; ++k) force[k] = force_[at++];
-    }
+// Compute the motion under the forces f.
+void Moreau::apply() {
+    const auto& parts = elements_.parts;
+    const auto& cones = elements_.cones;
+    const int n = static_cast<int>(elements_.rows.size());
+    w.now.a = a_free_;
     w.now.renew();
-}
-
-// Update the limits to the loads of the motion in the workspace. Return their largest change.
-double Moreau::update_limits(double t) {
-    double change = 0.0;
-    symmetric_limits_ = true;
-    for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e) {
-        const Friction& friction = p.frictions[e];
-        const SlipLimits load = load_limits(p, w, friction, t, w.now.terms.q, mean_.value());
-        const double speed = slip_velocity(w.now, friction).norm();
-        const SlipLimits limit = load * (holds_[e] ? friction.static_ratio : friction.speed_factor(speed));
-        change = std::max({change, std::abs(limit.reach() - limit_[e]), std::abs(limit.middle() - limit_.middle[at])});
-        limit_.size[e] = limit.reach();
-        limit_.middle[at] = limit.middle();
-        symmetric_limits_ = symmetric_limits_ && limit.middle() == 0.0;
+    if (n == 0) return;
+    forces_.add_motion(w.now.a);
+    begin_multipliers();
+    for (size_t e = 0, at = 0; e < parts.size(); at += cones[e].dim, ++e) {
+        const int head = parts[e].gap >= 0;
+        if (head) w.now.lam[p.blocks[p.gaps[parts[e].gap].block].row] = forces_.f[at];
+        if (parts[e].element < 0) continue;
+        Vec3& force = w.now.slip_force.change(parts[e].element);
+        force = Vec3::Zero();
+        for (int k = head; k < cones[e].dim; ++k) force[k - head] = forces_.f[at + k];
     }
-    return change;
 }
 
-// Compute the next iterate of the limits from two limits: one gave the force, the other follows from it.
-void Moreau::accelerate_limits() {
-    const Eigen::Index ne = system_.ne, rows = problem_.rows;
-    VecX from(ne + rows), to(ne + rows);
-    from << force_limit_.size, force_limit_.middle;
-    to << limit_.size, limit_.middle;
-    const VecX next = loads_.next(from, to);
-    limit_.size = next.head(ne).cwiseMax(0.0);
-    limit_.middle = next.tail(rows);
+// Elements at rest can share loads in many ways, so that limits which follow the loads need not converge. Solve the step
+// with a part of these limits. Return true if all elements rest and their forces are within the limits that follow.
+bool Moreau::rest_within_limits(double t) {
+    elements_.reduce_limits();
+    if (!forces_.solve(h_, q0_, v0_)) return false;
+    apply();
+    forces_.measure_end();
+    const auto end = forces_.end_rows.head(static_cast<Eigen::Index>(elements_.rows.size()));
+    return EndModes(v0_).is_stopped(h_ * end.cwiseAbs().maxCoeff()) &&
+           elements_.limits_hold(p, w, t, mean_, forces_.f);
 }
 
-// Solve for the friction forces, with limits for the loads of this step.
-void Moreau::solve_friction(double t) {
-    int at = 0;  // warm start from forces of the last step, whose modes usually persist
-    for (const Friction& friction : p.frictions)
-        for (int k = 0; k < friction.dim; ++k)
-            initial_force_[at++] = w.state.percussion[p.blocks[friction.block].row + k];
+// Find the forces of the step under limits that follow the loads. Friction may grow against slip that constraints prevent
+// without end.
+void Moreau::solve_forces(double t) {
     if (find_forces(t)) return;
-    if (!are_dependent_) throw Failure(Failure::Kind::not_converged, t, problem_.elements);
-    drop_prevented_slip();  // friction may grow against it without end
-    if (!find_forces(t)) throw Failure(Failure::Kind::not_converged, t, problem_.elements);
+    if (forces_.are_dependent()) {
+        forces_.drop_prevented_slip();
+        if (find_forces(t)) return;
+    }
+    const std::vector<int> contradicting = forces_.contradicting_contacts();
+    if (!contradicting.empty()) throw Failure(Failure::Kind::inconsistent, t, contradicting);
+    std::vector<int> rubbing;
+    for (const StepElements::Part& part : elements_.parts)
+        if (part.element >= 0) rubbing.push_back(part.element);
+    throw Failure(Failure::Kind::not_converged, t, rubbing);
 }
 
 // Alternate between the forces and the limits by their loads. Return false if this does not converge.
 bool Moreau::find_forces(double t) {
-    force_.setZero(problem_.rows);
-    double last_change = HUGE_VAL;
-    loads_.restart();
-    for (int pass = 0; pass < parameters.max_load_passes; ++pass) {
-        // Limits that depend on no load need no motion.
-        if (pass == 0 || p.needs_reactions) apply_forces();
-        const double change = update_limits(t);
-        const double largest = system_.ne > 0 ? std::max(0.0, limit_.size.maxCoeff()) : 0.0;
-        const bool stalls = change > parameters.min_load_decrease * last_change &&
-                            change <= parameters.stall_load_tolerance * largest;
-        last_change = change;
-        if (pass > 0 && (change <= parameters.load_tolerance * largest || stalls || !p.needs_reactions)) return true;
-        if (pass > 0) accelerate_limits();
-        if (!symmetric_limits_) force_ = friction_program(problem_.W, problem_.alpha0, problem_.dims, limit_);
-        else if (problem_.rows > 0 && boxes_)
-            box_.solve(problem_.W, problem_.alpha0, limit_.size, &initial_force_, force_);
-        else force_ = friction_program(problem_.W, problem_.alpha0, problem_.dims, limit_.size, &initial_force_);
-        force_limit_ = limit_;
-        if (are_dependent_) share_loads();
-        initial_force_ = force_;
+    const int n = static_cast<int>(elements_.rows.size());
+    const bool loads =
+        n > 0 && elements_.cones.back().is(ConeElement::Kind::box);  // limits that may depend on the motion
+    elements_.begin_passes();
+    for (int pass = 0; n > 0; ++pass) {
+        if (loads || pass > 0) apply();
+        const double allowed = StepForces::parameters.max_residual * forces_.f.head(n).cwiseAbs().maxCoeff();
+        if (elements_.limits_settle(p, w, t, mean_, allowed) && pass > 0) break;
+        if (pass > 0 && forces_.are_dependent()) elements_.accelerate_limits();
+        if (pass == parameters.max_load_passes && rest_within_limits(t)) break;
+        if (pass == parameters.max_load_passes || !forces_.solve(h_, q0_, v0_)) return false;
+        if (forces_.are_dependent()) forces_.share_loads(h_, v0_);
+        ++w.counters.iterations;
     }
-    return false;
+    if (n == 0) apply();
+    return true;
 }
 
-// Replace the forces of elements that stick by the forces of least norm with the same motion.
-void Moreau::share_loads() {
-    alpha_ = problem_.alpha0;
-    alpha_.noalias() += problem_.W * force_;
-    std::vector<SharedFriction::Element> sticking;
-    for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e) {
-        const int dim = problem_.dims[e];
-        const bool sticks = is_within_limit(e, at) || alpha_.segment(at, dim).norm() <= slip_rounding();
-        if (sticks && force_limit_[e] > 0.0) sticking.push_back({at, dim, force_limit_[e], force_limit_.middle[at]});
+void Moreau::solve(double t) {
+    const int n = static_cast<int>(elements_.rows.size());
+    solve_forces(t);
+    while (elements_.may_give_way(p)) {
+        forces_.measure_end();
+        const double largest = forces_.f.head(n).cwiseAbs().maxCoeff();
+        if (!elements_.give_way(p, w, forces_.f, forces_.end_rows, StepForces::parameters.limit_rounding * largest,
+                                rest_rate(v0_) / h_))
+            break;
+        solve_forces(t);
     }
-    shared_.share(problem_.W, sticking, force_);
+    keep_percussions();
+    if (n == 0) return;
+    const ConeResiduals r = forces_.residuals();
+    w.counters.signorini = std::max(w.counters.signorini, r.signorini);
+    w.counters.coulomb = std::max(w.counters.coulomb, r.coulomb);
+    w.counters.dissipation = std::max(w.counters.dissipation, r.dissipation);
 }
 
-// Compute the velocity and the modes at the step's end. A force below its limit holds its element.
+// Keep the forces as the first guess of the next step.
+void Moreau::keep_percussions() {
+    const auto entry = [&](const StepRow& row) -> double& { return w.state.percussion[p.blocks[row.block].row + row.k]; };
+    if (has_unknown_percussions_) w.state.percussion.setZero();
+    has_unknown_percussions_ = false;
+    for (const StepRow& row : rows_of_percussions_) entry(row) = 0.0;
+    rows_of_percussions_ = elements_.rows;
+    for (size_t i = 0; i < rows_of_percussions_.size(); ++i) entry(rows_of_percussions_[i]) = forces_.f[i];
+}
+
+// Compute the velocity, the closed contacts and the modes at the step's end. A force below
+// its limit holds an element whose slip stops. If a solution satisfies neither condition, the condition with the
+// smaller error decides.
 void Moreau::end_velocity() {
-    alpha_ = problem_.alpha0;
-    alpha_.noalias() += problem_.W * force_;
-    problem_.acceleration(p, w, force_, a_friction_);
-    a_friction_ += a_free_;
-    mean_.end(a_friction_, v1_);
-    const EndModes end(v1_);
-    for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e) {
-        const int dim = problem_.dims[e];
-        w.state.percussion.segment(p.blocks[p.frictions[e].block].row, dim) = force_.segment(at, dim);
-        const double slip = alpha_.segment(at, dim).norm();
-        const bool sticks = is_within_limit(e, at) || (end.is_rest(h_ * slip) && slip <= slip_rounding());
-        modes_[e] = EndModes::settle(sticks, dim > 1 || alpha_[at] > 0.0, p.blocks[p.frictions[e].block], v1_);
+    const auto& parts = elements_.parts;
+    const auto& cones = elements_.cones;
+    const int n = static_cast<int>(elements_.rows.size());
+    const VecX& f = forces_.f;
+    VecX& end = forces_.end_rows;
+    if (n > 0) forces_.measure_end();
+    mean_.end(w.now.a, v1_);
+    if (had_contacts_) {
+        std::fill(closed_.begin(), closed_.end(), char(0));
+        std::fill(modes_.begin(), modes_.end(), unloaded);
     }
+    if (n == 0) return;
+    const EndModes rule(v1_);
+    const double clear = StepForces::parameters.limit_rounding * f.head(n).cwiseAbs().maxCoeff();
+    const double still = h_ * forces_.rest_of_rows();
+    end.head(n) *= h_;
+    for (size_t e = 0, at = 0; e < parts.size(); at += cones[e].dim, ++e) {
+        const StepElements::Part& part = parts[e];
+        const int head = part.gap >= 0, dim = cones[e].dim - head;
+        if (head) closed_[part.gap] = rule.is_rest(end[at] - part.approach);
+        if (part.element < 0 || (head && !closed_[part.gap])) continue;
+        const double limit = cones[e].bound * (head ? f[at] : 1.0);
+        const double size = dim == 1 ? std::abs(f[at + head] - part.middle) : f.segment(at + head, dim).norm();
+        const double slip = end.segment(at + head, dim).norm();
+        const double error = h_ * forces_.row_error(static_cast<int>(at), cones[e].dim);
+        // In short steps joints slip less than the speed of rest.
+        const bool rests = rule.is_rest(slip, error) && (head || slip <= still + error);
+        const bool holds =
+            limit - size > clear && (rule.is_stopped(slip) || rule.is_nearer_to_rest(slip, size, limit));
+        const bool forward = dim > 1 || (dim > 0 && end[at + head] > 0.0);
+        const Block& block = p.blocks[p.frictions[part.element].block];
+        const Mode mode = EndModes::settle(holds || rests, forward, block, v1_);
+        modes_[part.element] = dim > 0 ? mode : slip_minus;
+    }
+    forces_.stop_resting_trees(h_, v0_, v1_);
+    const auto rest = [&](int e) {  // elements held by the constraints stick
+        if (modes_[e] == unloaded && (p.frictions[e].gap < 0 || closed_[p.frictions[e].gap])) modes_[e] = sticking;
+    };
+    for (int e : elements_.outside_contacts()) rest(e);
+    for (int i : touching_)
+        for (int e : p.gaps[i].elements) rest(e);
+    had_contacts_ = true;
 }
 
-// Add the work over the step, by the mean velocity. If a slip reverses inside the step, friction opposes the slip at
-// the step's end and can do positive work on the mean velocity. This work is due to the scheme, not to friction.
-void Moreau::book_work(VecX& y, double& numerical_energy) {
-    w.now.lam = lam_free_;
-    w.now.lam.noalias() += problem_.multipliers * force_;
-    move_ = 0.5 * (mean_.start() + mean_.finish());
-    powers(p, w, move_, power_.data());  // powers of all forces but dry friction, whose modes are not set yet
-    problem_.along(p, w, move_, alpha_);
-    for (int e = 0, at = 0; e < system_.ne; at += problem_.dims[e], ++e) {
-        double& power = power_[first_law_power + p.frictions[e].law];
-        power += alpha_.segment(at, problem_.dims[e]).dot(force_.segment(at, problem_.dims[e]));
-        if (!(power > 0.0)) continue;
-        numerical_energy += h_ * power;
-        power = 0.0;
+// Add the work over the step, by the mean velocity. The work of contacts along their normals belongs to impacts. If a slip
+// reverses inside the step, friction opposes the slip at the step's end and can do positive work on the mean velocity.
+// This work is due to the scheme, not to friction.
+void Moreau::book_work(VecX& y, double& numerical_energy, double& impact_energy) {
+    const auto& rows = elements_.rows;
+    const auto& parts = elements_.parts;
+    const auto& cones = elements_.cones;
+    begin_multipliers();
+    tangent_ = 0.5 * (mean_.start() + mean_.finish());
+    powers(p, w, tangent_, power_.data());
+    for (size_t e = 0, at = 0; e < parts.size(); at += cones[e].dim, ++e) {
+        double power = 0.0;
+        for (int k = 0; k < cones[e].dim; ++k) {
+            const StepRow& row = rows[at + k];
+            multiply(p.blocks[row.block], w.now.A, tangent_, w.scratch.r);
+            const double part = w.scratch.r[p.blocks[row.block].row + row.k] * forces_.f[at + k];
+            if (k == 0 && parts[e].gap >= 0) impact_energy += h_ * part;
+            else power += part;
+        }
+        if (parts[e].element < 0) continue;
+        if (power > 0.0) numerical_energy += h_ * power;
+        else power_[first_law_power + p.frictions[parts[e].element].law] += power;
     }
     system_.work(y) += h_ * power_;
 }

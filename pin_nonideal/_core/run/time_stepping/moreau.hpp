@@ -1,34 +1,34 @@
-// Time stepping at velocity level (Moreau's midpoint rule): the scheme, and its step in scenes without unilateral
-// contacts. moreau_contacts.hpp adds the contacts. With the slip velocities u at the step's end and the percussions P,
+// Step of time stepping at velocity level (Moreau's midpoint rule). With the slip velocities u at the step's end and the
+// percussions P of constraints and P_f of friction and contacts,
 //     q_m = q0 + h/2 v0,   M (v1 - v0) = h (F + C)(q_m, (v0 + v1)/2) + A^T P + N^T P_f,   q1 = q_m + h/2 v1,
 //     A v1 + phi_t = 0,
-// and P_f opposes u within h times its limit. The scheme has order 2 between events and no creep: sticking elements have
-// zero velocity. All friction elements are solved together.
+// and friction opposes u within h times its limit. A contact takes part if its gap is closed at the step's middle. With
+// the rate u_n- of its gap before the step, the restitution e and the percussion (P_n, P_t),
+//     0 <= P_n,   0 <= u_n + e min(u_n-, 0),   one of them zero,     |P_t| <= mu P_n,
+// and P_t opposes the slip velocity. These laws and the limits of the other friction elements form one cone problem. The
+// scheme has order 2 between events and no creep: sticking elements have zero velocity.
 #pragma once
 
+#include <optional>
 #include <vector>
 
-#include "complementarity/box_lcp.hpp"
-#include "complementarity/friction_limits.hpp"
-#include "friction/problem.hpp"
-#include "math/anderson.hpp"
-#include "run/integrators/system.hpp"
+#include "dynamics/failure.hpp"
+#include "run/events/gap_watch.hpp"
+#include "run/time_stepping/contact_projection.hpp"
 #include "run/time_stepping/free_flight.hpp"
 #include "run/integrators/joint_drives.hpp"
 #include "run/time_stepping/mean_velocity.hpp"
-#include "run/time_stepping/shared_friction.hpp"
+#include "run/time_stepping/opposed_contacts.hpp"
+#include "run/time_stepping/step_forces.hpp"
 
 namespace pn {
 
 struct MoreauParameters {
-    double load_tolerance = 1e-13;  // change of limits that counts as rounding, relative to the largest limit
-    // Change of limits that counts as rounding if a pass no longer halves it: loads of long chains have more
-    // rounding.
-    double stall_load_tolerance = 1e-9, min_load_decrease = 0.5;
-    double limit_rounding = 1e-12;     // distance of a force at its limit, relative to the limit
-    double slip_rest_rounding = 1e-9;  // slip at the end that counts as none, relative to that without friction
     // Maximum number of passes for load-dependent limits.
     int max_load_passes = 60;
+    double width_rounding = 1e-12;  // uncertainty of a gap at rest, relative to the scene's size
+    // Maximum penetration of edges and rims with a defined normal, relative to their rounding.
+    double nearly_all = 0.999;
 };
 
 class Moreau {
@@ -36,56 +36,92 @@ public:
     using Parameters = MoreauParameters;
     static constexpr Parameters parameters{};
 
-    explicit Moreau(System& system);
+    Moreau(System& system, GapWatch& watch);
 
-    // Take one step of size h from y at t. The energy added by the scheme itself is added to numerical_energy. The modes
-    // are set for the step's end. The caller must project and evaluate the end.
-    void step(double t, double h, VecX& y, double& numerical_energy);
+    // Discard the gaps and forces of earlier steps.
+    void reset() {
+        q_sampled_.resize(0);
+        forces_.reset();
+    }
+    // Return the longest step from y at t, up to h. Approaching edges and rims may penetrate by half of their rounding.
+    // If they already penetrate, the middle of the step may reach half of the remaining rounding. Deeper edges and rims
+    // have no defined normal, and may pass through each other.
+    double allowed(double t, double h, const VecX& y);
+    // Check if such an edge or rim has lost its normal since the call of `allowed`, at the end y of a step, at t. An impact
+    // inside the step may turn a body toward it.
+    bool passes_edge(double t, const VecX& y);
+    // Take one step of size h from y at t. The work of contacts along their normals is added to impact_energy. The
+    // energy added by the scheme itself is added to numerical_energy. The modes are set for the step's end. The caller must
+    // project and evaluate the end.
+    void step(double t, double h, VecX& y, double& numerical_energy, double& impact_energy);
+    // The next step is another attempt from the state of the last step: the loads before the first attempt count.
+    void repeat() { repeats_ = true; }
+    // Project the end y of the last step, at t, tree by tree. Return false if constraints join the trees: the caller
+    // must then project the end onto all rows of the scene. Contacts that depart open in both cases.
+    bool project(double t, VecX& y, double& numerical_energy);
+
+    // Return the gaps that are open at the end y of the last step, by gap. Narrow open gaps may be missing.
+    const std::vector<char>& open_gaps(const VecX& y);
+
+    // Check if the last step was solved tree by tree.
+    bool is_separate() const { return forces_.is_separate(); }
+    // Contact whose laws the last step missed.
+    const StepForces::LawMiss& law_miss() const { return forces_.law_miss(); }
 
 private:
-    void sweep(double t, JointDrives::Step& drives, bool anew);
-    void solve_without_friction(double t);
-    void respond();
-    void pose_problem();
-    void unload_held();
-    void drop_prevented_slip();
-    void solve_friction(double t);
+    bool has_known_direction(int gap, double width) const {
+        constexpr double nearly_all = Moreau::parameters.nearly_all;
+        return width > -nearly_all * rounded_by_[gap] || width > -nearly_all * max_depth(p, w, gap);
+    }
+    void open_departing_contacts(double t, const VecX& y);
+    void select(const std::vector<char>& closed, const std::vector<Mode>& modes, bool flies);
+    void begin_sweeps(double t, JointDrives::Step& drives);
+    void sweep(double t, JointDrives::Step& drives, bool first);
+    std::optional<Failure> attempt_sweep(double t, JointDrives::Step& drives, bool first);
+    bool correct(double t, JointDrives::Step& drives);
+    void solve_free(double t);
+    const VecX& path_since_last();
+    void gather(double t);
+    void find_touching(double t);
+    void move_touching(double t);
+    bool rest_within_limits(double t);
     bool find_forces(double t);
-    void find_rest();
-    bool give_way();
-    bool is_within_limit(int e, int at);
-    double slip_rounding() const;
-    void find_dependent();
-    void share_loads();
-    void accelerate_limits();
-    void apply_forces();
-    double update_limits(double t);
+    void solve_forces(double t);
+    void solve(double t);
+    void begin_multipliers();
+    void apply();
+    void find_loaded();
+    void keep_percussions();
     void end_velocity();
-    void book_work(VecX& y, double& numerical_energy);
+    void book_work(VecX& y, double& numerical_energy, double& impact_energy);
 
     System& system_;
     const Program& p;
     Workspace& w;
-    FrictionProblem problem_;  // problem of all elements
-    std::vector<Mode> modes_, unloaded_;
-    std::vector<char> holds_;  // elements that static friction may hold
-    double h_ = 0.0, t0_ = 0.0;  // length and start of the step
-    VecX q0_;
     MeanVelocity mean_;
     JointDrives drives_;
     FreeFlight flight_;
-    VecX q_mid_, v0_, v1_, move_, b_, a_free_, lam_free_;  // free: without friction of the elements
-    VecX a_friction_, alpha_, initial_force_;
-    BoxProgram box_;
-    bool boxes_ = true;  // every element has one direction
-    VecX force_, power_;                  // forces and powers of the elements
-    FrictionLimits limit_, force_limit_;  // current limits, and the limits for which the force was found
-    SharedFriction shared_;
-    std::vector<int> all_rows_;
-    bool are_dependent_ = false;    // some forces do not move the bodies: elements that stick share loads
-    bool symmetric_limits_ = true;  // all limits are equal forward and backward
-    AndersonAcceleration loads_;
-    VecX shifted_;
+    OpposedContacts opposed_;
+    double h_ = 0.0, t0_ = 0.0;  // length and start of the step
+    VecX q0_;
+    GapWatch& watch_;
+    std::vector<int> touching_;  // gaps that take part, ascending
+    std::vector<int> near_edges_;  // gaps of edges and rims with a normal that a step may reach
+    StepElements elements_;
+    StepForces forces_;
+    std::vector<char> was_closed_, closed_, open_;
+    std::vector<Mode> modes_, unloaded_;
+    std::vector<double> rounded_by_;   // rounding of each gap
+    bool rounded_ = false;             // a gap has rounding
+    bool had_contacts_ = false;  // the last step had a closed contact or an active element
+    bool has_unknown_percussions_ = true;  // other rows than these may have percussions
+    std::vector<StepRow> rows_of_percussions_;
+    std::vector<int> loaded_;  // blocks of the contacts with a load before the step, ascending
+    bool repeats_ = false;     // the next step is another attempt
+    VecX q_mid_, q_sampled_, v0_, v1_, a_free_, lam_free_, power_;
+    ContactProjection projection_;
+    VecX b_;
+    VecX tangent_;  // move, travel or mean velocity of the step
 };
 
 }  // namespace pn

@@ -68,7 +68,7 @@ void StepForces::drop_prevented_slip() {
     SharedFriction::drop_prevented_slip(W, rows, free_rows_);
 }
 
-// As Moreau::unload_held.
+// Remove friction from elements that the constraints alone hold. The rounding of their slip has no sign.
 void StepForces::unload_held(const MeanVelocity& mean, const VecX& a_free) {
     const auto W = responses_.matrix(static_cast<int>(elements_.rows.size()));
     if (W.diagonal().all()) return;
@@ -167,6 +167,7 @@ bool StepForces::solve(double h, const VecX& q0, const VecX& v0) {
     const int n = static_cast<int>(elements_.rows.size());
     elements_.middles(middle_);
     guess_ = f.head(n);
+    status_ = ConeStatus::solved;
     const double error = separate_ ? trees_.solve(elements_.cones, middle_, f) : HUGE_VAL;
     error_ = separate_ ? error : 0.0;
     bool solved = error <= parameters.max_residual;
@@ -183,18 +184,41 @@ bool StepForces::solve(double h, const VecX& q0, const VecX& v0) {
     f.head(n) -= middle_.head(n);
     end_rows.head(n) = free_rows_.head(n);
     end_rows.head(n).noalias() += W * middle_.head(n);
+    const bool is_of_boxes = has_boxes_only();
+    if (!solved && is_of_boxes) {
+        solve_boxes();
+        solved = true;
+    }
     solver_.search_briefly(error < parameters.max_brief_error);
     if (!solved) {
-        solved = solver_.solve(W, end_rows.head(n), elements_.cones, true, f.head(n), true) == ConeStatus::solved &&
-                 !add_energy(W, end_rows.head(n), f.head(n));
+        status_ = solver_.solve(W, end_rows.head(n), elements_.cones, true, f.head(n), true);
+        solved = status_ == ConeStatus::solved && !add_energy(W, end_rows.head(n), f.head(n));
         error_ = solver_.error();
     }
-    if (starts && !separate_ && keep_rest(solved, q0)) {
+    if (starts && !separate_ && !is_of_boxes && keep_rest(solved, q0)) {
         solved = true;
         error_ = 0.0;
     }
     f.head(n) += middle_.head(n);
     return solved || (separate_ && trees_.miss().element >= 0 && accept_best_forces(h));
+}
+
+// Check if every element is dry friction in one direction.
+bool StepForces::has_boxes_only() const {
+    return std::all_of(elements_.cones.begin(), elements_.cones.end(),
+                       [](const ConeElement& cone) { return cone.is(ConeKind::box) && cone.dim == 1; });
+}
+
+// Solve a problem of boxes, which is convex, for forces from their middles. The rows without forces are in end_rows.
+void StepForces::solve_boxes() {
+    const int n = static_cast<int>(elements_.rows.size());
+    box_rows_ = end_rows.head(n);
+    centered_ = f.head(n);
+    bounds_.resize(n);
+    for (int i = 0; i < n; ++i) bounds_[i] = elements_.cones[i].bound;
+    box_.solve(responses_.matrix(n), box_rows_, bounds_, &centered_, centered_);
+    f.head(n) = centered_;
+    error_ = 0.0;
 }
 
 // Hold trees at rest that forces can hold. Return true if all rest.
@@ -217,6 +241,16 @@ bool StepForces::accept_best_forces(double h) {
     return true;
 }
 
+std::vector<int> StepForces::contradicting_contacts() const {
+    std::vector<int> blocks;
+    if (status_ != ConeStatus::infeasible && status_ != ConeStatus::jammed) return blocks;
+    const VecX& pushes = solver_.certificate();
+    const double least = parameters.limit_rounding * pushes.cwiseAbs().maxCoeff();
+    for (size_t e = 0, at = 0; e < elements_.parts.size(); at += elements_.cones[e++].dim)
+        if (elements_.parts[e].gap >= 0 && pushes[at] > least) blocks.push_back(p.gaps[elements_.parts[e].gap].block);
+    return blocks;
+}
+
 void StepForces::measure_end() {
     const int n = static_cast<int>(elements_.rows.size());
     if (separate_) return trees_.move(middle_, f, a_, end_rows);
@@ -229,12 +263,16 @@ double StepForces::row_error(int at, int dim) const {
     return std::min(error_, parameters.max_residual) * free_rows_.segment(at, dim).cwiseAbs().maxCoeff();
 }
 
+double StepForces::rest_of_rows() const {
+    const auto free = free_rows_.head(static_cast<Eigen::Index>(elements_.rows.size()));
+    return parameters.rest_rounding * free.cwiseAbs().maxCoeff();
+}
+
 bool StepForces::moves() {
     const int n = static_cast<int>(elements_.rows.size());
     measure_end();
     if (separate_) return !trees_.rests(a_);
-    return end_rows.head(n).cwiseAbs().maxCoeff() >
-           parameters.rest_rounding * free_rows_.head(n).cwiseAbs().maxCoeff();
+    return end_rows.head(n).cwiseAbs().maxCoeff() > rest_of_rows();
 }
 
 // Check if forces within all cones hold the bodies at rest, and set f to such forces. The rows without forces are in
@@ -257,7 +295,8 @@ ConeResiduals StepForces::residuals() {
     const auto W = responses_.matrix(n);
     end_rows.head(n) = free_rows_.head(n);
     end_rows.head(n).noalias() += W * middle_.head(n);
-    return cone_residuals(W, end_rows.head(n), elements_.cones, f.head(n) - middle_.head(n));
+    centered_ = f.head(n) - middle_.head(n);
+    return cone_residuals(W, end_rows.head(n), elements_.cones, centered_);
 }
 
 }  // namespace pn

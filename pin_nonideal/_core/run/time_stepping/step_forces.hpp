@@ -4,6 +4,7 @@
 // constraints, the responses of all rows are used.
 #pragma once
 
+#include "complementarity/box_lcp.hpp"
 #include "complementarity/cone/solver.hpp"
 #include "run/time_stepping/separate_trees.hpp"
 #include "run/time_stepping/shared_friction.hpp"
@@ -60,6 +61,8 @@ public:
     double response(int row) const { return responses_.diagonal(row); }
     // Error of the rows at, ..., at + dim - 1 of an element at the step's end, if the forces satisfy the laws.
     double row_error(int at, int dim) const;
+    // Return the rate of rows at the step's end that counts as rest, over the step's length.
+    double rest_of_rows() const;
     // Errors of the laws for the forces.
     ConeResiduals residuals();
 
@@ -80,6 +83,8 @@ public:
         double miss = 0.0;
     };
     const LawMiss& law_miss() const { return law_miss_; }
+    // Return the blocks of contacts that the motion closes whatever the forces, after a search that found no forces.
+    std::vector<int> contradicting_contacts() const;
     void clear_miss() { law_miss_ = {}; }
 
 private:
@@ -89,6 +94,8 @@ private:
     void unload_held(const MeanVelocity& mean, const VecX& a_free);
     void find_dependent();
     bool accept_best_forces(double h);
+    bool has_boxes_only() const;
+    void solve_boxes();
     bool moves();
     bool hold_trees(const VecX& q0);
     bool keep_rest(bool solved, const VecX& q0);
@@ -99,6 +106,7 @@ private:
     SeparateTrees trees_;
     bool separate_ = false;
     double error_ = 0.0;     // error of the last solution, relative to the rows without forces
+    ConeStatus status_ = ConeStatus::solved;  // of the last search with all responses
     bool has_load_ = false;  // the rows without forces are more than rounding
     StepResponses responses_;
     SharedFriction shared_;
@@ -106,8 +114,11 @@ private:
     std::vector<SharedFriction::Element> sticking_;
     std::vector<int> dry_rows_;
     ConeComplementarity solver_;
+    BoxProgram box_;
     LawMiss law_miss_;
     VecX free_rows_, offset_, middle_, guess_, best_f_, a_;
+    VecX centered_;            // forces from the middles of their limits
+    VecX box_rows_, bounds_;  // rows without forces and limits of a problem of boxes
 };
 
 }  // namespace pn

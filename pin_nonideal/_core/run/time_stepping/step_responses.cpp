@@ -1,11 +1,22 @@
 #include "run/time_stepping/step_responses.hpp"
 
 #include "dynamics/acceleration.hpp"
-#include "friction/problem.hpp"
+#include "math/lanes.hpp"
 #include "math/tolerances.hpp"
 #include "tree/mass_factor.hpp"
 
 namespace pn {
+
+namespace {
+
+// Compute W = X^T X of the first n columns.
+PN_WIDE void gram(const MatX& X, int n, MatX& W) {
+    const int length = static_cast<int>(X.rows());
+    for (int i = 0; i < n; ++i)
+        for (int j = 0; j <= i; ++j) W(i, j) = W(j, i) = dot(X.col(i).data(), X.col(j).data(), length);
+}
+
+}  // namespace
 
 StepResponses::StepResponses(const Program& p)
     : unit_(VecX::Zero(p.layout.rows)), zero_(unit_), lam_(unit_), free_response_(unit_),

@@ -32,13 +32,14 @@ TimeStepping::TimeStepping(System& system, Progress& progress, GapWatch& watch, 
                            Torques& torques, Output& output, Warnings& warnings, ValueEvents& value_events,
                            Recording& out)
     : p(system.p), w(system.w), system_(system), progress_(progress), options_(options), torques_(torques),
-      output_(output), warnings_(warnings), value_events_(value_events), out_(out), moreau_(system),
-      moreau_contacts_(system, watch), is_autonomous_(!may_differ(system.p, options)),
+      output_(output), warnings_(warnings), value_events_(value_events), out_(out), moreau_(system, watch),
+      is_autonomous_(!may_differ(system.p, options)),
       samples_every_step_(options.method.scheme != Method::Scheme::moreau || options.output_dt == 0.0 ||
                           reads_forces_always(system.p, options)),
       reads_forces_(options.record.evaluates() || reads_forces_always(system.p, options)),
       directions_(options.method.scheme == Method::Scheme::moreau ? System::SlipDirection::of_end
-                                                                  : System::SlipDirection::of_step) {}
+                                                                  : System::SlipDirection::of_step),
+      may_lack_motion_(system.ng > 0 || options.method.scheme != Method::Scheme::moreau) {}
 
 // End of a step of this size: at a stop, a jump of the actuation or a due sample before it. Times that differ only by
 // rounding count as one end, the latest time.
@@ -59,13 +60,8 @@ double TimeStepping::end_of_step(double size, double stop, double t_end) const {
     return end;
 }
 
-// Check if nothing moves and the sticking elements leave no freedom.
-bool TimeStepping::rests() const {
-    return is_autonomous_ && (system_.velocity(progress_.y).array() == 0.0).all() && is_immobile(p, w);
-}
-
-// Check if accelerations and forces are due at the step's end: at a sample, at the end of the run, or for slip without
-// contacts. Slip needs them if its direction or limit depends on them.
+// Check if accelerations and forces are due at the step's end: at a sample, at the end of the run, or for slip in a scene
+// without contacts. Several motions and paradoxes of friction are found where forces are evaluated.
 bool TimeStepping::needs_forces(double end, double t_end) const {
     if (samples_every_step_ || end >= t_end || end >= options_.end() || output_.next() <= end + rounding_)
         return true;
@@ -74,25 +70,25 @@ bool TimeStepping::needs_forces(double end, double t_end) const {
     });
 }
 
-// Take as much of a step to `end` as approaching edges allow, in a scene with unilateral contacts. If an edge passes
-// another edge in this part, half of the part is taken instead.
+// Take as much of a step to `end` as approaching edges allow. If an edge passes another edge in this part, half of the
+// part is taken instead.
 void TimeStepping::step_part(double end, double t_end, double least) {
     const double from = progress_.t, numerical = progress_.numerical_energy, impacts = progress_.impact_energy;
-    double h = std::max(moreau_contacts_.allowed(from, end - from, progress_.y), least);
+    double h = std::max(moreau_.allowed(from, end - from, progress_.y), least);
     y_before_part_ = progress_.y.head(system_.ns);
     before_part_ = w.state.mode;
     closed_before_part_ = w.state.closed;
     for (;; h = std::max(0.5 * h, least)) {
         try_part(h, end, t_end);
-        if (h <= least || !moreau_contacts_.passes_edge(progress_.t, progress_.y)) break;
+        if (h <= least || !moreau_.passes_edge(progress_.t, progress_.y)) break;
         progress_.t = from;
         progress_.y.head(system_.ns) = y_before_part_;
         progress_.numerical_energy = numerical;
         progress_.impact_energy = impacts;
         set_contacts(p, w, closed_before_part_, before_part_);
-        moreau_contacts_.repeat();
+        moreau_.repeat();
     }
-    const StepForces::LawMiss& relaxed = moreau_contacts_.law_miss();
+    const StepForces::LawMiss& relaxed = moreau_.law_miss();
     if (relaxed.block >= 0 && !progress_.misses_laws) {
         out_.events.push_back({progress_.t, Event::Kind::relaxed, relaxed.block});
         out_.events.back().miss = relaxed.miss;
@@ -105,65 +101,54 @@ void TimeStepping::try_part(double h, double end, double t_end) {
     double& t = progress_.t;
     const double left = end - t;
     const bool whole = h >= (1.0 - parameters.min_remainder) * left;
-    moreau_contacts_.step(t, whole ? left : h, progress_.y, progress_.numerical_energy, progress_.impact_energy);
+    moreau_.step(t, whole ? left : h, progress_.y, progress_.numerical_energy, progress_.impact_energy);
     t = whole ? end : t + h;
     const bool needs_forces_here = progress_.has_forces = whole && needs_forces(end, t_end);
-    if (moreau_contacts_.project(t, progress_.y, progress_.numerical_energy)) {
+    if (moreau_.project(t, progress_.y, progress_.numerical_energy)) {
         progress_.has_forces = needs_forces_here && reads_forces_;
         if (!progress_.has_forces) return;
         if (directions_ == System::SlipDirection::of_end) follow_slip(p, w, system_.v);
-        system_.evaluate_step_end(t, progress_.y, progress_.rate, true);
+        system_.evaluate_step_end(t, progress_.y, progress_.rate, may_lack_motion_);
         return;
     }
-    system_.settle(t, progress_.y, progress_.rate, needs_forces_here, true, directions_);
+    system_.settle(t, progress_.y, progress_.rate, needs_forces_here, may_lack_motion_, directions_);
     progress_.numerical_energy += system_.numerical_energy;
 }
 
 // A step that starts and ends at rest with the same contacts and modes leaves the state unchanged.
-void TimeStepping::step_with_contacts(double end, double t_end) {
+void TimeStepping::take(double end, double t_end) {
     const double min_size = parameters.min_cut * (end - progress_.t);
+    const double energy_before = progress_.numerical_energy;
     const bool may_stand = is_autonomous_ && (system_.velocity(progress_.y).array() == 0.0).all();
+    const bool is_held = may_stand && system_.ng == 0 && is_immobile(p, w);
     if (may_stand) {
         y_from_ = progress_.y.head(system_.ns);
         before_step_ = w.state.mode;
         closed_before_step_ = w.state.closed;
     }
     while (progress_.t < end) step_part(end, t_end, min_size);
-    progress_.is_stationary = may_stand && !progress_.misses_laws && progress_.y.head(system_.ns) == y_from_ &&
-                              same_bytes<Mode>(before_step_, w.state.mode) &&
-                              same_bytes(closed_before_step_, w.state.closed);
+    progress_.is_stationary = false;
+    if (!may_stand || progress_.misses_laws || !same_bytes<Mode>(before_step_, w.state.mode) ||
+        !same_bytes(closed_before_step_, w.state.closed))
+        return;
+    if (is_held) {
+        stay_at_rest();
+        progress_.numerical_energy = energy_before;
+    }
+    progress_.is_stationary = progress_.y.head(system_.ns) == y_from_;
 }
 
-void TimeStepping::take(double end, double t_end) {
-    if (system_.ng > 0) return step_with_contacts(end, t_end);
-    double& t = progress_.t;
-    VecX &y = progress_.y, &y_from = y_from_;
-    const bool was_at_rest = rests();
-    Modes& before = before_step_;
-    if (was_at_rest) {
-        y_from = y;
-        before = w.state.mode;
-    }
-    const double energy_before = progress_.numerical_energy;
-    moreau_.step(t, end - t, y, progress_.numerical_energy);
-    t = end;
-    const bool held = was_at_rest && std::equal(before.begin(), before.end(), w.state.mode.begin());
-    if (!held) {
-        const bool bridges = options_.method.scheme != Method::Scheme::moreau;
-        system_.settle(t, y, progress_.rate, needs_forces(end, t_end), bridges, directions_);
-        progress_.numerical_energy += system_.numerical_energy;
-        return;
-    }
-    // Remove the rounding from a motion held at rest. Law states continue.
-    y.head(system_.nq + system_.nv) = y_from.head(system_.nq + system_.nv);
-    system_.work(y) = system_.work(y_from);
-    progress_.numerical_energy = energy_before;
+// Remove the rounding from a motion held at rest. Law states continue.
+void TimeStepping::stay_at_rest() {
+    VecX& y = progress_.y;
+    const Eigen::Index moving = system_.nq + system_.nv;
+    y.head(moving) = y_from_.head(moving);
+    y.segment(moving + system_.nz, system_.nw) = y_from_.segment(moving + system_.nz, system_.nw);
     system_.read(y);
     system_.read_law_states(y);
-    begin_step(p, w, t, system_.q, system_.v);
-    system_.rate_of_evaluation(t, y, progress_.rate);
+    begin_step(p, w, progress_.t, system_.q, system_.v);
+    system_.rate_of_evaluation(progress_.t, y, progress_.rate);
     progress_.has_forces = true;
-    progress_.is_stationary = y == y_from;
 }
 
 // Elements at rest take their modes and slip directions from the end of a first step, which costs far less than a solution
@@ -172,10 +157,10 @@ void TimeStepping::begin(double size) {
     system_.read(progress_.y);
     std::vector<char> closed = system_.touching.at(p, w, progress_.t, system_.q, system_.v, true).rest;
     set_closed(p, w, closed);
-    moreau_contacts_.reset();
+    moreau_.reset();
     VecX y = progress_.y;
     double numerical_energy = 0.0, impact_energy = 0.0;
-    moreau_contacts_.step(progress_.t, size, y, numerical_energy, impact_energy);
+    moreau_.step(progress_.t, size, y, numerical_energy, impact_energy);
     for (size_t i = 0; i < closed.size(); ++i) closed[i] = closed[i] && w.state.closed[i];
     const std::vector<Mode> modes = w.state.mode;
     system_.read(y);
@@ -190,7 +175,7 @@ void TimeStepping::begin(double size) {
         w.state.slip_direction[e] = w.state.last_direction[e] = directions[e];
     }
     set_contacts(p, w, closed, first.modes);
-    if (reads_forces_ || !moreau_contacts_.is_separate())
+    if (reads_forces_ || !moreau_.is_separate())
         system_.evaluate_step_end(progress_.t, progress_.y, progress_.rate, true);
 }
 
@@ -209,7 +194,7 @@ void TimeStepping::step(double size, double stop, double t_end) {
     }
     const VecX y_from = options_.record.dense ? y : VecX();
     const double impact_energy_from = progress_.impact_energy;
-    const bool lacks_forces = !progress_.has_forces && (reads_forces_ || system_.ng == 0) && needs_forces(end, t_end);
+    const bool lacks_forces = !progress_.has_forces && reads_forces_ && needs_forces(end, t_end);
     if (!progress_.is_stationary || lacks_forces) take(end, t_end);
     t = end;
     ++out_.steps;
@@ -226,7 +211,7 @@ void TimeStepping::step(double size, double stop, double t_end) {
     value_events_.append_events(t, out_.events);
     if (!value_events_.found().empty()) output_.now();
     const bool measures = system_.ng > 0 && output_.is_due(rounding_);
-    output_.end_time_step(rounding_, measures ? &moreau_contacts_.open_gaps(y) : nullptr);
+    output_.end_time_step(rounding_, measures ? &moreau_.open_gaps(y) : nullptr);
 }
 
 }  // namespace pn

@@ -3,7 +3,6 @@
 #pragma once
 
 #include "run/time_stepping/moreau.hpp"
-#include "run/time_stepping/moreau_contacts.hpp"
 #include "run/events/warnings.hpp"
 #include "run/torque_schedule.hpp"
 #include "run/events/value_events.hpp"
@@ -31,9 +30,8 @@ public:
     void step(double size, double stop, double t_end);
 
 private:
-    bool rests() const;
     void take(double end, double t_end);
-    void step_with_contacts(double end, double t_end);
+    void stay_at_rest();
     void step_part(double end, double t_end, double least);
     void try_part(double h, double end, double t_end);
     bool needs_forces(double end, double t_end) const;
@@ -50,7 +48,6 @@ private:
     ValueEvents& value_events_;
     Recording& out_;
     Moreau moreau_;
-    MoreauContacts moreau_contacts_;
     const bool is_autonomous_;  // a state that a step leaves unchanged stays unchanged
     double rounding_ = 0.0;  // difference of two times that count as the same end of a step
     const bool samples_every_step_;  // every step's end is a sample, or user code reads it
@@ -58,6 +55,7 @@ private:
     // them.
     const bool reads_forces_;
     const System::SlipDirection directions_;
+    const bool may_lack_motion_;  // the modes at a step's end may allow no motion
     VecX y_from_;
     Modes before_, before_step_;
     std::vector<char> closed_before_, closed_before_step_;

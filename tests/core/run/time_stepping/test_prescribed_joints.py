@@ -187,3 +187,21 @@ def test_records_of_a_driven_arm_change_nothing_and_balance(kind: str, hold: flo
     np.testing.assert_array_equal(run.q, plain.q)
     assert np.abs(run.energy["balance"]).max() < 1e-4
     assert np.abs(run.energy["projection"]).max() < 1e-2
+
+
+@pytest.mark.parametrize("contact", ["limit", "floor"])
+@pytest.mark.parametrize("method", ["dop853", "moreau"])
+def test_a_motion_prescribed_into_a_contact_is_refused_by_name(method: str, contact: str) -> None:
+    model, shapes = pin.Model(), pin.GeometryModel()
+    lift = model.addJoint(0, pin.JointModelPZ(), pin.SE3.Identity(), "lift")
+    model.appendBodyToJoint(lift, pin.Inertia.FromBox(5.0, 0.4, 0.4, 0.1), pin.SE3.Identity())
+    shapes.addGeometryObject(pin.GeometryObject("table", lift, pin.SE3.Identity(), coal.Box(0.4, 0.4, 0.1)))
+    shapes.addGeometryObject(pn.ground())
+    floor = pn.GeometryContact("table", "ground", mu=0.5)
+    contacts = [pn.JointLimit("lift", lower=0.05) if contact == "limit" else floor]
+    drive = pn.PrescribedMotion("lift", pn.polynomial([0.3, -0.5]), name="drive")
+    scene = pn.Scene(model, constraints=[drive], contacts=contacts, collision_model=shapes, q0=[0.3])
+    with pytest.raises(pn.InconsistentConstraintsError, match=r'cannot separate.*\("drive"\)') as told:
+        pn.simulate(scene, 1.0, method=method, **({"dt": DT} if method == "moreau" else {}))
+    assert 'method="moreau"' not in str(told.value)
+    assert abs(told.value.time - 0.5) <= 2.0 * DT
