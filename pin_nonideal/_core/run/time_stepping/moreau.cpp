@@ -401,7 +401,7 @@ void Moreau::end_velocity() {
     if (n == 0) return;
     const EndModes rule(v1_);
     const double clear = StepForces::parameters.limit_rounding * f.head(n).cwiseAbs().maxCoeff();
-    const double still = h_ * forces_.rest_of_rows();
+    const double still = h_ * std::max(forces_.rest_of_rows(), mean_.held_slip(p, a_free_));
     end.head(n) *= h_;
     for (size_t e = 0, at = 0; e < parts.size(); at += cones[e].dim, ++e) {
         const StepElements::Part& part = parts[e];

@@ -205,3 +205,21 @@ def test_a_motion_prescribed_into_a_contact_is_refused_by_name(method: str, cont
         pn.simulate(scene, 1.0, method=method, **({"dt": DT} if method == "moreau" else {}))
     assert 'method="moreau"' not in str(told.value)
     assert abs(told.value.time - 0.5) <= 2.0 * DT
+
+
+def test_friction_of_a_driven_joint_changes_its_mode_where_its_motion_does() -> None:
+    """The joint stands, turns from 0.05 to 0.2 s and stands again, beside two joints that swing."""
+    model, place = pin.Model(), pin.SE3(np.eye(3), np.array([0.0, 0.0, -0.3]))
+    parent = 0
+    for name in ("driven", "middle", "last"):
+        parent = model.addJoint(parent, pin.JointModelRY(), place if parent else pin.SE3.Identity(), name)
+        model.appendBodyToJoint(
+            parent, pin.Inertia(1.0, place.translation, 0.01 * np.eye(3)), pin.SE3.Identity()
+        )
+    turn = pn.spline([0.05, 0.2], [0.0, 0.2])
+    for motion, kinds in ((turn, ["slip", "stick"]), (pn.constant(0.0), [])):
+        drive = pn.PrescribedMotion("driven", motion, name="drive")
+        rough = pn.JointFriction("driven", coulomb=0.5)
+        scene = pn.Scene(model, constraints=[drive], laws=[rough], v0=[0.0, -0.7, 0.3])
+        run = pn.simulate(scene, 0.25, method="moreau", dt=DT)
+        assert [event.kind for event in run.events] == kinds
