@@ -22,7 +22,7 @@ void StepForces::pose(const MeanVelocity& mean, double h, const VecX& a_free, bo
     has_load_ = (free.array().abs() > parameters.row_rounding * largest).any();
     if (anew) {
         responses_.reset();
-        separate_ = !elements_.limits_follow_loads(p) &&
+        separate_ = !elements_.limits_follow_loads(p) && !has_few_boxes() &&
                     trees_.pose(p, w, elements_.rows, elements_.cones, a_free, offset_);
     } else if (separate_) {
         trees_.release(a_free, offset_);
@@ -207,6 +207,12 @@ bool StepForces::solve(double h, const VecX& q0, const VecX& v0) {
 bool StepForces::has_boxes_only() const {
     return std::all_of(elements_.cones.begin(), elements_.cones.end(),
                        [](const ConeElement& cone) { return cone.is(ConeKind::box) && cone.dim == 1; });
+}
+
+// Check if the scene has no contacts and no constraints, and few joints with dry friction.
+bool StepForces::has_few_boxes() const {
+    return p.gaps.empty() && w.now.rows.blocks.empty() && has_boxes_only() &&
+           static_cast<int>(elements_.rows.size()) <= parameters.max_boxes_with_responses;
 }
 
 // Solve a problem of boxes, which is convex, for forces from their middles. The rows without forces are in end_rows.

@@ -19,6 +19,9 @@ struct StepForcesParameters {
     // Largest number of rows of separate trees that are solved with all responses if the search tree by tree fails. The
     // cost grows by the cube of the number, to a tenth of a second here.
     int max_rows_with_responses = 200;
+    // Largest number of joints with dry friction, in a scene without contacts and constraints, that take less time with
+    // all responses than tree by tree.
+    int max_boxes_with_responses = 32;
     // Largest turn of a direction in a step whose change of a rate is taken into account [half rad].
     double max_turn = 0.25;
     // Distance of a force at its limit, relative to the largest force.
@@ -95,6 +98,7 @@ private:
     void find_dependent();
     bool accept_best_forces(double h);
     bool has_boxes_only() const;
+    bool has_few_boxes() const;
     void solve_boxes();
     bool moves();
     bool hold_trees(const VecX& q0);
