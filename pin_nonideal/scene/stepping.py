@@ -37,13 +37,18 @@ class Stepper:
     Args:
         run: stepped run of the core.
         compiled: the compiled scene.
+        method: method of the run.
         delayed: delayed torques of the run, or None.
     """
 
     def __init__(
-        self, run: core.SteppedRun, compiled: CompiledScene, delayed: DelayedTorque | None = None
+        self,
+        run: core.SteppedRun,
+        compiled: CompiledScene,
+        method: str,
+        delayed: DelayedTorque | None = None,
     ) -> None:
-        self._run, self._compiled, self._delayed = run, compiled, delayed
+        self._run, self._compiled, self._method, self._delayed = run, compiled, method, delayed
 
     def __repr__(self) -> str:
         at = f"at t = {self.t:g} s" if self._run.begun else "stopped"
@@ -124,9 +129,9 @@ class Stepper:
             except ValueError as error:
                 raise InputError(f"Stepper: {error}") from None
             except core.CoreFailure as failure:
-                raise self._compiled.named(failure) from None
+                raise self._compiled.named(failure, self._method) from None
         except core.CoreFailure as failure:
-            raise self._compiled.named(failure) from None
+            raise self._compiled.named(failure, self._method) from None
 
     def _require_begun(self) -> None:
         if not self._run.begun:
@@ -197,7 +202,8 @@ class SceneStepper:
         )
         begin = number("stepper: t0", t0)
         program, delayed = self._compiled.program_of_runs(begin)
-        stepper = Stepper(self._new_run(program, method, length, size, *tolerances), self._compiled, delayed)
+        run = self._new_run(program, method, length, size, *tolerances)
+        stepper = Stepper(run, self._compiled, method, delayed)
         at, speed, _ = self._states.project(q, v, begin)
         stepper.reset(at, speed, begin, tau)
         return stepper

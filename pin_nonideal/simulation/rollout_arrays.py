@@ -110,7 +110,7 @@ def run_arrays(
         complete = [outcome for outcome in outcomes if outcome is not None]
         if len(complete) < len(outcomes):
             raise RunInterrupted("the runs were interrupted")
-        return _of_outcomes(compiled, complete)
+        return _of_outcomes(compiled, complete, options.method)
     numbers_of_runs = np.ascontiguousarray(numbers.values)
     program = compiled.program_of_runs(options.t0, by_thread=True)[0]
     try:
@@ -128,11 +128,11 @@ def run_arrays(
         violation,
         steps.astype(np.int64),
     )
-    runs.failures.update(_failures(compiled, dict(stopped), violation))
+    runs.failures.update(_failures(compiled, dict(stopped), violation, options.method))
     return runs
 
 
-def _of_outcomes(compiled: CompiledScene, outcomes: Sequence[core.Outcome]) -> RunArrays:
+def _of_outcomes(compiled: CompiledScene, outcomes: Sequence[core.Outcome], method: str) -> RunArrays:
     """Return the samples of runs whose components took their own steps."""
     n, (nq, nv) = len(outcomes), (compiled.model.nq, compiled.model.nv)
     samples = np.array([len(one.t) for one in outcomes], dtype=np.int64)
@@ -149,17 +149,18 @@ def _of_outcomes(compiled: CompiledScene, outcomes: Sequence[core.Outcome]) -> R
     violation = np.array([one.largest_violation for one in outcomes])
     steps = np.array([one.steps for one in outcomes], dtype=np.int64)
     stopped = {i: one.stopped for i, one in enumerate(outcomes) if one.stopped is not None}
-    return RunArrays(t, q, v, samples, violation, steps, _failures(compiled, stopped, violation))
+    failures = _failures(compiled, stopped, violation, method)
+    return RunArrays(t, q, v, samples, violation, steps, failures)
 
 
 def _failures(
-    compiled: CompiledScene, stopped: dict[int, BaseException], violation: Array
+    compiled: CompiledScene, stopped: dict[int, BaseException], violation: Array, method: str
 ) -> dict[int, PinNonidealError]:
     """Return the errors of stopped runs and of runs that have left their constraints, by index."""
     failures: dict[int, PinNonidealError] = {}
     for i, cause in stopped.items():
         if isinstance(cause, core.CoreFailure):
-            failures[i] = compiled.named(cause)
+            failures[i] = compiled.named(cause, method)
         elif isinstance(cause, PinNonidealError):
             failures[i] = cause
         elif isinstance(cause, KeyboardInterrupt):

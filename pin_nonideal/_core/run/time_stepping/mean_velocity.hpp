@@ -55,7 +55,6 @@ public:
     // needed. `touches`: contacts take part.
     bool move(bool touches);
 
-    bool is_first() const { return moves_ == 0; }  // no sweep has ended
     bool is_predicted() const { return is_predicted_; }  // the first sweep is at another velocity than the start
     const VecX& value() const { return value_; }  // velocity at which the forces are taken
     const VecX& start() const { return start_; }  // velocity of the start, in the axes at the middle of the step

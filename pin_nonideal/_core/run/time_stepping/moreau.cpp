@@ -342,9 +342,10 @@ bool Moreau::find_forces(double t) {
     elements_.begin_passes();
     for (int pass = 0; n > 0; ++pass) {
         if (loads || pass > 0) apply();
-        const double allowed = StepForces::parameters.max_residual * forces_.f.head(n).cwiseAbs().maxCoeff();
+        const double rounding = touching_.empty() ? parameters.stalled_limits : StepForces::parameters.max_residual;
+        const double allowed = rounding * forces_.f.head(n).cwiseAbs().maxCoeff();
         if (elements_.limits_settle(p, w, t, mean_, allowed) && pass > 0) break;
-        if (pass > 0 && forces_.are_dependent()) elements_.accelerate_limits();
+        if (pass > 0 && (touching_.empty() || forces_.are_dependent())) elements_.accelerate_limits();
         if (pass == parameters.max_load_passes && rest_within_limits(t)) break;
         if (pass == parameters.max_load_passes || !forces_.solve(h_, q0_, v0_)) return false;
         if (forces_.are_dependent()) forces_.share_loads(h_, v0_);

@@ -26,6 +26,9 @@ namespace pn {
 struct MoreauParameters {
     // Maximum number of passes for load-dependent limits.
     int max_load_passes = 60;
+    // Change of limits without closed contacts that counts as rounding if passes no longer reduce it, relative to the
+    // largest force: loads of long chains have more rounding.
+    double stalled_limits = 1e-9;
     double width_rounding = 1e-12;  // uncertainty of a gap at rest, relative to the scene's size
     // Maximum penetration of edges and rims with a defined normal, relative to their rounding.
     double nearly_all = 0.999;

@@ -177,7 +177,8 @@ bool StepForces::solve(double h, const VecX& q0, const VecX& v0) {
     if (separate_ && starts && hold_trees(q0)) return true;
     if (separate_ && solved) return true;
     if (!solved) best_f_ = f.head(n);
-    if (separate_ && n > parameters.max_rows_with_responses) return accept_best_forces(h);
+    const bool has_best = separate_ && trees_.miss().element >= 0;
+    if (separate_ && n > parameters.max_rows_with_responses) return has_best && accept_best_forces(h);
     responses_.find(p, w, elements_.rows);
     if (!solved) f.head(n) = guess_;
     const auto W = responses_.matrix(n);
@@ -197,10 +198,11 @@ bool StepForces::solve(double h, const VecX& q0, const VecX& v0) {
     }
     if (starts && !separate_ && !is_of_boxes && keep_rest(solved, q0)) {
         solved = true;
+        status_ = ConeStatus::solved;
         error_ = 0.0;
     }
     f.head(n) += middle_.head(n);
-    return solved || (separate_ && trees_.miss().element >= 0 && accept_best_forces(h));
+    return solved || (has_best && accept_best_forces(h));
 }
 
 // Check if every element is dry friction in one direction.

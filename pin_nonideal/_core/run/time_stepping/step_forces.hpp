@@ -1,7 +1,7 @@
 // Forces of the contacts and the dry friction in one step of time stepping: the cone problem of its elements.
 //
-// If there are no constraints but prescribed motions, the trees are solved one by one. If this fails, and with other
-// constraints, the responses of all rows are used.
+// If there are no constraints but prescribed motions, and no limit of dry friction follows a load, the trees are solved one
+// by one. If this fails, and in other scenes, the responses of all rows are used.
 #pragma once
 
 #include "complementarity/box_lcp.hpp"
@@ -110,7 +110,7 @@ private:
     SeparateTrees trees_;
     bool separate_ = false;
     double error_ = 0.0;     // error of the last solution, relative to the rows without forces
-    ConeStatus status_ = ConeStatus::solved;  // of the last search with all responses
+    ConeStatus status_ = ConeStatus::solved;  // of the last search for cones with all responses
     bool has_load_ = false;  // the rows without forces are more than rounding
     StepResponses responses_;
     SharedFriction shared_;

@@ -61,7 +61,7 @@ double TimeStepping::end_of_step(double size, double stop, double t_end) const {
 }
 
 // Check if accelerations and forces are due at the step's end: at a sample, at the end of the run, or for slip in a scene
-// without contacts. Several motions and paradoxes of friction are found where forces are evaluated.
+// without contacts whose constraints or loads may allow several motions or none: the evaluation finds them.
 bool TimeStepping::needs_forces(double end, double t_end) const {
     if (samples_every_step_ || end >= t_end || end >= options_.end() || output_.next() <= end + rounding_)
         return true;
@@ -179,6 +179,18 @@ void TimeStepping::begin(double size) {
         system_.evaluate_step_end(progress_.t, progress_.y, progress_.rate, true);
 }
 
+// Add a sample at an event, whose forces are not due otherwise.
+void TimeStepping::sample_event() {
+    if (!progress_.has_forces && options_.record.evaluates()) {
+        system_.read(progress_.y);
+        update_kinematics(p, w, progress_.t, system_.q, system_.v);
+        if (directions_ == System::SlipDirection::of_end) follow_slip(p, w, system_.v);
+        system_.evaluate_step_end(progress_.t, progress_.y, progress_.rate, may_lack_motion_);
+        progress_.has_forces = true;
+    }
+    output_.now();
+}
+
 void TimeStepping::step(double size, double stop, double t_end) {
     rounding_ = std::max(parameters.min_remainder * size, same_time(progress_.t));
     torques_.enter(progress_.t + rounding_);
@@ -209,7 +221,7 @@ void TimeStepping::step(double size, double stop, double t_end) {
     output_.keep_time_step({from, y_from, closed_before_, before_}, impact_energy_from);
     value_events_.sample_end(t, y);
     value_events_.append_events(t, out_.events);
-    if (!value_events_.found().empty()) output_.now();
+    if (!value_events_.found().empty()) sample_event();
     const bool measures = system_.ng > 0 && output_.is_due(rounding_);
     output_.end_time_step(rounding_, measures ? &moreau_.open_gaps(y) : nullptr);
 }

@@ -32,6 +32,7 @@ public:
 private:
     void take(double end, double t_end);
     void stay_at_rest();
+    void sample_event();
     void step_part(double end, double t_end, double least);
     void try_part(double h, double end, double t_end);
     bool needs_forces(double end, double t_end) const;

@@ -201,8 +201,13 @@ def test_a_motion_prescribed_into_a_contact_is_refused_by_name(method: str, cont
     contacts = [pn.JointLimit("lift", lower=0.05) if contact == "limit" else floor]
     drive = pn.PrescribedMotion("lift", pn.polynomial([0.3, -0.5]), name="drive")
     scene = pn.Scene(model, constraints=[drive], contacts=contacts, collision_model=shapes, q0=[0.3])
+    step = {"dt": DT} if method == "moreau" else {}
     with pytest.raises(pn.InconsistentConstraintsError, match=r'cannot separate.*\("drive"\)') as told:
-        pn.simulate(scene, 1.0, method=method, **({"dt": DT} if method == "moreau" else {}))
+        pn.simulate(scene, 1.0, method=method, **step)
+    if step:
+        stepper = scene.stepper(1.0, method=method, **step)
+        with pytest.raises(pn.InconsistentConstraintsError, match=r'cannot separate at.*\("drive"\)'):
+            stepper.step()
     assert 'method="moreau"' not in str(told.value)
     assert abs(told.value.time - 0.5) <= 2.0 * DT
 
