@@ -17,50 +17,15 @@
 
 namespace pn {
 
-Moreau::Moreau(System& system, GapWatch& watch)
+Moreau::Moreau(System& system, GapWatch& watch, const ApproachingEdges& edges)
     : system_(system), p(system.p), w(system.w), mean_(p), drives_(p), flight_(p, drives_), opposed_(p), watch_(watch),
-      elements_(p), forces_(p, w, elements_), was_closed_(system.ng, 0), closed_(system.ng, 0), open_(system.ng, 0),
-      modes_(system.ne, unloaded), unloaded_(modes_), q_mid_(VecX::Zero(system.nq)), v0_(VecX::Zero(system.nv)), v1_(v0_),
-      a_free_(v0_), power_(VecX::Zero(system.nw)), projection_(system.p), tangent_(v0_) {
+      edges_(edges), elements_(p), forces_(p, w, elements_), was_closed_(system.ng, 0), closed_(system.ng, 0),
+      open_(system.ng, 0), modes_(system.ne, unloaded), unloaded_(modes_), q_mid_(VecX::Zero(system.nq)),
+      v0_(VecX::Zero(system.nv)), v1_(v0_), a_free_(v0_), power_(VecX::Zero(system.nw)), projection_(system.p),
+      tangent_(v0_) {
     projection_.energy = system.energy;
-    for (const Gap& gap : p.gaps) rounded_by_.push_back(rounded_by(p.blocks[gap.block].kind));
-    rounded_ = std::any_of(rounded_by_.begin(), rounded_by_.end(), [](double r) { return r < HUGE_VAL; });
     lam_free_ = VecX::Zero(p.layout.rows);
     touching_.reserve(system.ng);
-}
-
-double Moreau::allowed(double t, double h, const VecX& y) {
-    near_edges_.clear();
-    if (!rounded_) return h;
-    bool placed = false;
-    double shortest = h;
-    for (int i : watch_.gaps.monitored_gaps) {
-        if (!(rounded_by_[i] < HUGE_VAL) || w.state.closed[i] || watch_.stays_open_in_step(i)) continue;
-        if (!placed) {
-            system_.read(y);
-            kinematics(p.mechanism, w.now.terms, system_.q, system_.v);
-            placed = true;
-        }
-        follow_gap(p, w, t, system_.v, i);
-        const double width = gap_width(p, w, i), rate = gap_rate(p, w, i);
-        if (!has_known_direction(i, width)) continue;
-        near_edges_.push_back(i);
-        if (!(rate < 0.0)) continue;
-        const double reach = std::max(width, 0.0) + (width > 0.0 ? 0.5 : 1.0) * depth_left(p, w, i, width);
-        shortest = std::min(shortest, reach / -rate);
-    }
-    return shortest;
-}
-
-bool Moreau::passes_edge(double t, const VecX& y) {
-    if (near_edges_.empty()) return false;
-    system_.read(y);
-    place_bodies(p.mechanism, w.now.terms, system_.q);
-    return std::any_of(near_edges_.begin(), near_edges_.end(), [&](int i) {
-        if (w.state.closed[i]) return false;
-        measure_gap(p, w, t, system_.v, i);
-        return !has_known_direction(i, gap_width(p, w, i));
-    });
 }
 
 void Moreau::step(double t, double h, VecX& y, double& numerical_energy, double& impact_energy) {
@@ -254,7 +219,7 @@ void Moreau::find_touching(double t) {
     const double uncertainty = parameters.width_rounding * scene_size(p, w);
     for (int i : watch_.advance(path_since_last())) {
         const double width = measured_width(p, w, t, mean_.start(), i);
-        const bool touches = was_closed_[i] || (width <= 0.0 && has_known_direction(i, width));
+        const bool touches = was_closed_[i] || (width <= 0.0 && edges_.has_known_direction(i, width));
         if (touches) touching_.push_back(i);
         watch_.gaps.width[i] = touches ? 0.0 : width - uncertainty;  // guaranteed width
     }
@@ -337,11 +302,10 @@ void Moreau::solve_forces(double t) {
 // Alternate between the forces and the limits by their loads. Return false if this does not converge.
 bool Moreau::find_forces(double t) {
     const int n = static_cast<int>(elements_.rows.size());
-    const bool loads =
-        n > 0 && elements_.cones.back().is(ConeElement::Kind::box);  // limits that may depend on the motion
+    const bool follow_loads = elements_.limits_follow_loads(p);
     elements_.begin_passes();
     for (int pass = 0; n > 0; ++pass) {
-        if (loads || pass > 0) apply();
+        if (follow_loads || pass > 0) apply();
         const double rounding = touching_.empty() ? parameters.stalled_limits : StepForces::parameters.max_residual;
         const double allowed = rounding * forces_.f.head(n).cwiseAbs().maxCoeff();
         if (elements_.limits_settle(p, w, t, mean_, allowed) && pass > 0) break;
@@ -384,9 +348,8 @@ void Moreau::keep_percussions() {
     for (size_t i = 0; i < rows_of_percussions_.size(); ++i) entry(rows_of_percussions_[i]) = forces_.f[i];
 }
 
-// Compute the velocity, the closed contacts and the modes at the step's end. A force below
-// its limit holds an element whose slip stops. If a solution satisfies neither condition, the condition with the
-// smaller error decides.
+// Compute the velocity, the closed contacts and the modes at the step's end. A force below its limit holds an element
+// whose slip stops. If a solution satisfies neither condition, the condition with the smaller error decides.
 void Moreau::end_velocity() {
     const auto& parts = elements_.parts;
     const auto& cones = elements_.cones;
@@ -413,7 +376,7 @@ void Moreau::end_velocity() {
         const double size = dim == 1 ? std::abs(f[at + head] - part.middle) : f.segment(at + head, dim).norm();
         const double slip = end.segment(at + head, dim).norm();
         const double error = h_ * forces_.row_error(static_cast<int>(at), cones[e].dim);
-        // In short steps joints slip less than the speed of rest.
+        // In a short step an element may begin to slip at less than the speed of rest.
         const bool rests = rule.is_rest(slip, error) && (head || slip <= still + error);
         const bool holds =
             limit - size > clear && (rule.is_stopped(slip) || rule.is_nearer_to_rest(slip, size, limit));

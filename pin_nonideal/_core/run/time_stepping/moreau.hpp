@@ -14,6 +14,7 @@
 
 #include "dynamics/failure.hpp"
 #include "run/events/gap_watch.hpp"
+#include "run/time_stepping/approaching_edges.hpp"
 #include "run/time_stepping/contact_projection.hpp"
 #include "run/time_stepping/free_flight.hpp"
 #include "run/integrators/joint_drives.hpp"
@@ -30,8 +31,6 @@ struct MoreauParameters {
     // largest force: loads of long chains have more rounding.
     double stalled_limits = 1e-9;
     double width_rounding = 1e-12;  // uncertainty of a gap at rest, relative to the scene's size
-    // Maximum penetration of edges and rims with a defined normal, relative to their rounding.
-    double nearly_all = 0.999;
 };
 
 class Moreau {
@@ -39,20 +38,13 @@ public:
     using Parameters = MoreauParameters;
     static constexpr Parameters parameters{};
 
-    Moreau(System& system, GapWatch& watch);
+    Moreau(System& system, GapWatch& watch, const ApproachingEdges& edges);
 
     // Discard the gaps and forces of earlier steps.
     void reset() {
         q_sampled_.resize(0);
         forces_.reset();
     }
-    // Return the longest step from y at t, up to h. Approaching edges and rims may penetrate by half of their rounding.
-    // If they already penetrate, the middle of the step may reach half of the remaining rounding. Deeper edges and rims
-    // have no defined normal, and may pass through each other.
-    double allowed(double t, double h, const VecX& y);
-    // Check if such an edge or rim has lost its normal since the call of `allowed`, at the end y of a step, at t. An impact
-    // inside the step may turn a body toward it.
-    bool passes_edge(double t, const VecX& y);
     // Take one step of size h from y at t. The work of contacts along their normals is added to impact_energy. The
     // energy added by the scheme itself is added to numerical_energy. The modes are set for the step's end. The caller must
     // project and evaluate the end.
@@ -72,10 +64,6 @@ public:
     const StepForces::LawMiss& law_miss() const { return forces_.law_miss(); }
 
 private:
-    bool has_known_direction(int gap, double width) const {
-        constexpr double nearly_all = Moreau::parameters.nearly_all;
-        return width > -nearly_all * rounded_by_[gap] || width > -nearly_all * max_depth(p, w, gap);
-    }
     void open_departing_contacts(double t, const VecX& y);
     void select(const std::vector<char>& closed, const std::vector<Mode>& modes, bool flies);
     void begin_sweeps(double t, JointDrives::Step& drives);
@@ -108,14 +96,12 @@ private:
     double h_ = 0.0, t0_ = 0.0;  // length and start of the step
     VecX q0_;
     GapWatch& watch_;
+    const ApproachingEdges& edges_;
     std::vector<int> touching_;  // gaps that take part, ascending
-    std::vector<int> near_edges_;  // gaps of edges and rims with a normal that a step may reach
     StepElements elements_;
     StepForces forces_;
     std::vector<char> was_closed_, closed_, open_;
     std::vector<Mode> modes_, unloaded_;
-    std::vector<double> rounded_by_;   // rounding of each gap
-    bool rounded_ = false;             // a gap has rounding
     bool had_contacts_ = false;  // the last step had a closed contact or an active element
     bool has_unknown_percussions_ = true;  // other rows than these may have percussions
     std::vector<StepRow> rows_of_percussions_;

@@ -164,45 +164,32 @@ void StepForces::recall_forces() {
 }
 
 bool StepForces::solve(double h, const VecX& q0, const VecX& v0) {
-    const int n = static_cast<int>(elements_.rows.size());
     elements_.middles(middle_);
-    guess_ = f.head(n);
+    guess_ = f.head(static_cast<Eigen::Index>(elements_.rows.size()));
     status_ = ConeStatus::solved;
-    const double error = separate_ ? trees_.solve(elements_.cones, middle_, f) : HUGE_VAL;
-    error_ = separate_ ? error : 0.0;
-    bool solved = error <= parameters.max_residual;
     const VecX& without_rest = w.state.q_without_rest;
     const bool starts = v0.cwiseAbs().maxCoeff() <= rest_speed && !(without_rest.size() > 0 && without_rest == q0);
+    if (!separate_) return solve_with_responses(starts, q0);
+    error_ = trees_.solve(elements_.cones, middle_, f);
+    const bool solved = error_ <= parameters.max_residual;
     if (solved && !(starts && moves())) return true;
-    if (separate_ && starts && hold_trees(q0)) return true;
-    if (separate_ && solved) return true;
-    if (!solved) best_f_ = f.head(n);
-    const bool has_best = separate_ && trees_.miss().element >= 0;
-    if (separate_ && n > parameters.max_rows_with_responses) return has_best && accept_best_forces(h);
+    if (starts && hold_trees(q0)) return true;
+    if (solved) return true;
+    best_f_ = f.head(guess_.size());
+    if (guess_.size() <= parameters.max_rows_with_responses && solve_with_responses(false, q0)) return true;
+    return accept_best_forces(h);
+}
+
+// Solve the laws with the responses of all rows. `starts`: the bodies may be held at rest at q0.
+bool StepForces::solve_with_responses(bool starts, const VecX& q0) {
+    const int n = static_cast<int>(elements_.rows.size());
     responses_.find(p, w, elements_.rows);
-    if (!solved) f.head(n) = guess_;
-    const auto W = responses_.matrix(n);
-    f.head(n) -= middle_.head(n);
+    f.head(n) = guess_ - middle_.head(n);
     end_rows.head(n) = free_rows_.head(n);
-    end_rows.head(n).noalias() += W * middle_.head(n);
-    const bool is_of_boxes = has_boxes_only();
-    if (!solved && is_of_boxes) {
-        solve_boxes();
-        solved = true;
-    }
-    solver_.search_briefly(error < parameters.max_brief_error);
-    if (!solved) {
-        status_ = solver_.solve(W, end_rows.head(n), elements_.cones, true, f.head(n), true);
-        solved = status_ == ConeStatus::solved && !add_energy(W, end_rows.head(n), f.head(n));
-        error_ = solver_.error();
-    }
-    if (starts && !separate_ && !is_of_boxes && keep_rest(solved, q0)) {
-        solved = true;
-        status_ = ConeStatus::solved;
-        error_ = 0.0;
-    }
+    end_rows.head(n).noalias() += responses_.matrix(n) * middle_.head(n);
+    const bool solved = has_boxes_only() ? solve_boxes() : solve_cones(starts, q0);
     f.head(n) += middle_.head(n);
-    return solved || (has_best && accept_best_forces(h));
+    return solved;
 }
 
 // Check if every element is dry friction in one direction.
@@ -218,7 +205,7 @@ bool StepForces::has_few_boxes() const {
 }
 
 // Solve a problem of boxes, which is convex, for forces from their middles. The rows without forces are in end_rows.
-void StepForces::solve_boxes() {
+bool StepForces::solve_boxes() {
     const int n = static_cast<int>(elements_.rows.size());
     box_rows_ = end_rows.head(n);
     centered_ = f.head(n);
@@ -227,6 +214,21 @@ void StepForces::solve_boxes() {
     box_.solve(responses_.matrix(n), box_rows_, bounds_, &centered_, centered_);
     f.head(n) = centered_;
     error_ = 0.0;
+    return true;
+}
+
+// Solve a problem with cones in the same way, or hold the bodies at rest.
+bool StepForces::solve_cones(bool starts, const VecX& q0) {
+    const int n = static_cast<int>(elements_.rows.size());
+    const auto W = responses_.matrix(n);
+    solver_.search_briefly(separate_ && error_ < parameters.max_brief_error);
+    status_ = solver_.solve(W, end_rows.head(n), elements_.cones, true, f.head(n), true);
+    error_ = solver_.error();
+    const bool solved = status_ == ConeStatus::solved && !add_energy(W, end_rows.head(n), f.head(n));
+    if (!starts || !keep_rest(solved, q0)) return solved;
+    status_ = ConeStatus::solved;
+    error_ = 0.0;
+    return true;
 }
 
 // Hold trees at rest that forces can hold. Return true if all rest.
@@ -240,9 +242,10 @@ bool StepForces::hold_trees(const VecX& q0) {
     return false;
 }
 
-// Accept the best forces found, which violate the laws of contact by the error of one element.
+// Accept the best forces found tree by tree, which violate the laws of contact by the error of one element.
 bool StepForces::accept_best_forces(double h) {
     const BlockSolver::Miss& miss = trees_.miss();
+    if (miss.element < 0) return false;
     f.head(best_f_.size()) = best_f_;
     const StepElements::Part& part = elements_.parts[miss.element];
     law_miss_ = {part.gap >= 0 ? p.gaps[part.gap].block : p.frictions[part.element].block, h * miss.velocity};

@@ -97,9 +97,11 @@ private:
     void unload_held(const MeanVelocity& mean, const VecX& a_free);
     void find_dependent();
     bool accept_best_forces(double h);
+    bool solve_with_responses(bool starts, const VecX& q0);
     bool has_boxes_only() const;
     bool has_few_boxes() const;
-    void solve_boxes();
+    bool solve_boxes();
+    bool solve_cones(bool starts, const VecX& q0);
     bool moves();
     bool hold_trees(const VecX& q0);
     bool keep_rest(bool solved, const VecX& q0);
@@ -121,7 +123,7 @@ private:
     BoxProgram box_;
     LawMiss law_miss_;
     VecX free_rows_, offset_, middle_, guess_, best_f_, a_;
-    VecX centered_;            // forces from the middles of their limits
+    VecX centered_;           // forces from the middles of their limits
     VecX box_rows_, bounds_;  // rows without forces and limits of a problem of boxes
 };
 

@@ -32,8 +32,8 @@ TimeStepping::TimeStepping(System& system, Progress& progress, GapWatch& watch, 
                            Torques& torques, Output& output, Warnings& warnings, ValueEvents& value_events,
                            Recording& out)
     : p(system.p), w(system.w), system_(system), progress_(progress), options_(options), torques_(torques),
-      output_(output), warnings_(warnings), value_events_(value_events), out_(out), moreau_(system, watch),
-      is_autonomous_(!may_differ(system.p, options)),
+      output_(output), warnings_(warnings), value_events_(value_events), out_(out), edges_(system, watch),
+      moreau_(system, watch, edges_), is_autonomous_(!may_differ(system.p, options)),
       samples_every_step_(options.method.scheme != Method::Scheme::moreau || options.output_dt == 0.0 ||
                           reads_forces_always(system.p, options)),
       reads_forces_(options.record.evaluates() || reads_forces_always(system.p, options)),
@@ -74,13 +74,13 @@ bool TimeStepping::needs_forces(double end, double t_end) const {
 // part is taken instead.
 void TimeStepping::step_part(double end, double t_end, double least) {
     const double from = progress_.t, numerical = progress_.numerical_energy, impacts = progress_.impact_energy;
-    double h = std::max(moreau_.allowed(from, end - from, progress_.y), least);
+    double h = std::max(edges_.allowed(from, end - from, progress_.y), least);
     y_before_part_ = progress_.y.head(system_.ns);
     before_part_ = w.state.mode;
     closed_before_part_ = w.state.closed;
     for (;; h = std::max(0.5 * h, least)) {
         try_part(h, end, t_end);
-        if (h <= least || !moreau_.passes_edge(progress_.t, progress_.y)) break;
+        if (h <= least || !edges_.pass(progress_.t, progress_.y)) break;
         progress_.t = from;
         progress_.y.head(system_.ns) = y_before_part_;
         progress_.numerical_energy = numerical;
@@ -141,9 +141,8 @@ void TimeStepping::take(double end, double t_end) {
 // Remove the rounding from a motion held at rest. Law states continue.
 void TimeStepping::stay_at_rest() {
     VecX& y = progress_.y;
-    const Eigen::Index moving = system_.nq + system_.nv;
-    y.head(moving) = y_from_.head(moving);
-    y.segment(moving + system_.nz, system_.nw) = y_from_.segment(moving + system_.nz, system_.nw);
+    y.head(system_.nq + system_.nv) = y_from_.head(system_.nq + system_.nv);
+    system_.work(y) = system_.work(y_from_);
     system_.read(y);
     system_.read_law_states(y);
     begin_step(p, w, progress_.t, system_.q, system_.v);

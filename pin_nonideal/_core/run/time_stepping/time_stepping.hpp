@@ -48,6 +48,7 @@ private:
     Warnings& warnings_;
     ValueEvents& value_events_;
     Recording& out_;
+    ApproachingEdges edges_;
     Moreau moreau_;
     const bool is_autonomous_;  // a state that a step leaves unchanged stays unchanged
     double rounding_ = 0.0;  // difference of two times that count as the same end of a step
