@@ -133,7 +133,9 @@ def _depth(value: object) -> int:
 
 def _bounds(name: str, values: Array) -> Array:
     if values.ndim != 1 or (values < 0.0).any():
-        raise InputError(f"{name} must be at least 0, one a row, got {values}; correct the negative ones")
+        raise InputError(
+            f"{name} must be a list of numbers of at least 0, got {values}; correct the negative numbers"
+        )
     return values
 
 
@@ -151,11 +153,13 @@ def _contacts(rows: int, mu: Array, dims: ArrayLike | None) -> tuple[list[int], 
     each = [int(d) for d in np.broadcast_to(sizes, (count,))]
     if sum(each) != rows or any(not 1 <= d <= MAX_ROWS for d in each) or (sizes != sizes.astype(int)).any():
         raise InputError(
-            f"dims must be 1, 2 or 3 a contact and add up to the {rows} rows of contacts in w0, got {each};"
-            " pass dims, or as many coefficients mu as there are contacts"
+            f"dims must be 1, 2 or 3 for each contact and add up to the {rows} rows of contacts in w0, got "
+            f"{each}; pass dims, or as many coefficients mu as there are contacts"
         )
     if mu.ndim > 1 or (mu.ndim == 1 and len(mu) != count):
-        raise InputError(f"mu must be a number or have shape ({count},), got {mu.shape}; one a contact")
+        raise InputError(
+            f"mu must be a number or have shape ({count},), got {mu.shape}; one number per contact"
+        )
     return each, _bounds("mu", np.broadcast_to(mu, (count,)).astype(float))
 
 

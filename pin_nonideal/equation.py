@@ -235,12 +235,12 @@ def _check_consistent(
     rows = sorted([worst, *(chosen[j] for j in np.flatnonzero(weight > RESIDUAL_TOLERANCE))])
     if len(rows) == 1:
         raise InconsistentConstraintsError(
-            f"row {worst} of A is zero: b[{worst}] must be 0, got {b[worst]:.6g}; correct b or drop the row"
+            f"row {worst} of A is zero: b[{worst}] must be 0, got {b[worst]:.6g}; correct b or remove the row"
         )
     listed = ", ".join(str(i) for i in rows[:-1]) + f" and {rows[-1]}"
     raise InconsistentConstraintsError(
         f"constraint rows {listed} contradict each other: A a - b must be 0,"
-        f" got {residual[worst]:.1e} in row {worst}; correct b or drop a row"
+        f" got {residual[worst]:.1e} in row {worst}; correct b or remove a row"
     )
 
 
@@ -254,19 +254,21 @@ def checked_problem(
     n = M.shape[0]
     if (A is None) != (b is None):
         present, absent = ("A", "b") if b is None else ("b", "A")
-        raise InputError(f"A and b must come together, got {present} without {absent}; pass {absent} as well")
+        raise InputError(
+            f"A and b must be given together, got {present} without {absent}; pass {absent} as well"
+        )
     F = _numbers("F", F)
     A = np.zeros((0, n)) if A is None else _numbers("A", A)
     b = np.zeros(0) if b is None else _numbers("b", b)
     C = np.zeros(n) if C is None else _numbers("C", C)
     if F.shape != (n,):
-        raise InputError(f"F must have shape ({n},) to fit M, got {F.shape}; one force a coordinate")
+        raise InputError(f"F must have shape ({n},) to fit M, got {F.shape}; one force per coordinate")
     if A.ndim != 2 or A.shape[1] != n:
-        raise InputError(f"A must have shape (m, {n}) to fit M, got {A.shape}; one row a constraint")
+        raise InputError(f"A must have shape (m, {n}) to fit M, got {A.shape}; one row per constraint")
     if b.shape != (len(A),):
-        raise InputError(f"b must have shape ({len(A)},) to fit A, got {b.shape}; one value a row of A")
+        raise InputError(f"b must have shape ({len(A)},) to fit A, got {b.shape}; one value per row of A")
     if C.shape != (n,):
-        raise InputError(f"C must have shape ({n},) to fit M, got {C.shape}; one force a coordinate")
+        raise InputError(f"C must have shape ({n},) to fit M, got {C.shape}; one force per coordinate")
     _check_symmetry(M)
     symmetric: Array = M + (M.T - M) / 2.0
     return symmetric, _factor(symmetric), F, A, b, C

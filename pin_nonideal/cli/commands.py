@@ -88,7 +88,7 @@ def replay_file(options: argparse.Namespace) -> int:
     path, number = Path(options.run), options.number
     if path.is_dir() != (number is not None):
         kind = "a" if path.is_dir() else "no"
-        raise InputError(f'--run K says which run of a sweep\'s folder; "{path}" is {kind} folder')
+        raise InputError(f'--run K selects a run in the folder of a sweep; "{path}" is {kind} folder')
     if number is None:
         run, page = Trajectory.load(path, scene=scene), path.with_suffix(".html")
     else:
@@ -99,7 +99,7 @@ def replay_file(options: argparse.Namespace) -> int:
     if run.scene is None:
         because = f": {run.notes[-1]}" if run.notes else ""
         raise InputError(
-            f'"{path}" does not know a robot that `load` finds{because}; name it: --robot NAME_OR_PATH'
+            f'"{path}" names no robot that `load` finds{because}; give one: --robot NAME_OR_PATH'
         )
     page = options.page or page
     replay(run, page)

@@ -192,13 +192,13 @@ def _check_vanishing(
     """Check that a vanishing row has zero right-hand side and a residual within the tolerance."""
     if acceleration > SUM_ROUNDING * max(1.0, largest):
         raise InconsistentConstraintsError(
-            f'row {local} of constraint "{name}" moves nothing and asks for the acceleration '
-            f"{acceleration:.1e}; the joints leave that direction no freedom: drop the row or free a joint"
+            f'row {local} of constraint "{name}" moves nothing and requires the acceleration '
+            f"{acceleration:.1e}; the joints leave that direction no freedom: remove the row or free a joint"
         )
     if gap > tolerance:
         raise LoopClosureError(
             f'loop "{name}" does not close: gap {gap:.2g} in row {local}, a direction in which no joint '
-            "moves; mend the frames' placement",
+            "moves; correct the placement of the frames",
             gaps={name: float(gap)},
         )
 
@@ -279,5 +279,5 @@ def _compare(name: str, left: str, x: Array, right: str, y: Array, scale: float)
         k = int(np.argmax(miss))
         raise InputError(
             f"{name}: {left} must equal {right}; row {k}: {x[k]:.6g} by differences against {y[k]:.6g}; "
-            "mend the function, the residual or gap, or the rate"
+            "correct the function, the residual or gap, or the rate"
         )

@@ -201,8 +201,8 @@ def _check_derivatives(jet: Callable[..., Any], who: str) -> None:
             t, difference, stated = wrong[0]
             raise InputError(
                 f"{who}: function of time: {derivative} must be the derivative of {quantity}; at t = {t:g} s "
-                f"it returns {stated:.6g}, and differences give {difference:.6g}; mend it, or use sinusoid, "
-                "polynomial or spline"
+                f"it returns {stated:.6g}, and differences give {difference:.6g}; correct it, or use "
+                "sinusoid, polynomial or spline"
             )
 
 

@@ -231,9 +231,9 @@ class CompiledScene:
         """Message on a part of the scene that no implicit method supports, or empty."""
         if self.has_openings:
             name = self.contact(self.opening_names[0])
-            return f'no implicit method here opens and closes contacts such as "{name}" yet'
+            return f'no implicit method supports contacts that open, such as "{name}"'
         if switching := switching_drives(self.spec.actuation):
-            return f"no implicit method here holds the torques of a {type(switching[0]).__name__} yet"
+            return f"no implicit method supports the held torques of a {type(switching[0]).__name__}"
         return ""
 
     def contact(self, name: str) -> str:

@@ -205,8 +205,8 @@ def _divergence_error(model: Model, dof: int, source: str, rate: float, t: float
     joint = str(model.names[joint_of(model, dof)])
     return DivergenceError(
         f'the speed of joint "{joint}" grows without bound by t = {t:.4g} s, by a factor of e every '
-        f"{1.0 / rate:.2g} s, over many decades, and {source} does most work on it: the motion is unstable; "
-        "look at the signs, gains and delays there, or follow it all the same with max_steps",
+        f"{1.0 / rate:.2g} s, over many decades, and {source} does the most work on it: the motion is "
+        "unstable; check the signs, gains and delays there, or allow the motion with max_steps",
         joint=joint,
         source=source,
         rate=rate,
@@ -217,15 +217,13 @@ def _divergence_error(model: Model, dof: int, source: str, rate: float, t: float
 def _stiffness_error(model: Model, dof: int, rate: float, t: float, explicit_only: str) -> RunError:
     joint = str(model.names[joint_of(model, dof)])
     ways_out = (
-        "look at its damping, stiffness and inertia, or allow the steps with max_steps, since "
-        f"{explicit_only}"
+        f"check its damping, stiffness and inertia, or allow the steps with max_steps, since {explicit_only}"
         if explicit_only
-        else "look at its damping, stiffness and inertia, "
-        'use method="Radau", or allow the steps with max_steps'
+        else 'check its damping, stiffness and inertia, use method="Radau", or allow the steps with max_steps'
     )
     return StiffnessError(
         f'joint "{joint}" is stiff at t = {t:.4g} s: its motion relaxes at {rate:.2g} 1/s, and an explicit '
-        f"method takes steps that short, too many to reach the end; {ways_out}",
+        f"method needs equally short steps, too many to reach the end; {ways_out}",
         joint=joint,
         rate=rate,
         time=t,
@@ -245,17 +243,17 @@ def stiff_hint(model: Model, dof: int, rate: float, decays: bool, explicit_only:
     joint = str(model.names[joint_of(model, dof)])
     if decays:
         ways_out = (
-            f"look at its damping, stiffness and inertia, or wait, since {explicit_only}"
+            f"check its damping, stiffness and inertia, or wait, since {explicit_only}"
             if explicit_only
-            else 'use method="Radau", or look at its damping, stiffness and inertia'
+            else 'use method="Radau", or check its damping, stiffness and inertia'
         )
         return (
-            f'joint "{joint}" is stiff: its motion relaxes at {rate:.2g} 1/s, and an explicit method takes '
-            f"steps that short; {ways_out}"
+            f'joint "{joint}" is stiff: its motion relaxes at {rate:.2g} 1/s, and an explicit method needs '
+            f"equally short steps; {ways_out}"
         )
     ways_out = "" if explicit_only else 'damp them and use method="Radau", or '
     return (
-        f'joint "{joint}" swings at {rate:.2g} rad/s, and the steps follow it; where these vibrations do not '
+        f'joint "{joint}" swings at {rate:.2g} rad/s, and the steps follow it; if these vibrations do not '
         f"matter, {ways_out}loosen rtol and atol"
     )
 
@@ -268,7 +266,10 @@ def joint_of(model: Model, dof: int) -> int:
 def _paradox(names: Sequence[str], failure: core.CoreFailure) -> RunError:
     shown, t = core.Solutions, failure.time
     solutions, way_out = {
-        shown.several: ("several solutions", 'go on with the nearer one by several="continue", reduce mu,'),
+        shown.several: (
+            "several solutions",
+            'continue with the nearer one by several="continue", reduce mu,',
+        ),
         shown.none: ("no solution", "reduce mu,"),
     }.get(failure.solutions, ("no solution or several", "reduce mu,"))
     are_several = failure.solutions == shown.several
@@ -286,7 +287,7 @@ def _paradox(names: Sequence[str], failure: core.CoreFailure) -> RunError:
 
 
 def _modes_error(names: Sequence[str], t: float, method: str) -> RunError:
-    remedy = "take shorter steps" if method == "moreau" else 'tighten rtol, use method="moreau"'
+    remedy = "use shorter steps" if method == "moreau" else 'tighten rtol, use method="moreau"'
     whose = f" of {_list_names(names)}" if names else ""
     return FrictionConvergenceError(
         f"the modes (stick or slip){whose} were not found at t = {t:.4g} s, although a motion may exist; "
@@ -310,13 +311,13 @@ def _stuck(steps: float, t: float, explicit_only: str) -> RunError:
     last = "or loosen rtol and atol" if explicit_only else 'loosen rtol and atol, or use "Radau"'
     if steps:
         return StepSizeError(
-            f"the run would never end: after {steps:.0f} steps it has come to t = {t:.4g} s; "
+            f"the run makes no progress: after {steps:.0f} steps it has reached t = {t:.4g} s; "
             f"simulate a shorter duration, {last}",
             time=t,
         )
     return StepSizeError(
         f"the step size fell below rounding at t = {t:.6g} s: the motion is singular there, or stiff; "
-        f"look at the last samples, {last}",
+        f"check the last samples, {last}",
         time=t,
     )
 
@@ -329,7 +330,7 @@ def _inseparable(names: Sequence[str], t: float, model: Model, around: Circumsta
             "they touch, or drive the joint by a force, such as actuation=HoldPosition"
         )
     elif around.method == "moreau":
-        why = "other constraints or contacts keep them from moving apart: take shorter steps, or reduce mu"
+        why = "other constraints or contacts keep them from moving apart: use shorter steps, or reduce mu"
     else:
         why = (
             "other constraints keep them from moving apart; lower restitution, or use "
@@ -349,11 +350,11 @@ def _inconsistent(names: Sequence[str], residual: float, t: float, rubs: bool) -
         blame, remedy = f"constraints {quoted} contradict each other", "leave one of them out"
     else:
         blame, remedy = f"constraint {quoted} contradicts itself", "leave one of its rows out"
-    remedy += ", or let both ask for the same motion"
+    remedy += ", or give both the same motion"
     if rubs:
         remedy = (
-            "friction sticks that a prescribed motion begins to move: methods of the core, such as "
-            '"dop853", let it slip'
+            "a prescribed motion begins to move sticking friction: use a method of the core, such as "
+            '"dop853", in which the friction slips'
         )
     return InconsistentConstraintsError(
         f"{blame}: residual {abs(residual):.1e} m/s^2 at t = {t:.2f} s; {remedy}", time=t

@@ -190,7 +190,7 @@ def _in_constraint(
     if not ball or rows != 3:
         held = f" that holds {rows} of three directions" if ball else ""
         raise InputError(
-            f'{who}: "{law.joint}" is a {type(c).__name__}{held}, in which nothing is known to rub; friction '
+            f'{who}: "{law.joint}" is a {type(c).__name__}{held}, for which no friction is defined; friction '
             'acts in a HingeAnchor, in a PointAnchor with axes="xyz" and on a JointCoupling'
         )
     _check_radius(law, who, core.Load.spherical)

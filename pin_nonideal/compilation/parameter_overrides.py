@@ -107,8 +107,8 @@ def _check_known(program: core.Program, first: ParameterOverrides, owners: Mappi
         core.with_numbers(program, *first)
     except ValueError as error:
         raise InputError(
-            f"rollout: parameters: {owners.get(str(error), error)} shapes the scene and cannot differ "
-            "between runs; sweep makes a scene for each"
+            f"rollout: parameters: {owners.get(str(error), error)} changes the structure of the scene "
+            "and cannot differ between runs; sweep makes a scene for each"
         ) from None
 
 
@@ -159,7 +159,7 @@ def _body(compiled: CompiledScene, name: str, entries: Mapping[str, object], n: 
         dynamic = array(f"{who}: inertia", entries["inertia"], (n, 10))
         mass = dynamic[:, 0]
     if own.mass == 0.0 and "mass" in entries:
-        raise InputError(f'{who}: the body has no mass, whose inertia would go with it; give "inertia"')
+        raise InputError(f'{who}: a body without mass has no inertia to scale; give "inertia"')
     heavy = mass > 0.0  # Pinocchio creates no inertia without a positive mass
     if not heavy.all():
         bodies = []
@@ -174,7 +174,7 @@ def _body(compiled: CompiledScene, name: str, entries: Mapping[str, object], n: 
         k = int(np.argmin(good))
         moment = f" and a least moment of {moments[k, 0]:g} kg m^2" if bodies else ""
         raise InputError(
-            f"{who}: masses must be positive, and so moments of inertia about the center of mass; "
+            f"{who}: masses and moments of inertia about the center of mass must be positive; "
             f"run {k} has a mass of {mass[k]:g} kg{moment}"
         )
     return {
@@ -217,10 +217,11 @@ def _descriptions(name: str, described: object, entries: object, n: int) -> Iter
         if key not in known or key == "name":
             raise UnknownNameError(f'{who}: no field "{key}"{nearest(str(key), known)}')
         if not isinstance(values, (list, tuple, np.ndarray)) or np.shape(values)[:1] != (n,):
-            raise InputError(f"{who}: {key} must be {n} values, one a run; got {short_repr(values)}")
+            raise InputError(f"{who}: {key} must be {n} values, one per run; got {short_repr(values)}")
         if isinstance(described, GeometryContact) and key not in OF_PAIRS:
             raise InputError(
-                f"{who}: {key} shapes the scene and cannot differ between runs; sweep makes a scene for each"
+                f"{who}: {key} changes the structure of the scene and cannot differ between runs; sweep "
+                "makes a scene for each"
             )
         own = _functions_of(getattr(described, key))
         if any(functions and functions != own for functions in map(_functions_of, values)):
@@ -296,10 +297,9 @@ class _Relower:
         item.relower(other, self)
         if self._differs or len(self._arguments) != len(self.calls):
             raise InputError(
-                f'rollout: parameters: "{name}" with {short_repr(other)} is more than other numbers: '
-                "something would "
-                "begin or cease to act; keep zeros zero and others positive, or let sweep make a scene for "
-                "each"
+                f'rollout: parameters: "{name}" with {short_repr(other)} changes more than numbers: '
+                "parts of the scene would begin or cease to act; keep zeros zero and other numbers positive, "
+                "or use sweep, which makes a scene for each"
             )
         return self._arguments
 

@@ -208,7 +208,7 @@ class EffortLimits:
         inner = drives_of(self.actuation)
         if not inner or any(isinstance(drive, EffortLimits) for drive in inner):
             kind = "EffortLimits" if inner else "None"
-            raise InputError(f"{who}: actuation must ask for torques without limits of its own; got {kind}")
+            raise InputError(f"{who}: actuation must be drives without effort limits; got {kind}")
         if self.effort is not None:
             object.__setattr__(self, "effort", checked_gain(f"{who}: effort", self.effort))
 

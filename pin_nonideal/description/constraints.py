@@ -223,7 +223,7 @@ class JointCoupling:
         ratio = number(f"{who}: ratio", self.ratio)
         if ratio == 0.0:
             raise InputError(
-                f"{who}: ratio must not be zero; to hold a joint still use PrescribedMotion or lock it"
+                f"{who}: ratio must not be zero; hold a joint at rest by a PrescribedMotion, or lock it"
             )
         object.__setattr__(self, "ratio", ratio)
         object.__setattr__(self, "offset", number(f"{who}: offset", self.offset))

@@ -196,24 +196,22 @@ def _thread(law: JointFriction, who: str) -> None:
     object.__setattr__(law, "pressure_angle", _acute(what, nonnegative(what, law.pressure_angle)))
     if law.lead_angle is None:
         if law.pressure_angle:
-            raise InputError(f"{who}: pressure_angle is that of a thread, which needs a lead_angle too")
+            raise InputError(f"{who}: pressure_angle describes a thread; give its lead_angle too")
         return
     what = f"{who}: lead_angle"
     object.__setattr__(law, "lead_angle", _acute(what, positive(what, law.lead_angle)))
     if not law.mu:
-        raise InputError(f"{who}: lead_angle needs a positive mu, with which the thread rubs")
+        raise InputError(f"{who}: lead_angle needs a positive mu of the thread")
 
 
 def _efficiencies(law: JointFriction, who: str) -> None:
     """Check the two efficiencies of a coupling."""
     if law.efficiency is None:
         if law.efficiency_back is not None:
-            raise InputError(f"{who}: efficiency_back needs an efficiency too, of the way there")
+            raise InputError(f"{who}: efficiency_back needs efficiency too")
         return
     if law.mu or law.lead_angle is not None:
-        raise InputError(
-            f"{who}: give either efficiency, or mu and lead_angle, from which it follows; got both"
-        )
+        raise InputError(f"{who}: give either efficiency, or mu and lead_angle; got both")
     forth = number(f"{who}: efficiency", law.efficiency)
     if not 0.0 < forth < 1.0:
         raise InputError(f"{who}: efficiency must lie between 0 and 1; got {forth:g}")

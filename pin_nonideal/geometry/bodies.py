@@ -139,7 +139,7 @@ def _inertia(who: str, shape: object, density: float | None, mass: float | None)
         volume, moments = -volume, -moments
     if not (volume > 0.0 and np.isfinite(moments).all() and np.linalg.eigvalsh(moments)[0] > 0.0):
         raise InputError(
-            f"{who}: shape must enclose a volume; a {type(shape).__name__} of {volume:g} m^3 came: "
+            f"{who}: shape must enclose a volume; got a {type(shape).__name__} of {volume:g} m^3: "
             "give a solid, or a closed mesh"
         )
     if density is None:

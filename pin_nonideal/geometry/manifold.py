@@ -101,9 +101,9 @@ def manifold(
             contacts = cylinder_contacts(who, first, second, rounding, options)
         else:
             raise InputError(
-                f"{who}: no contacts are known for this pair of shapes, a {first.kind} and a {second.kind}; "
-                "a half-space with any other shape is one, and so are spheres, capsules, boxes, convex "
-                "meshes, cylinders and cones with each other: use PointContact for the places that touch"
+                f"{who}: this pair of shapes is not supported, a {first.kind} and a {second.kind}; supported "
+                "pairs are a half-space with any other shape, and spheres, capsules, boxes, convex meshes, "
+                "cylinders and cones with each other: use PointContact for the points that touch"
             )
     return numbered(contacts, base)
 
@@ -208,7 +208,7 @@ def _edge_radius(who: str, shapes: list[Shape], rounding: float | None) -> float
 def _check_count(who: str, count: int, edges: str) -> None:
     if count > MAX_CONTACTS:
         raise InputError(
-            f"{who}: two shapes may touch at {MAX_CONTACTS} places at most, and these have {count}: "
+            f"{who}: two shapes may have at most {MAX_CONTACTS} contact points, and these have {count}: "
             f"{edges} and all corners; use simpler shapes, or PointContact"
         )
 

@@ -135,7 +135,7 @@ class Stepper:
 
     def _require_begun(self) -> None:
         if not self._run.begun:
-            raise InputError("Stepper: the run has stopped; begin anew with reset(q, v)")
+            raise InputError("Stepper: the run has stopped; start a new run with reset(q, v)")
 
 
 class SceneStepper:

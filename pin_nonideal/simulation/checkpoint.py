@@ -130,7 +130,7 @@ class Saver:
             if not self._written:
                 raise
             warnings.warn(
-                f"{error}; the run goes on, the last checkpoint stays", RuntimeWarning, stacklevel=2
+                f"{error}; the run continues, and the last checkpoint stays", RuntimeWarning, stacklevel=2
             )
         self._written = True
 
@@ -153,7 +153,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
                 "or start it again"
             )
         if hashlib.sha256(state).hexdigest() != header["digest"]:
-            raise LoadingError(f'"{path}" is damaged: its state is not the one that was written')
+            raise LoadingError(f'"{path}" is damaged: its state differs from the written state')
         held = header["options"]
         return Checkpoint(
             scene=header["scene"],

@@ -120,7 +120,7 @@ def check_opening(method: str, name: str) -> None:
     if method not in known:
         raise InputError(
             f'simulate: method "{method}" cannot open and close contacts, and "{name}" may open; use one of '
-            f"{', '.join(known)}, with max_steps where one of them calls the scene stiff, or keep it closed "
+            f"{', '.join(known)}, with max_steps if the scene is stiff, or keep it closed "
             "with unilateral=False"
         )
 

@@ -48,7 +48,7 @@ MAX_RESIDUAL = 1e-6
 # Smallest singular value of the rows over that at the start below which a position is singular, and the part
 # of a constraint in the dependence above which an error names it.
 SINGULAR_RATIO, DEPENDENT_SHARE = 1e-4, 0.1
-TRAJECTORY_HINT = "the trajectory up to there is in error.trajectory"
+TRAJECTORY_HINT = "the trajectory up to this time is in error.trajectory"
 
 
 def finish(
@@ -179,10 +179,10 @@ def _overflow_hint(error: RunError, options: RunOptions) -> str:
     if not isinstance(error, NonFiniteError):
         return ""
     if options.dt == 0.0:
-        return "; look at the last samples for a force, stiffness or function that grows without bound"
+        return "; check the last samples for a force, stiffness or function that grows without bound"
     return (
-        f": where steps of dt = {options.dt:g} s are too long for the stiffest force the motion overflows; "
-        'take a shorter dt, or method="dop853", with max_steps where it calls the scene stiff'
+        f": the motion overflows if steps of dt = {options.dt:g} s are too long for the stiffest force; "
+        'use a shorter dt, or method="dop853", with max_steps if the scene is stiff'
     )
 
 

@@ -109,7 +109,9 @@ def rollout(
     if method in SCIPY:
         raise InputError(f'rollout: method must be one of the core\'s; "{method}" runs in SciPy')
     if parameters and options.dense:
-        raise InputError('rollout: record "dense" goes without parameters; take output_dt for more samples')
+        raise InputError(
+            'rollout: record "dense" is not supported with parameters; use output_dt for more samples'
+        )
     numbers = parse_overrides(compiled, parameters or {}, len(starts_q))
     if choice("rollout: as_arrays", as_arrays, (True, False)):
         return _arrays(scene, starts_q, starts_v, numbers, options, threads, keep, record)
@@ -194,7 +196,7 @@ def _arrays(
 ) -> RunArrays:
     """Run all states and return a RunArrays."""
     if len(record):
-        raise InputError("rollout: as_arrays records states alone; leave record out, or as_arrays")
+        raise InputError("rollout: as_arrays records only states; leave out record or as_arrays")
     q = scene_states(scene).with_unit_parts(q)
     compiled = compiled_scene(scene)
     require_resolved(compiled.model, q)

@@ -108,10 +108,10 @@ class _Run:
         if element is None:
             return
         raise StepSizeError(
-            f'{self.options.method} cannot go on at t = {self.core.t:.6g} s: "{element}" begins to slip in '
-            "several directions with hardly any acceleration, where its direction relaxes faster than any "
+            f'{self.options.method} cannot continue at t = {self.core.t:.6g} s: "{element}" begins to slip '
+            "in several directions with hardly any acceleration, and its direction relaxes faster than any "
             'step; use method="dop853", which solves for the direction of an onset, or a larger '
-            "static_ratio; the trajectory up to there is in error.trajectory",
+            "static_ratio; the trajectory up to this time is in error.trajectory",
             time=self.core.t,
         )
 
@@ -122,9 +122,9 @@ class _Run:
         if self.failure is not None:
             raise self.failure
         raise StepSizeError(
-            f"{self.options.method} cannot go on at t = {solver.t:.6g} s ({message}): the motion is "
-            "singular there; look at the last samples, or loosen rtol and atol; the trajectory up to "
-            "there is in error.trajectory",
+            f"{self.options.method} cannot continue at t = {solver.t:.6g} s ({message}): the motion is "
+            "singular there; check the last samples, or loosen rtol and atol; the trajectory up to this "
+            "time is in error.trajectory",
             time=float(solver.t),
         )
 

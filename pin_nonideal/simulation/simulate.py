@@ -188,12 +188,12 @@ def _check_together(method: str, requests: RunRequests, callback: object, checkp
     if method in SCIPY and checkpoint is not None:
         raise InputError(
             f'simulate: checkpoint needs one of the core\'s methods; "{method}" runs in SciPy, which '
-            "does not give its state away"
+            "hides its state"
         )
     if method in SCIPY and callback is not None:
         raise InputError(
             f'simulate: callback needs one of the core\'s methods; "{method}" runs in SciPy, whose steps '
-            "go on from earlier ones"
+            "depend on earlier steps"
         )
     if checkpoint is not None and (requests.watched or callback is not None):
         raise InputError(

@@ -63,8 +63,8 @@ def refuse_deep_starts(
     name, depth = deepest_contact(phi, program, contact_of)
     if name and depth > allowed:
         raise InputError(
-            f'contact "{name}" starts {depth:.3g} (m or rad) inside at t = {t:.4g} s; it must '
-            f"start open, closed, or at most {allowed:.2g} inside, which is moved out: change the start"
+            f'contact "{name}" starts with a penetration of {depth:.3g} (m or rad) at t = {t:.4g} s; it must '
+            f"start open, closed, or with at most {allowed:.2g}, which is removed: change the start"
         )
 
 
@@ -81,8 +81,8 @@ def penetration_error(
     """
     name, depth = deepest_contact(phi, program, contact_of)
     return InputError(
-        f'contact "{name}" starts {depth:.3g} (m or rad) inside at t = {t:.4g} s, and no short move was '
-        "found that leads out of all planes: change the start"
+        f'contact "{name}" starts with a penetration of {depth:.3g} (m or rad) at t = {t:.4g} s, and no '
+        "short move that removes it was found: change the start"
     )
 
 
@@ -139,7 +139,7 @@ def velocity_error(
     worst = max(slices, key=lambda name: _largest(rate[slices[name]]))
     return InconsistentConstraintsError(
         f'no velocity satisfies the constraints at t = {t:.2f} s: "{contact_of.get(worst, worst)}" '
-        f"misses its rate by "
+        f"violates its rate by "
         f"{_largest(rate):.1e}",
         time=t,
     )

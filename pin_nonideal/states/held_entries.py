@@ -280,7 +280,7 @@ def change_note(model: Model, before: Array, after: Array) -> list[str]:
         return []
     return [
         "the initial velocity did not satisfy the constraints and was projected onto them: the run starts "
-        f"with {_list_names(model, after, much)}; Scene.project(report=True) says more"
+        f"with {_list_names(model, after, much)}; Scene.project(report=True) returns details"
     ]
 
 

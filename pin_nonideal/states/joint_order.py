@@ -73,7 +73,7 @@ def describe_order(model: Model, values: object, what: str, sizes: Literal["nqs"
         return
     warnings.warn(
         f"{what}: {order_words(model)}; name the joints, such as {what.split(': ')[-1]}="
-        f'{{"{model.names[1]}": ...}}, or pass an array to be taken at your word',
+        f'{{"{model.names[1]}": ...}}, or pass an array in the order of the model',
         JointOrderWarning,
         stacklevel=find_stack_level(),
     )

@@ -381,7 +381,7 @@ class Projection:
         return [
             "the initial configuration did not satisfy the constraints and was moved onto them: "
             f'"{coordinate(self.model, dof)}" by {move[dof]:.3g} {unit}, the others by less; '
-            "Scene.project(report=True) says more"
+            "Scene.project(report=True) returns details"
         ]
 
 

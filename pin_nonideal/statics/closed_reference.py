@@ -250,6 +250,6 @@ def without_drives(model: Model, q0: Array, spec: SceneSpec, who: str) -> Compil
         if not np.all(c.holonomic):
             raise InputError(
                 f'{who}: feedforward "constrained" needs constraints of positions; "{c.name}" constrains '
-                'velocities only; take feedforward "rnea" or "gravity"'
+                'velocities only; use feedforward "rnea" or "gravity"'
             )
     return compiled

@@ -198,11 +198,11 @@ class _Search:
         dof = int(power.argmax())
         ends = [i + n for i, n in zip(self.model.idx_vs, self.model.nvs, strict=True)]
         joint = self.model.names[int(np.searchsorted(ends[1:], dof, side="right")) + 1]
-        others = f"all else holds {held:.2g} of it" if held > 0.0 else "nothing else holds against it"
+        others = f"all other forces resist with {held:.2g}" if held > 0.0 else "no other force resists"
         return (
             f'the drive of joint "{joint}", {drive[dof]:.4g} (N or N m), exceeds all resistance: at the '
             f"smallest unbalanced force the drives push with {along:.2g} along a motion that the constraints "
-            f"allow, and {others}; drive less, or hold more{friction_note}"
+            f"allow, and {others}; reduce the drive, or add resistance{friction_note}"
         )
 
     def in_play(self, now: Balance, inertia: Array) -> Array:

@@ -217,9 +217,9 @@ def _check_follows(rest: AtRest, A: Array, b: Array, a: Array, allowed: Array) -
         point = next(n for n, s in rest.compiled.slices.items() if s.start <= worst < s.stop)
         name = rest.compiled.contact(point)
         raise InputError(
-            f'inverse_dynamics: a must follow the constraints, A a = b; "{name}" misses it by '
-            f"{missed[worst]:.2g} (m/s^2 or rad/s^2); take one that scene.acceleration gives, or solve for "
-            "the dependent joints"
+            f'inverse_dynamics: a must satisfy the constraints, A a = b; "{name}" violates it by '
+            f"{missed[worst]:.2g} (m/s^2 or rad/s^2); use a result of scene.acceleration, or solve for the "
+            "dependent joints"
         )
 
 
@@ -290,8 +290,8 @@ class _Torques:
             before = size
         else:
             raise FrictionConvergenceError(
-                f"inverse_dynamics: friction and torques did not settle in {MAX_PASSES} passes; the friction "
-                f'of "{name}" depends too much on the torques here',
+                f"inverse_dynamics: friction and torques did not converge in {MAX_PASSES} passes; the "
+                f'friction of "{name}" depends too much on the torques here',
                 element=", ".join(self.rest.compiled.elements.names),
             )
         lam = self._motion(tau).lam

@@ -190,7 +190,7 @@ def _inertia_beyond(model: Model, index: int, who: str) -> pin.Inertia:
         is_beyond = _is_beyond(model, i, index)
         if is_beyond is None and each.inertia.mass > 0.0:
             raise InputError(
-                f'{who}: the model must tell on which side of the frame link "{each.name}" lies; its parent '
+                f'{who}: the model must show on which side of the frame link "{each.name}" lies; its parent '
                 "frame leads to no joint, as behind a joint that was locked; keep that joint free, or hold "
                 "it by a PrescribedMotion"
             )
@@ -199,7 +199,7 @@ def _inertia_beyond(model: Model, index: int, who: str) -> pin.Inertia:
     links = any(f.type == pin.FrameType.BODY and f.parentFrame == index for f in model.frames)
     if total.mass == 0.0 and not (frame.type == pin.FrameType.FIXED_JOINT and links):
         raise InputError(
-            f"{who}: the model must give the inertia beyond the frame; it keeps none there, only that of "
+            f"{who}: the model must give the inertia beyond the frame; it has only the inertia of "
             f'the whole body of joint "{model.names[frame.parentJoint]}"; make the frame a fixed joint with '
             "a link"
         )
@@ -228,7 +228,7 @@ def _child_beyond(model: Model, child: int, index: int, who: str) -> bool:
         is_beyond = _is_beyond(model, int(model.getFrameId(name, pin.FrameType.JOINT)), index)
     if is_beyond is None:
         raise InputError(
-            f'{who}: the model must tell on which side of the frame joint "{name}" lies; its joint frame has '
+            f'{who}: the model must show on which side of the frame joint "{name}" lies; its joint frame has '
             "no parent frame on this body; add it by model.addJointFrame(joint, parent_frame)"
         )
     return is_beyond
@@ -251,7 +251,7 @@ def _load_beyond(scene: Scene, load: Load, index: int, who: str) -> bool:
     if is_beyond is None:
         place = "it has no frame name" if load.frame is None else f'it is attached to "{load.frame}"'
         raise InputError(
-            f"{who}: the scene must tell on which side of the frame {load.who} acts; {place}, which belongs "
+            f"{who}: the scene must show on which side of the frame {load.who} acts; {place}, which belongs "
             "to no link of this body; attach it to the frame of a link"
         )
     return is_beyond

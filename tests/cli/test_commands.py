@@ -66,7 +66,7 @@ def test_replay_of_a_saved_run(tmp_path, capsys):
     assert main(["replay", str(run), str(tmp_path / "page.html")]) == 0
     assert (tmp_path / "page.html").stat().st_size > 1e5
     pn.simulate(pn.Scene(pn.load("four_bar").model), 0.1).save(run)
-    assert "does not know a robot that `load` finds; name it: --robot" in fails(capsys, ["replay", str(run)])
+    assert "names no robot that `load` finds; give one: --robot" in fails(capsys, ["replay", str(run)])
 
 
 def test_info_for_programs(capsys):
@@ -116,7 +116,7 @@ def test_a_sweep_from_a_file(tmp_path, capsys):
     assert capsys.readouterr().out == f"wrote {page}\n"
     assert page.stat().st_size > 10_000
     assert "--run must be at least 0 and below 3; got 3" in fails(capsys, ["replay", runs, "--run", "3"])
-    assert "--run K says which run of a sweep's folder" in fails(capsys, ["replay", runs])
+    assert "--run K selects a run in the folder of a sweep" in fails(capsys, ["replay", runs])
     assert 'ladders.yaml" is no folder' in fails(capsys, ["replay", str(path), "--run", "0"])
     path.write_text(SWEEP.replace("0.05\n", "0.07\n", 1))
     assert "holds another sweep" in fails(capsys, ["sweep", str(path)])

@@ -199,7 +199,8 @@ def test_a_law_that_asks_for_a_reaction_that_is_not_there(ask, message):
 
 
 MISS = (
-    r"; row 0: -?[\d.]+ by differences against -?[\d.]+; mend the function, the residual or gap, or the rate"
+    r"; row 0: -?[\d.]+ by differences against -?[\d.]+; "
+    r"correct the function, the residual or gap, or the rate"
 )
 DOOR = {
     "rate": (
@@ -271,7 +272,7 @@ def test_ctrl_c_keeps_what_was_computed(kind):
         child.kill()
     assert child.returncode == 0, err
     message, samples, at_end, finite, cause = out.strip().split("|")
-    pattern = r"the run was interrupted at t = \S+ s; the trajectory up to there is in error\.trajectory"
+    pattern = r"the run was interrupted at t = \S+ s; the trajectory up to this time is in error\.trajectory"
     assert re.fullmatch(pattern, message)
     assert int(samples) > 10
     assert (at_end, finite, cause) == ("True", "True", "None")

@@ -190,7 +190,7 @@ REFUSED = {
     ),
     "ratio of zero": (
         lambda: JointCoupling("j", "k", 0.0),
-        "JointCoupling: ratio must not be zero; to hold a joint still use PrescribedMotion or lock it",
+        "JointCoupling: ratio must not be zero; hold a joint at rest by a PrescribedMotion, or lock it",
     ),
     "offset infinite": (
         lambda: JointCoupling("j", "k", 1.0, INF),
@@ -316,7 +316,7 @@ REFUSED = {
     ),
     "bounce of a closed contact": (
         lambda: PointContact("a", restitution=0.5, unilateral=False),
-        "PointContact: restitution is of a contact that may open; leave it or unilateral=False out",
+        "PointContact: only a contact that may open has restitution; omit restitution or unilateral",
     ),
     "negative stiffness": (
         lambda: JointSpring("j", -1),

@@ -175,7 +175,7 @@ class TestPlaces:
     )
     def test_anchor_in_which_nothing_rubs(self, gripper, anchor, what):
         words = (
-            f'JointFriction(loop): "loop" is a {what}, in which nothing is known to rub; friction acts in a '
+            f'JointFriction(loop): "loop" is a {what}, for which no friction is defined; friction acts in a '
             'HingeAnchor, in a PointAnchor with axes="xyz" and on a JointCoupling'
         )
         with refuses(words, InputError):

@@ -39,8 +39,8 @@ def stiff_and_sampled():
 @pytest.mark.parametrize(
     ("make", "why"),
     [
-        (stiff_on_the_ground, 'no implicit method here opens and closes contacts such as "sole" yet'),
-        (stiff_and_sampled, "no implicit method here holds the torques of a SampledControl yet"),
+        (stiff_on_the_ground, 'no implicit method supports contacts that open, such as "sole"'),
+        (stiff_and_sampled, "no implicit method supports the held torques of a SampledControl"),
     ],
 )
 def test_stiffness_names_no_method_that_refuses_the_scene(make, why):
@@ -54,7 +54,7 @@ def test_stiffness_names_no_method_that_refuses_the_scene(make, why):
 
 
 def test_the_refusal_of_contacts_names_max_steps():
-    words = "with max_steps where one of them calls the scene stiff, or keep it closed with unilateral=False"
+    words = "with max_steps if the scene is stiff, or keep it closed with unilateral=False"
     with refuses(words, InputError):
         pn.simulate(stiff_on_the_ground(), 1.0, method="Radau")
 
@@ -64,8 +64,8 @@ def test_fixed_steps_that_overflow_name_shorter_ones():
     body(model, 0, pin.JointModelPX(), "slide", 1.0)
     scene = pn.Scene(model, forces=[pn.JointSpring("slide", 1e8)], v0=[1.0])
     words = (
-        ": where steps of dt = 0.01 s are too long for the stiffest force the motion overflows; take a "
-        'shorter dt, or method="dop853", with max_steps where it calls the scene stiff; the trajectory up'
+        ": the motion overflows if steps of dt = 0.01 s are too long for the stiffest force; use a shorter "
+        'dt, or method="dop853", with max_steps if the scene is stiff; the trajectory up'
     )
     with refuses(words, NonFiniteError):
         pn.simulate(scene, 10.0, method="rk4", dt=0.01)

@@ -71,24 +71,24 @@ class TestMessages:
 
     def test_vectors_of_wrong_shape(self):
         check(
-            InputError, "F must have shape (3,) to fit M, got (2,); one force a coordinate", EYE, [1.0, 2.0]
+            InputError, "F must have shape (3,) to fit M, got (2,); one force per coordinate", EYE, [1.0, 2.0]
         )
         check(
             InputError,
-            "F must have shape (3,) to fit M, got (3, 1); one force a coordinate",
+            "F must have shape (3,) to fit M, got (3, 1); one force per coordinate",
             EYE,
             np.ones((3, 1)),
         )
         check(
             InputError,
-            "C must have shape (3,) to fit M, got (1,); one force a coordinate",
+            "C must have shape (3,) to fit M, got (1,); one force per coordinate",
             *(EYE, ONES, ROW, [0.0], [1.0]),
         )
 
     def test_rows_of_wrong_shape(self):
         check(
             InputError,
-            "A must have shape (m, 3) to fit M, got (3,); one row a constraint",
+            "A must have shape (m, 3) to fit M, got (3,); one row per constraint",
             EYE,
             ONES,
             ONES,
@@ -96,7 +96,7 @@ class TestMessages:
         )
         check(
             InputError,
-            "A must have shape (m, 3) to fit M, got (1, 2); one row a constraint",
+            "A must have shape (m, 3) to fit M, got (1, 2); one row per constraint",
             EYE,
             ONES,
             [[1, 2]],
@@ -104,19 +104,21 @@ class TestMessages:
         )
         check(
             InputError,
-            "b must have shape (1,) to fit A, got (2,); one value a row of A",
+            "b must have shape (1,) to fit A, got (2,); one value per row of A",
             EYE,
             ONES,
             ROW,
             [0, 0],
         )
         check(
-            InputError, "b must have shape (1,) to fit A, got (); one value a row of A", EYE, ONES, ROW, 0.0
+            InputError, "b must have shape (1,) to fit A, got (); one value per row of A", EYE, ONES, ROW, 0.0
         )
 
     def test_half_a_constraint(self):
-        check(InputError, "A and b must come together, got A without b; pass b as well", EYE, ONES, ROW)
-        check(InputError, "A and b must come together, got b without A; pass A as well", EYE, ONES, b=[0.0])
+        check(InputError, "A and b must be given together, got A without b; pass b as well", EYE, ONES, ROW)
+        check(
+            InputError, "A and b must be given together, got b without A; pass A as well", EYE, ONES, b=[0.0]
+        )
 
     @pytest.mark.parametrize(
         ("value", "kind"),
@@ -179,7 +181,7 @@ class TestMessages:
     def test_rows_that_contradict(self):
         message = (
             "constraint rows 0 and 2 contradict each other: A a - b must be 0, got 3.1e-02 in row 2;"
-            " correct b or drop a row"
+            " correct b or remove a row"
         )
         check(
             InconsistentConstraintsError, message, EYE, ONES, [[1, 0, 0], [0, 1, 0], [1, 0, 0]], [1, 0, 0.969]
@@ -193,9 +195,9 @@ class TestMessages:
             solve(EYE, ONES, A, [1.0, 1.0, 1.0, 8.0])
 
     def test_zero_row_that_contradicts(self):
-        message = "row 1 of A is zero: b[1] must be 0, got 0.5; correct b or drop the row"
+        message = "row 1 of A is zero: b[1] must be 0, got 0.5; correct b or remove the row"
         check(InconsistentConstraintsError, message, EYE, ONES, [[1, 0, 0], [0, 0, 0]], [0.0, 0.5])
-        message = "row 0 of A is zero: b[0] must be 0, got 1e-05; correct b or drop the row"
+        message = "row 0 of A is zero: b[0] must be 0, got 1e-05; correct b or remove the row"
         check(InconsistentConstraintsError, message, EYE, ONES, [[0, 0, 0]], [1e-5])
 
     def test_more_demands_than_coordinates(self):

@@ -241,7 +241,7 @@ BOX = coal.Box(0.1, 0.1, 0.1)
         (lambda m, g: pn.free_body(m, "a", BOX, mass=0.0), 'free_body "a": mass must be positive; got 0'),
         (
             lambda m, g: pn.free_body(m, "a", pn.ground().geometry, 1.0),
-            'free_body "a": shape must enclose a volume; a Halfspace of 0 m^3 came: give a solid, or',
+            'free_body "a": shape must enclose a volume; got a Halfspace of 0 m^3: give a solid, or',
         ),
         (
             lambda m, g: pn.free_body(m, "a", coal.Box(-1.0, 1.0, 1.0), 1.0),

@@ -97,7 +97,7 @@ def test_which_pairs_are_known(one, other):
         if (one, other) in KNOWN | IN_PARTS:
             assert pair(first, second)[0].contacts
         else:
-            with pytest.raises(pn.InputError, match="no contacts are known for this pair of shapes, a"):
+            with pytest.raises(pn.InputError, match="this pair of shapes is not supported, a"):
                 pair(first, second)
 
 

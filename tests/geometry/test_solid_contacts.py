@@ -256,7 +256,9 @@ def test_a_cube_has_six_faces():
 
 def test_meshes_of_many_edges_are_refused():
     round_stone = convex(cloud(1, 60))
-    with pytest.raises(pn.InputError, match="two shapes may touch at 1000 places at most, and these have"):
+    with pytest.raises(
+        pn.InputError, match="two shapes may have at most 1000 contact points, and these have"
+    ):
         pair(round_stone, round_stone)
 
 
@@ -265,7 +267,7 @@ def test_meshes_of_many_edges_are_refused():
     [
         (
             lambda: pn.HullContact("a", "b", CUBE[:4], 0.1),
-            "points must span a solid: four that lie in no plane",
+            "points must span a solid, at least four points out of",
         ),
         (lambda: pn.HullContact("a", "b", CUBE, 0.0), "one of radius1 and radius2 must be positive"),
         (lambda: pn.HullContact("a", "a", CUBE, 0.1), 'frame1 and frame2 must differ; both are "a"'),

@@ -113,8 +113,11 @@ def test_time_stepping_tells_at_the_end_of_a_step():
 @pytest.mark.parametrize(
     ("made", "message"),
     [
-        (lambda: pn.EffortLimits(None), "EffortLimits: actuation must ask for torques .*; got None"),
-        (lambda: pn.EffortLimits(pn.EffortLimits([1.0])), ".* without limits of its own; got EffortLimits"),
+        (
+            lambda: pn.EffortLimits(None),
+            "EffortLimits: actuation must be drives without effort limits; got None",
+        ),
+        (lambda: pn.EffortLimits(pn.EffortLimits([1.0])), ".* without effort limits; got EffortLimits"),
         (lambda: pn.EffortLimits([1.0], -2.0), "EffortLimits: effort must not be negative; got -2"),
         (
             lambda: pn.Scene(slider(), actuation=pn.EffortLimits([1.0], [1.0, 2.0])),

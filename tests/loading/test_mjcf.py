@@ -68,7 +68,7 @@ def test_a_joint_that_has_the_name_of_the_ground_gets_another(tmp_path):
     bodies = '<body name="universe"><joint name="universe"/><geom size="0.1"/></body>'
     scene = pn.load(write(tmp_path, bodies=bodies))
     assert list(scene.model.names) == ["universe", "universe_0"]
-    assert 'joint "universe" is called "universe_0" here, for the ground has its name' in scene.notes
+    assert 'joint "universe" has the name "universe_0" here, since its name is reserved' in scene.notes
 
 
 def test_a_fragment_whose_tendon_goes_around_nothing_is_refused(tmp_path):
@@ -170,7 +170,7 @@ def test_what_is_left_out_is_noted(tmp_path):
     scene = pn.load(write(tmp_path, equality))
     assert [c.name for c in scene.constraints] == ["soft"]
     assert 'equality "off" is inactive in the MJCF file and left out' in scene.notes
-    assert "solref and solimp of soft are not used: constraints here are exact, not soft" in scene.notes
+    assert "solref and solimp of soft are not used: constraints are exact here, not soft" in scene.notes
 
 
 def test_joint_equalities_of_higher_order_are_rows(tmp_path):

@@ -130,7 +130,7 @@ TOLD_FILES = {
     ),
     "controller": (
         '<actuator><dcmotor joint="j" motorconst="0.1" resistance="1"/></actuator>',
-        'actuators with a controller, a delay or a law of their own "actuator_0"',
+        'actuators with a controller, a delay or a special law "actuator_0"',
         "actuator",
     ),
     "wrapping tendon": (
@@ -164,7 +164,7 @@ TOLD_FILES = {
     ),
     "tendon armature": (
         '<tendon><fixed armature="0.2"><joint joint="j" coef="1"/></fixed></tendon>',
-        'armature of tendons "tendon_0", which no mass matrix of a tree holds',
+        'armature of tendons "tendon_0", which the mass matrix of a tree cannot contain',
         "tendon",
     ),
 }
@@ -179,12 +179,12 @@ def write(path, extra="", joint="", geom="", option=""):
 
 
 @pytest.mark.parametrize(("text", "message", "key"), TOLD_FILES.values(), ids=TOLD_FILES)
-def test_what_moves_the_robot_and_cannot_be_carried_is_an_error_until_it_is_allowed(
+def test_what_moves_the_robot_and_cannot_be_converted_is_an_error_until_it_is_allowed(
     tmp_path, text, message, key
 ):
     file = write(tmp_path, text)
     with refuses(
-        f"cannot be carried: {message}; remove it from the file, or leave it out with "
+        f"cannot be converted: {message}; remove it from the file, or leave it out with "
         f"load(..., allow=('{key}',))"
     ):
         pn.load(file)
@@ -195,11 +195,11 @@ def test_ellipsoids_are_a_note_without_a_fluid_and_an_error_in_one(tmp_path):
     geom = 'fluidshape="ellipsoid"'
     words = 'fluid forces on ellipsoids of bodies "body"'
     assert (
-        f"{words} do not act, for there is no density and no viscosity"
+        f"{words} do not act, because density and viscosity are zero"
         in pn.load(write(tmp_path, geom=geom)).notes
     )
     file = write(tmp_path, geom=geom, option='<option density="1"/>')
-    with refuses(f"cannot be carried: {words}"):
+    with refuses(f"cannot be converted: {words}"):
         pn.load(file)
     scene = pn.load(file, allow=("fluid",))
     assert f"left out, as allowed: {words}" in scene.notes
@@ -228,8 +228,8 @@ def test_notes_of_what_plays_no_part(tmp_path):
         'tendons that wrap around geoms are left out: "tendon_0"',
         "bounds of the positions of 1 joints are not used; limits=True makes them stops",
         'ranges of tendons that wrap around geoms are left out: "tendon_0"',
-        "bodies do not fall asleep here",
-        "contacts between geoms (1 pairs) are not carried over",
+        "bodies do not sleep here",
+        "contacts between geoms (1 pairs) are not transferred",
     ):
         assert words in notes
 
@@ -240,9 +240,9 @@ def test_notes_of_bodies_and_drives_that_play_no_part(tmp_path):
     rigid = """<worldbody><flexcomp name="net" type="grid" count="3 3 1" spacing="0.1 0.1 0.1" dim="2"
         rigid="true"/></worldbody>"""
     notes = pn.load(write(tmp_path, extra + rigid)).notes
-    assert "flexes play no part: their contacts are not carried over" in notes
+    assert "flexes have no effect: their contacts are not transferred" in notes
     assert 'mocap bodies "hand" are held where they start' in notes
-    assert 'adhesion actuators "suction" pull on contacts, which are not carried over' in notes
+    assert 'adhesion actuators "suction" act on contacts, which are not transferred' in notes
 
 
 def test_a_file_without_contacts_has_no_note_of_them(tmp_path):
@@ -255,8 +255,8 @@ def test_fields_of_a_newer_mujoco_are_noted(tmp_path, monkeypatch):
     monkeypatch.setattr(
         "pin_nonideal.loading.mjcf.unsupported.is_listed", lambda field: field != "jnt_margin"
     )
-    (note,) = [note for note in pn.load(write(tmp_path)).notes if "not known here" in note]
-    assert note.endswith("has fields that are not known here and may matter: jnt_margin")
+    (note,) = [note for note in pn.load(write(tmp_path)).notes if "unknown fields" in note]
+    assert note.endswith("has unknown fields, which may affect the motion: jnt_margin")
 
 
 def test_unknown_allowance_is_refused(tmp_path):

@@ -315,7 +315,7 @@ YAML_REFUSED = {
     ),
     "helical without pitch": (
         "model: {helical: {elbow: 0}}",
-        'pitch of "elbow" must not be zero; a joint that does not rise is a revolute one',
+        'pitch of "elbow" must not be zero; a joint without a rise is revolute',
     ),
     "pitch no number": (
         "model: {helical: {elbow: .nan}}",

@@ -271,13 +271,13 @@ BAD = [
     ({"efficiency": 0.0}, "efficiency must lie between 0 and 1; got 0"),
     ({"efficiency": 1.0}, "efficiency must lie between 0 and 1; got 1"),
     ({"efficiency": 0.9, "efficiency_back": 1.0}, "efficiency_back must be below 1; got 1"),
-    ({"efficiency_back": 0.5}, "efficiency_back needs an efficiency too"),
+    ({"efficiency_back": 0.5}, "efficiency_back needs efficiency too"),
     ({"efficiency": 0.9, "mu": 0.1}, "give either efficiency, or mu and lead_angle"),
     ({"lead_angle": 0.1}, "lead_angle needs a positive mu"),
     ({"mu": 0.1, "lead_angle": 0.0}, "lead_angle must be positive; got 0"),
     ({"mu": 0.1, "lead_angle": 1.6}, "lead_angle must be below pi/2 rad; got 1.6"),
     ({"mu": 0.1, "lead_angle": 0.1, "pressure_angle": 2.0}, "pressure_angle must be below pi/2 rad; got 2"),
-    ({"mu": 0.1, "pressure_angle": 0.3}, "pressure_angle is that of a thread, which needs a lead_angle too"),
+    ({"mu": 0.1, "pressure_angle": 0.3}, "pressure_angle describes a thread; give its lead_angle too"),
 ]
 
 

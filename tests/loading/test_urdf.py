@@ -131,7 +131,7 @@ URDF_REFUSED = {
     ),
     "joint of the ground": (
         robot(*ARM, link("x"), joint("universe", "base", "x")),
-        'no joint may be called "universe", which is the name of the joint of the ground',
+        'no joint may have the name "universe", which Pinocchio uses for the world or for the',
     ),
     "another root element": ("<sdf/>", "must have the root element <robot>; got <sdf>"),
     "entities": (
@@ -151,7 +151,7 @@ def test_malformed_urdf_is_refused(tmp_path, text, message):
 def test_a_joint_must_not_have_the_name_of_the_floating_base(tmp_path):
     path = folder(tmp_path, urdf=robot(*ARM, link("x"), joint("root_joint", "base", "x")))
     assert "root_joint" in pn.load(path).model.names
-    with refuses('no joint may be called "root_joint"'):
+    with refuses('no joint may have the name "root_joint"'):
         pn.load(path, free_flyer=True)
 
 
@@ -363,7 +363,7 @@ COSMETIC = {
     ),
     "inertia negative by rounding": (
         link("x").replace('ixx="0.1"', 'ixx="-2.4e-35"'),
-        'moments of inertia below zero by rounding are zero, of links "x"',
+        'moments of inertia that rounding makes negative are zero, of links "x"',
     ),
     "tag of another tool": (
         link("x") + "<gazebo><speed>3</speed></gazebo>",
@@ -391,16 +391,18 @@ LIMITS = {
     "none": ('<limit effort="1" velocity="1" lower="-3" upper="3"/>', ""),
     "without effort": ('effort="1"', ""),
     "negative effort": ('effort="1"', 'effort="-1"'),
-    "turned around": ('lower="-3" upper="3"', 'lower="3" upper="-3"'),
+    "reversed": ('lower="-3" upper="3"', 'lower="3" upper="-3"'),
     "infinite": ('effort="1"', 'effort="inf"'),
 }
 
 
 @pytest.mark.parametrize(("old", "new"), LIMITS.values(), ids=LIMITS)
-def test_limits_are_mended(tmp_path, old, new):
+def test_limits_are_corrected(tmp_path, old, new):
     text = robot(*ARM, link("x"), joint("j", "base", "x").replace(old, new))
     scene = pn.load(folder(tmp_path, urdf=text))
-    assert 'limits that are none, missing, negative or turned around are mended, of joints "j"' in scene.notes
+    assert (
+        'limits that are infinite, missing, negative or reversed are corrected, of joints "j"' in scene.notes
+    )
 
 
 BARE = (
@@ -484,7 +486,7 @@ def test_inertias_that_no_body_has_are_told(tmp_path):
     text = link("x").replace('izz="0.1"', 'izz="0.3"')
     scene = pn.load(folder(tmp_path, urdf=robot(*ARM, text, joint("j", "base", "x"))))
     (note,) = (note for note in scene.notes if "inertias" in note)
-    assert note.startswith('inertias that no body has are taken as they are, of links "x": their largest')
+    assert note.startswith('physically impossible inertias are used unchanged, of links "x": their largest')
     assert scene.model.inertias[scene.model.getJointId("j")].inertia[2, 2] == 0.3
 
 

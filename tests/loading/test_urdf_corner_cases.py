@@ -55,9 +55,9 @@ def test_a_mesh_of_a_broken_path_is_found_by_its_ending(tmp_path, filename):
     assert [g.meshPath for g in scene.visual_model.geometryObjects] == [str(found)]
     (note,) = (note for note in scene.notes if "mesh" in note)
     assert note.startswith(
-        f'paths of meshes "{filename}" lead nowhere; they are the only ones beneath a folder'
+        f'paths of meshes "{filename}" do not exist; the only files with the same end below a folder'
     )
-    assert note.endswith(f'"meshes" that end so, such as "{found}"')
+    assert note.endswith(f'"meshes" are used, such as "{found}"')
 
 
 @pytest.mark.parametrize(
@@ -95,7 +95,7 @@ def test_a_mesh_that_comes_later_is_found(tmp_path):
 def test_the_world_need_not_be_declared(tmp_path):
     parts = [link("base"), joint("mount", "world", "base", kind="fixed", xyz="0 0 2"), *ARM[1:]]
     scene = pn.load(folder(tmp_path, urdf=robot(*parts)))
-    assert 'link "world", on which joints hang, is not declared; it is added without inertia' in scene.notes
+    assert 'link "world", a parent of joints, is not declared; it is added without inertia' in scene.notes
     assert scene.model.jointPlacements[1].translation[2] == 2.0
     with refuses('no link "wrld", the parent of joint "mount"'):
         pn.load(folder(tmp_path, urdf=robot(*parts).replace('"world"', '"wrld"')))

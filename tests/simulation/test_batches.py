@@ -201,8 +201,8 @@ def test_arrays_keep_starts_that_cannot_be_closed_apart():
 REFUSED = {
     "nobody": ({"rab": {"mu": [0.1] * N}}, 'no law, contact, force or joint "rab"; nearest: "rub"'),
     "no field": ({"rub": {"nu": [0.1] * N}}, '"rub": no field "nu"; nearest: "mu"'),
-    "one number": ({"rub": {"mu": 0.1}}, '"rub": mu must be 3 values, one a run; got 0.1'),
-    "too few": ({"rub": {"mu": [0.1]}}, '"rub": mu must be 3 values, one a run; got [0.1]'),
+    "one number": ({"rub": {"mu": 0.1}}, '"rub": mu must be 3 values, one per run; got 0.1'),
+    "too few": ({"rub": {"mu": [0.1]}}, '"rub": mu must be 3 values, one per run; got [0.1]'),
     "negative": (
         {"rub": {"mu": [0.1, -1.0, 0.1]}},
         'run 1: JointFriction "rub": mu must not be negative; got -1',
@@ -218,11 +218,11 @@ REFUSED = {
     ),
     "ceases": (
         {"rub": {"viscous": [0.0, 0.1, 0.1]}},
-        "is more than other numbers: something would begin or cease to act; keep zeros zero",
+        "changes more than numbers: parts of the scene would begin or cease to act; keep zeros zero",
     ),
-    "elsewhere": ({"air": {"frame": ["tip", "a", "tip"]}}, "is more than other numbers"),
+    "elsewhere": ({"air": {"frame": ["tip", "a", "tip"]}}, "changes more than numbers"),
     "values": ({"rub": [0.1] * N}, '"rub" must be values by field of a description; got [0.1, 0.1, 0.1]'),
-    "mass": ({"b": {"mass": [1.0, 0.0, 1.0]}}, '"b": masses must be positive'),
+    "mass": ({"b": {"mass": [1.0, 0.0, 1.0]}}, '"b": masses and moments of inertia about'),
     "both": ({"b": {"mass": [1.0] * N, "inertia": np.ones((N, 10))}}, 'give "mass" or "inertia", not both'),
     "gravity": ({"gravity": [0.0] * N}, "rollout: gravity must have shape (3, 3); got shape (3,)"),
     "list": ([0.1], "rollout: parameters must be values by name; got [0.1]"),
@@ -239,10 +239,10 @@ def test_what_is_no_parameter(case):
 def test_what_shapes_the_scene_is_no_parameter():
     touch = {"floor": {"radius": [0.1, 0.2]}}
     with refuses(
-        '"floor": radius shapes the scene and cannot differ between runs; sweep makes', pn.InputError
+        '"floor": radius changes the structure of the scene and cannot differ between runs', pn.InputError
     ):
         pn.rollout(ball(), None, None, 0.1, parameters=touch)
-    with refuses('record "dense" goes without parameters', pn.InputError):
+    with refuses('record "dense" is not supported with parameters', pn.InputError):
         pn.rollout(scene_of(), None, None, 0.1, parameters={"rub": {"mu": [0.1]}}, record="dense")
     pinocchio = pn.Scene(chain(), terms="pinocchio")
     with refuses('"b": masses can differ between runs with terms="core" only', pn.InputError):

@@ -303,7 +303,7 @@ def test_another_version(changes, written):
 
 def test_a_state_that_was_not_written(written):
     rewritten(written, digest="0" * 64)
-    with refuses(f'"{written}" is damaged: its state is not the one that was written', LoadingError):
+    with refuses(f'"{written}" is damaged: its state differs from the written state', LoadingError):
         pn.resume(written, cart())
 
 
@@ -433,14 +433,14 @@ def test_a_disk_that_fills_up(tmp_path, monkeypatch):
         warnings.simplefilter("always")
         run = pn.simulate(pn.load("four_bar"), 0.1, checkpoint=path, checkpoint_interval=0.0)
     assert run.t[-1] == 0.1
-    assert str(told[0].message) == "no room; the run goes on, the last checkpoint stays"
+    assert str(told[0].message) == "no room; the run continues, and the last checkpoint stays"
     monkeypatch.undo()
     assert_same_run(run, pn.resume(path))
 
 
 def test_methods_of_scipy_have_no_checkpoint(tmp_path):
     message = (
-        'simulate: checkpoint needs one of the core\'s methods; "Radau" runs in SciPy, which does not give '
+        'simulate: checkpoint needs one of the core\'s methods; "Radau" runs in SciPy, which hides '
         "its state away"
     )
     with refuses(message, InputError):

@@ -557,7 +557,7 @@ def test_scenes_with_lists_are_described_copied_and_pickled():
 )
 def test_errors(drives, message):
     if message is None:
-        with pytest.raises(pn.InputError, match="must ask for torques without limits of its own"):
+        with pytest.raises(pn.InputError, match="must be drives without effort limits"):
             pn.EffortLimits([drives, {"shoulder": 1.0}], 1.0)
         return
     with pytest.raises((pn.InputError, pn.UnknownNameError)) as error:

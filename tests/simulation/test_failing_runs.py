@@ -112,7 +112,7 @@ def test_a_model_that_cannot_move():
 
 
 def test_drives_that_ask_for_two_velocities():
-    message = 'no velocity satisfies the constraints at t = 0.00 s: "two" misses its rate by 1.0e+00'
+    message = 'no velocity satisfies the constraints at t = 0.00 s: "two" violates its rate by 1.0e+00'
     with refuses(message, InconsistentConstraintsError):
         pn.simulate(drives(pn.polynomial([0.0, 1.0]), pn.constant(0.0)), 1.0)
 
@@ -120,12 +120,12 @@ def test_drives_that_ask_for_two_velocities():
 def test_drives_that_ask_for_two_accelerations():
     scene = drives(pn.polynomial([0.0, 0.0, 1.0]), pn.constant(0.0))
     message = 'constraints "two" and "one" contradict each other: residual 2.0e+00 m/s^2 at t = 0.00 s; '
-    message += "leave one of them out, or let both ask for the same motion"
+    message += "leave one of them out, or give both the same motion"
     for call in (scene.solve, scene.acceleration):
         with refuses(message, InconsistentConstraintsError):
             call(np.zeros(3), np.zeros(3))
     with refuses(
-        f"{message}; the trajectory up to there is in error.trajectory", InconsistentConstraintsError
+        f"{message}; the trajectory up to this time is in error.trajectory", InconsistentConstraintsError
     ):
         pn.simulate(scene, 1.0)
 
@@ -160,7 +160,7 @@ def test_a_row_that_moves_nothing_and_asks_for_something():
     )
     message = (
         'loop "side" does not close: gap 0.2 in row 0, a direction in which no joint moves; '
-        "mend the frames' placement"
+        "correct the placement of the frames"
     )
     with refuses(message, LoopClosureError):
         pn.Scene(model, constraints=[pn.PointAnchor("coupler_tip", "beside", axes="y", name="side")])
@@ -190,8 +190,8 @@ def test_a_rod_that_grows_too_long():
         pn.simulate(pn.Scene(model, q0=[0.3, 0.4], constraints=[rod]), 1.0)
     assert str(caught.value).endswith(
         ", such as full stretch or a dead point, where its rows become dependent and the motion ends or is "
-        "not determined; drive another joint, or stay away from the position; the trajectory up to there is "
-        "in error.trajectory"
+        "not determined; drive another joint, or stay away from the position; the trajectory up to this time "
+        "is in error.trajectory"
     )
     run = caught.value.trajectory
     assert len(run) > 5
@@ -220,8 +220,8 @@ def test_an_acceleration_that_is_not_finite():
     message = "acceleration is not finite at t = 0 s"
     with refuses(message, NonFiniteError):
         scene.solve(np.zeros(3), np.zeros(3))
-    hint = "; look at the last samples for a force, stiffness or function that grows without bound"
-    with refuses(f"{message}{hint}; the trajectory up to there is in error.trajectory", NonFiniteError):
+    hint = "; check the last samples for a force, stiffness or function that grows without bound"
+    with refuses(f"{message}{hint}; the trajectory up to this time is in error.trajectory", NonFiniteError):
         pn.simulate(scene, 1.0)
 
 

@@ -107,7 +107,7 @@ def test_lists_that_may_be_in_the_order_of_the_file_are_told(tmp_path):
         "(z_arm, a_arm)"
     )
     assert any(note.endswith(words) for note in scene.notes)
-    advice = '; name the joints, such as v={"a_arm": ...}, or pass an array to be taken at your word'
+    advice = '; name the joints, such as v={"a_arm": ...}, or pass an array in the order of the model'
     with pytest.warns(pn.JointOrderWarning) as told:
         scene.project(v=[1.0, 2.0])
     assert str(told[0].message) == f"v: {words}{advice}"

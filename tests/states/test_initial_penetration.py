@@ -199,8 +199,8 @@ def test_what_finds_no_way_out_is_named() -> None:
     with pytest.raises(pn.InputError) as error:
         scene.project([-2e-3], [0.0])
     assert (
-        'contact "floor" starts 0.002 (m or rad) inside at t = 0 s, and no short move was found that leads '
-        "out of all planes: change the start"
+        'contact "floor" starts with a penetration of 0.002 (m or rad) at t = 0 s, and no short move that '
+        "removes it was found: change the start"
     ) in str(error.value)
 
 

@@ -185,7 +185,7 @@ def test_what_meets_the_constraints_is_not_moved():
 
 MOVED = (
     "the initial configuration did not satisfy the constraints and was moved onto them: "
-    '"rocker_joint" by 1.29 rad, the others by less; Scene.project(report=True) says more'
+    '"rocker_joint" by 1.29 rad, the others by less; Scene.project(report=True) returns details'
 )
 
 

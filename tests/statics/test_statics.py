@@ -123,10 +123,10 @@ def test_a_drive_stronger_than_the_weight_is_named():
     """A bar of 1 kg and 1 m turns under 20 N m, and its weight holds 4.905 of them at most."""
     drives = 'the drive of joint "swing", 20 (N or N m), exceeds all resistance: at the smallest '
     held = (
-        "unbalanced force the drives push with 20 along a motion that the constraints allow, and all else "
-        "holds 4.9 of it"
+        "unbalanced force the drives push with 20 along a motion that the constraints allow, and all other "
+        "forces resist with 4.9"
     )
-    with refuses(drives + held + "; drive less, or hold more", pn.EquilibriumError):
+    with refuses(drives + held + "; reduce the drive, or add resistance", pn.EquilibriumError):
         pn.equilibrium(pendulum(), tau=[20.0], starts=FEW)
     driven = pn.Scene(pendulum().model, actuation=[20.0], laws=[pn.JointFriction("swing", coulomb=30.0)])
     with refuses("dry friction is ignored here, and `rest` includes it", pn.EquilibriumError):
@@ -398,7 +398,7 @@ def test_torques_within_bounds():
 def test_what_inverse_dynamics_refuses():
     scene = pn.load("four_bar")
     q, v = scene.initial_state()
-    with refuses('inverse_dynamics: a must follow the constraints, A a = b; "', pn.InputError):
+    with refuses('inverse_dynamics: a must satisfy the constraints, A a = b; "', pn.InputError):
         pn.inverse_dynamics(scene, q, v, np.ones(scene.model.nv))
     for arguments, message, error in (
         ({"actuated": ["crnk"]}, 'inverse_dynamics: actuated: no joint "crnk"', pn.UnknownNameError),

@@ -103,7 +103,7 @@ def test_a_motion_opens_a_contact_and_never_enters_it():
         assert lifted.tau == pytest.approx([2.0 * (G + a)])
         assert lifted.lam == pytest.approx([0.0])
         assert scene.acceleration([0.0], [v], tau=lifted.tau) == pytest.approx([a])
-    with pytest.raises(pn.InputError, match='"ground" misses it by'):
+    with pytest.raises(pn.InputError, match='"ground" violates it by'):
         pn.inverse_dynamics(scene, [0.0], [0.0], [-1.0])
 
 

@@ -304,7 +304,7 @@ def reaction(made, name="weld"):
 
 def test_frames_without_inertia_are_refused():
     message = (
-        'reaction("weld"): the model must give the inertia beyond the frame; it keeps none there, only that '
+        'reaction("weld"): the model must give the inertia beyond the frame; it has only the inertia '
         'of the whole body of joint "swing"; make the frame a fixed joint with a link'
     )
     for kind in (pin.FrameType.FIXED_JOINT, pin.FrameType.OP_FRAME):
@@ -329,7 +329,7 @@ def test_loads_on_frames_without_order_are_refused():
     assert np.abs(pushed - free)[0].max() > 0.5
     assert np.abs(above - pushed)[0].max() > 0.5
     message = (
-        'reaction("weld"): the scene must tell on which side of the frame the Wrench at "tip" acts; it is '
+        'reaction("weld"): the scene must show on which side of the frame the Wrench at "tip" acts; it is '
         'attached to "tip", which belongs to no link of this body; attach it to the frame of a link'
     )
     with refuses(message, InputError):

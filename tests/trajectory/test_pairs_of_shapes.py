@@ -215,7 +215,7 @@ def test_parameters_of_a_rollout_reach_all_points() -> None:
         alone = pn.simulate(scene.replace(contacts=contacts), 0.02, method="moreau", dt=1e-3, record="forces")
         np.testing.assert_allclose(run.q, alone.q, atol=1e-14)
         np.testing.assert_allclose(run.limits[:, 0], alone.limits[:, 0], atol=1e-9)
-    with pytest.raises(pn.InputError, match="rounding shapes the scene"):
+    with pytest.raises(pn.InputError, match="rounding changes the structure of the scene"):
         pn.rollout(scene, None, None, 0.01, parameters={"upper": {"rounding": [1e-3, 2e-3]}})
 
 

@@ -89,7 +89,7 @@ def test_what_cannot_be_plotted_is_refused() -> None:
     for name in ("violation", "reactions"):
         with pytest.raises(InputError, match=f'plot "{name}" needs a constraint, and this scene has none'):
             plots_of(panda(), [name])
-    message = r'curve "tip" of plot "Tip" must have shape \(61,\), one value a sample; got \(3,\)'
+    message = r'curve "tip" of plot "Tip" must have shape \(61,\), one value per sample; got \(3,\)'
     with pytest.raises(InputError, match=message):
         plots_of(run, [("Tip", {"tip": np.zeros(3)})])
 

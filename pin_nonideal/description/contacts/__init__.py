@@ -108,7 +108,7 @@ class PointContact:
         object.__setattr__(self, "unilateral", flag(f"{who}: unilateral", self.unilateral))
         if self.restitution and not self.unilateral:
             raise InputError(
-                f"{who}: restitution is of a contact that may open; leave it or unilateral=False out"
+                f"{who}: only a contact that may open has restitution; omit restitution or unilateral"
             )
 
 

@@ -53,7 +53,7 @@ def convex_hull(points: Array, what: str) -> ConvexHull:
         hull = Qhull(points)
     except (QhullError, ValueError) as error:
         raise InputError(
-            f"{what} must span a solid: four that lie in no plane at least; got {len(points)}"
+            f"{what} must span a solid, at least four points out of one plane; got {len(points)}"
         ) from error
     face = _faces(hull.equations[:, :3], hull.neighbors)
     edges = [

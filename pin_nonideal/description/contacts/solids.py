@@ -170,7 +170,7 @@ class CylinderContact:
         object.__setattr__(self, "radius1", around(f"{who}: radius1", self.radius1))
         check_vectors(self, who, "offset", "xyz", "rpy")
         if self.below == self.above == 0.0:
-            raise InputError(f"{who}: one of below and above must be positive; a line is a CapsuleContact's")
+            raise InputError(f"{who}: one of below and above must be positive; use CapsuleContact for a line")
         if self.end is not None:
             check_vectors(self, who, "end")
             if self.end == self.offset:
@@ -272,7 +272,7 @@ class RevolvedContact:
             if not (min(solid) >= 0.0 < max(below, above) and (disk or length > 0.0)):
                 raise InputError(
                     f"{who}: {key} must be a length and two radii, none negative and one radius positive; "
-                    f"without a length both must be one; got {list(solid)}"
+                    f"without a length the radii must be equal; got {list(solid)}"
                 )
 
 

@@ -44,9 +44,7 @@ def exchange_joints(robot: RobotFile, table: Table, where: str, notes: list[str]
         return
     if chains:
         balls = ", ".join(f'"{chain.name}"' for chain in chains)
-        notes.append(
-            f"three revolute joints with massless links between are merged into a ball joint each: {balls}"
-        )
+        notes.append(f"three revolute joints in a row with massless links become one ball joint: {balls}")
     model = robot.model
     _exchange(robot, lambda geometries: edit_joints(model, geometries, chains, types, screws))
     robot.q0 = robot.v0 = None

@@ -58,7 +58,7 @@ class UnsupportedFeatures:
             keys = tuple(dict.fromkeys(key for key, _ in self._active))
             what = "; ".join(dict.fromkeys(text for _, text in self._active))
             raise LoadingError(
-                f"{self._where}: cannot be carried: {what}; remove it from the file, or leave it out with "
+                f"{self._where}: cannot be converted: {what}; remove it from the file, or leave it out with "
                 f"load(..., allow={keys!r})"
             )
 
@@ -93,7 +93,7 @@ def _check_actuators(tree: Tree, tendons: list[Tendon | None], unsupported: Unsu
     sticking = [names[a] for a in working if m.actuator_trntype[a] == BODY]
     if sticking:
         unsupported.add_note(
-            f"adhesion actuators {quote_names(sticking)} pull on contacts, which are not carried over"
+            f"adhesion actuators {quote_names(sticking)} act on contacts, which are not transferred"
         )
     muscles = [names[a] for a in working if MUSCLE in (m.actuator_gaintype[a], m.actuator_biastype[a])]
     if muscles:
@@ -105,7 +105,7 @@ def _check_actuators(tree: Tree, tendons: list[Tendon | None], unsupported: Unsu
     ]
     if others:
         unsupported.add_active(
-            "actuator", f"actuators with a controller, a delay or a law of their own {quote_names(others)}"
+            "actuator", f"actuators with a controller, a delay or a special law {quote_names(others)}"
         )
     wrapped = [
         names[a]
@@ -146,7 +146,8 @@ def _check_tendons(tree: Tree, tendons: list[Tendon | None], unsupported: Unsupp
     heavy = [names[i] for i in np.flatnonzero(inertia)]
     if heavy:
         unsupported.add_active(
-            "tendon", f"armature of tendons {quote_names(heavy)}, which no mass matrix of a tree holds"
+            "tendon",
+            f"armature of tendons {quote_names(heavy)}, which the mass matrix of a tree cannot contain",
         )
     plastic = [names[i] for i in range(m.ntendon) if m.tendon_plasticadr[i] >= 0]
     plastic += [tree.joint_name(j) for j in range(m.njnt) if m.jnt_plasticadr[j] >= 0]
@@ -161,9 +162,9 @@ def _check_bodies(tree: Tree, unsupported: UnsupportedFeatures) -> None:
         unsupported.add_note(f"mocap bodies {quote_names(names)} are held where they start")
     elliptic = np.unique(m.geom_bodyid[m.geom_fluid[:, 0] > 0.0])
     if elliptic.size:
-        still = "for their bodies do not move"
+        still = "because their bodies do not move"
         if not (m.opt.density or m.opt.viscosity):
-            still = "for there is no density and no viscosity"
+            still = "because density and viscosity are zero"
         what = f"fluid forces on ellipsoids of bodies {quote_names([tree.body_names[b] for b in elliptic])}"
         moving = any(tree.bodies[b][0] for b in elliptic)
         if moving and (m.opt.density or m.opt.viscosity):
@@ -176,7 +177,7 @@ def _check_bodies(tree: Tree, unsupported: UnsupportedFeatures) -> None:
         if (soft & stiff).any() or m.nflexstiffness or m.nflexbending or m.nefm0dof:
             unsupported.add_active("flex", f"elasticity of {m.nflex} flexes")
         else:
-            unsupported.add_note("flexes play no part: their contacts are not carried over")
+            unsupported.add_note("flexes have no effect: their contacts are not transferred")
     if (m.body_plugin >= 0).any() or (m.actuator_plugin >= 0).any():
         unsupported.add_active("plugin", "forces of plugins")
     elif m.nplugin:
@@ -199,7 +200,7 @@ def _check_equalities(tree: Tree, tendons: list[Tendon | None], unsupported: Uns
             soft.append(name)
     if soft:
         unsupported.add_note(
-            f"solref and solimp of {', '.join(soft)} are not used: constraints here are exact, not soft"
+            f"solref and solimp of {', '.join(soft)} are not used: constraints are exact here, not soft"
         )
 
 
@@ -216,9 +217,9 @@ def _check_contacts(mujoco: Mujoco, tree: Tree, unsupported: UnsupportedFeatures
         ]
         more = f", nor is their {' and '.join(extras)}" if extras else ""
         unsupported.add_note(
-            f"contacts between geoms ({pairs} pairs) are not carried over{more}: bodies pass through each "
-            "other; say the ones that matter with PointContact; scene.contact_friction holds the file's "
-            "coefficients"
+            f"contacts between geoms ({pairs} pairs) are not transferred{more}: bodies pass through each "
+            "other; add the needed contacts as GeometryContact or PointContact; scene.contact_friction holds "
+            "the coefficients of the file"
         )
 
 
@@ -234,11 +235,11 @@ def _check_limits(tree: Tree, tendons: list[Tendon | None], unsupported: Unsuppo
 def _check_options(mujoco: Mujoco, tree: Tree, unsupported: UnsupportedFeatures) -> None:
     m = tree.compiled
     if m.opt.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP:
-        unsupported.add_note("bodies do not fall asleep here, whatever the file's sleep flag")
+        unsupported.add_note("bodies do not sleep here, and the sleep flag of the file is not used")
     renamed = [j for j in range(m.njnt) if m.joint(j).name == GROUND]
     if renamed:
         unsupported.add_note(
-            f'joint "{GROUND}" is called "{tree.joint_name(renamed[0])}" here, for the ground has its name'
+            f'joint "{GROUND}" has the name "{tree.joint_name(renamed[0])}" here, since its name is reserved'
         )
     if m.nsensor:
         unsupported.add_note(f"sensors ({m.nsensor}) are not read")
@@ -250,13 +251,13 @@ def _check_options(mujoco: Mujoco, tree: Tree, unsupported: UnsupportedFeatures)
     if floating:
         unsupported.add_note(
             f"armature of free joints {quote_names(floating)}: MuJoCo gives it no Coriolis force along the "
-            "world's axes; a given force makes it the same here"
+            "world's axes; a given force reproduces this here"
         )
     unknown = [
         f for f in dir(m) if not f.startswith("_") and not callable(getattr(m, f)) and not is_listed(f)
     ]
     if unknown:
         unsupported.add_note(
-            f"this version of MuJoCo ({mujoco.__version__}) has fields that are not known here and may "
-            "matter: " + ", ".join(unknown)
+            f"this version of MuJoCo ({mujoco.__version__}) has unknown fields, which may affect the "
+            "motion: " + ", ".join(unknown)
         )

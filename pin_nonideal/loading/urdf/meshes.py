@@ -70,12 +70,12 @@ def resolve_meshes(root: ElementTree.Element, path: Path, package_dirs: Sequence
     if guessed:
         first = next(iter(guessed))
         notes.append(
-            f"paths of meshes {quote_names(guessed)} lead nowhere; they are the only ones beneath a folder "
-            f'"{MESHES}" that end so, such as "{guessed[first]}"'
+            f"paths of meshes {quote_names(guessed)} do not exist; the only files with the same end "
+            f'below a folder "{MESHES}" are used, such as "{guessed[first]}"'
         )
     if drawn:
         units = ", ".join(f"{meter:g} m" for meter in sorted(set(drawn.values())))
-        notes.append(f"meshes {quote_names(drawn)} are drawn in units of {units}, as their files say")
+        notes.append(f"meshes {quote_names(drawn)} are drawn in units of {units}, which their files state")
     return notes
 
 

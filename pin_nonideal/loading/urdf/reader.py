@@ -206,7 +206,7 @@ def _rotate_planar_joints(model: Model, root: ElementTree.Element, path: Path, n
             if frame.parentJoint == j and frame.type != pin.FrameType.JOINT:
                 frame.placement = back * frame.placement
         x, y = (" ".join(f"{round(c, 9):g}" for c in 0.0 + column) for column in turn.T[:2])
-        whose = "its axis" if joint.find("axis") is not None else "URDF's axis, for the file states none,"
+        whose = "its axis" if joint.find("axis") is not None else "the default axis of URDF,"
         notes.append(
             f'planar joint "{name}" moves in the plane normal to {whose} '
             f"{' '.join(f'{c:g}' for c in normal)}: its x and y are along {x} and {y} in the joint's frame"

@@ -97,7 +97,7 @@ def _world(root: ElementTree.Element) -> list[str]:
     if WORLD in declared or WORLD not in named or not declared:
         return []
     root.append(ElementTree.Element("link", {"name": WORLD}))
-    return [f'link "{WORLD}", on which joints hang, is not declared; it is added without inertia']
+    return [f'link "{WORLD}", a parent of joints, is not declared; it is added without inertia']
 
 
 def _colors(root: ElementTree.Element) -> list[str]:
@@ -194,10 +194,12 @@ def _inertias(root: ElementTree.Element) -> list[str]:
             unbalanced.append(str(link.get("name")))
     notes = []
     if rounded:
-        notes.append(f"moments of inertia below zero by rounding are zero, of links {quote_names(rounded)}")
+        notes.append(
+            f"moments of inertia that rounding makes negative are zero, of links {quote_names(rounded)}"
+        )
     if unbalanced:
         notes.append(
-            f"inertias that no body has are taken as they are, of links {quote_names(unbalanced)}: their "
+            f"physically impossible inertias are used unchanged, of links {quote_names(unbalanced)}: their "
             "largest principal moment exceeds the sum of the others"
         )
     return notes
@@ -235,6 +237,6 @@ def _limits(root: ElementTree.Element) -> list[str]:
     if not mended:
         return []
     return [
-        f"limits that are none, missing, negative or turned around are mended, of joints "
+        f"limits that are infinite, missing, negative or reversed are corrected, of joints "
         f"{quote_names(mended)}"
     ]

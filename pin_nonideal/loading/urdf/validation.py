@@ -42,8 +42,8 @@ def check_urdf(root: ElementTree.Element, path: Path, barred: Collection[str] = 
     for joint in root.findall("joint"):
         if joint.get("name") in barred:
             raise LoadingError(
-                f'"{path}": no joint may be called "{joint.get("name")}", which is the name of the joint of '
-                "the ground or of the floating base in Pinocchio; rename it"
+                f'"{path}": no joint may have the name "{joint.get("name")}", which Pinocchio uses for the '
+                "world or for the floating base; rename it"
             )
         _check_joint(joint, path)
 
@@ -79,8 +79,8 @@ def _check_tree(root: ElementTree.Element, path: Path) -> None:
         if child in parent_joint:
             raise LoadingError(
                 f'"{path}": link "{child}" has two parents, joints "{parent_joint[child]}" and '
-                f'"{joint_name}", but URDF holds trees only.  Keep one of the two joints; where the other '
-                "was, give each side a link on a fixed joint to serve as a frame; and close the loop in a "
+                f'"{joint_name}", but URDF holds trees only.  Keep one of the two joints. In place '
+                "of the other, add a link on a fixed joint to each side as a frame, and close the loop in a "
                 "robot.yaml beside the URDF:\n"
                 f"  closed_loop: [[frame_A, frame_B]]\n  type: [3d]"
             )

@@ -319,7 +319,7 @@ def pitches(table: Table, where: str) -> dict[str, float]:
         except InputError as error:
             raise LoadingError(str(error)) from None
         if result[joint] == 0.0:
-            raise LoadingError(f"{what} must not be zero; a joint that does not rise is a revolute one")
+            raise LoadingError(f"{what} must not be zero; a joint without a rise is revolute")
     return result
 
 

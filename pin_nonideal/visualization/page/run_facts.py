@@ -52,7 +52,7 @@ def facts_of(run: Trajectory, motion: Motion) -> list[tuple[str, str]]:
     model = run.scene.model
     frames = f"{len(motion.times)} frames"
     if motion.held.any():
-        frames += f", {int(motion.held.sum())} of them still: the samples do not tell the motion between them"
+        frames += f", {int(motion.held.sum())} of them still: samples too far apart"
     facts = [
         ("scene", str(run.scene.name)),
         ("model", f"{model.name}, {model.njoints - 1} joints, nq {model.nq}, nv {model.nv}"),

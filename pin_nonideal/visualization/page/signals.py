@@ -237,7 +237,7 @@ def _user_plot(run: Trajectory, title: str, curves: Mapping[str, Array]) -> Plot
         values[str(label)] = samples.astype(np.float64)
         if samples.shape != (len(run.t),):
             raise InputError(
-                f"{where} must have shape ({len(run.t)},), one value a sample; got {samples.shape}"
+                f"{where} must have shape ({len(run.t)},), one value per sample; got {samples.shape}"
             )
     return Plot(what.strip(), unit.strip(" ]"), np.asarray(run.t), values)
 

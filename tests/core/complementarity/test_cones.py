@@ -225,17 +225,17 @@ class TestRefusals:
     @pytest.mark.parametrize(
         ("change", "message"),
         [
-            ({"mu": -0.1}, "mu must be at least 0, one a row, got [-0.1]; correct the negative ones"),
-            ({"mu": [0.1, 0.2]}, "dims must be 1, 2 or 3 a contact and add up to the 3 rows"),
+            ({"mu": -0.1}, "mu must be a list of numbers of at least 0, got [-0.1]; correct the negative"),
+            ({"mu": [0.1, 0.2]}, "dims must be 1, 2 or 3 for each contact and add up to the 3 rows"),
             ({"W": np.eye(2)}, "W must have shape (3, 3); got shape (2, 2)"),
             ({"w0": [np.nan, 0.0, 0.0]}, "w0 must be finite; entry [0] is nan"),
             (
                 {"limits": [-1.0]},
-                "limits must be at least 0, one a row, got [-1.]; correct the negative ones",
+                "limits must be a list of numbers of at least 0, got [-1.]; correct the negative numbers",
             ),
             ({"dims": {}}, "dims must be a number or an array of numbers; got {}"),
-            ({"dims": 2.5}, "dims must be 1, 2 or 3 a contact and add up to the 3 rows"),
-            ({"dims": 2}, "dims must be 1, 2 or 3 a contact and add up to the 3 rows"),
+            ({"dims": 2.5}, "dims must be 1, 2 or 3 for each contact and add up to the 3 rows"),
+            ({"dims": 2}, "dims must be 1, 2 or 3 for each contact and add up to the 3 rows"),
         ],
     )
     def test_bad_input(self, change, message):

@@ -469,6 +469,6 @@ def test_a_deep_start_is_refused():
     with pytest.raises(pn.InputError) as error:
         pn.simulate(scene, 1.0, q=[-0.1])
     assert (
-        'contact "foot" starts 0.1 (m or rad) inside at t = 0 s; it must start open, closed, or at most'
+        'contact "foot" starts with a penetration of 0.1 (m or rad) at t = 0 s; it must start open, closed'
         in str(error.value)
     )

@@ -100,7 +100,7 @@ class TestDrawer:
         small, large = drawer.limits()
         words = (
             f'friction of "guide" has several solutions at t = 0 s: limits of {small:.4g} and {large:.4g} '
-            "(N m or N), det(I - d lam'/d lam) = -0.18; go on with the nearer one by "
+            "(N m or N), det(I - d lam'/d lam) = -0.18; continue with the nearer one by "
             'several="continue", reduce mu, or use reaction="ideal"'
         )
         with pytest.raises(pn.FrictionParadoxError, match=re.escape(words)) as caught:

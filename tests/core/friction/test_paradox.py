@@ -254,7 +254,7 @@ class TestRuns:
         assert -THRESHOLD < error.determinant <= 0.0
         assert error.time == pytest.approx(threshold, abs=THRESHOLD)
         assert kept.t[-1] == pytest.approx(threshold, abs=THRESHOLD)
-        assert str(error).endswith("; the trajectory up to there is in error.trajectory")
+        assert str(error).endswith("; the trajectory up to this time is in error.trajectory")
         for i in np.flatnonzero(kept.t < threshold - NEAR / growth):
             lam = scene.solve(kept.q[i], kept.v[i], t=kept.t[i]).lam[0]
             assert lam == pytest.approx(GRAVITY / (1.0 + start + growth * kept.t[i]), rel=SOLVED)

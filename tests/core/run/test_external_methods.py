@@ -164,10 +164,10 @@ def test_a_motion_that_ends(method):
     assert run.t[-1] == pytest.approx(0.5, abs=1e-3)
     assert np.isfinite(run.v).all()
     if isinstance(caught.value, StepSizeError):
-        assert str(caught.value).startswith(f"{method} cannot go on at t = 0.")
+        assert str(caught.value).startswith(f"{method} cannot continue at t = 0.")
         assert str(caught.value).endswith(
-            "the motion is singular there; look at the last samples, or loosen rtol and atol; the trajectory "
-            "up to there is in error.trajectory"
+            "the motion is singular there; check the last samples, or loosen rtol and atol; the trajectory "
+            "up to this time is in error.trajectory"
         )
 
 

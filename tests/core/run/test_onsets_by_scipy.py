@@ -62,8 +62,8 @@ def test_an_onset_in_several_directions_names_the_method_that_follows_it(name, m
     with pytest.raises(StepSizeError) as caught:
         pn.simulate(scene, 1.5, method=method)
     assert re.search(
-        rf'{method} cannot go on at t = 0\.6\d+ s: "JointFriction\({element}\)[^"]*" begins to slip in '
-        r"several directions with hardly any acceleration, where its direction relaxes faster than any "
+        rf'{method} cannot continue at t = 0\.6\d+ s: "JointFriction\({element}\)[^"]*" begins to slip in '
+        r"several directions with hardly any acceleration, and its direction relaxes faster than any "
         r'step; use method="dop853",',
         str(caught.value),
     )

@@ -141,7 +141,7 @@ def test_a_stepper_that_has_stopped_begins_anew() -> None:
         stepper.step()
     assert repr(stepper) == "<Stepper stopped>"
     for use in (stepper.step, lambda: stepper.q, lambda: stepper.v, lambda: stepper.t):
-        with refuses("Stepper: the run has stopped; begin anew with reset(q, v)", pn.InputError):
+        with refuses("Stepper: the run has stopped; start a new run with reset(q, v)", pn.InputError):
             use()
     stepper.reset(np.zeros(1), np.zeros(1))
     stepper.step({"slide": 2.0})  # a torque by name acts in place of the function
@@ -189,7 +189,7 @@ def test_arrays_keep_failures_apart() -> None:
     with pytest.raises(pn.StepSizeError) as stopped:
         pn.rollout(scene, np.tile(q, (3, 1)), speeds, 0.2, max_steps=25, as_arrays=True)
     assert stopped.value.index == 1
-    with pytest.raises(pn.InputError, match="states alone"):
+    with pytest.raises(pn.InputError, match="records only states"):
         pn.rollout(scene, np.tile(q, (3, 1)), speeds, 0.2, record="a", as_arrays=True)
 
 

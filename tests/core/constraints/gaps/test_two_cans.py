@@ -361,7 +361,7 @@ def test_thrown_bodies_do_not_enter(kinds, seeds):
         (
             lambda: pn.RevolvedContact("a", "b", (1, 0, 0), (1, 1, 1), 0.1),
             "solid1 must be a length and two radii, none negative and one radius positive; without a length "
-            "both must be one; got [1.0, 0.0, 0.0]",
+            "the radii must be equal; got [1.0, 0.0, 0.0]",
         ),
         (lambda: pn.RevolvedContact("a", "b", (1, 1, 1), (0, 1, 2), 0.1), "got [0.0, 1.0, 2.0]"),
         (lambda: pn.CylinderContact("a", "b", 0.1, 0.1, 0.0), "radius1 must be positive; got 0"),

@@ -208,7 +208,7 @@ def test_methods_of_scipy_name_the_friction_that_a_drive_would_move() -> None:
     model, _ = carriage()
     drive = pn.PrescribedMotion("carriage", pn.polynomial([0.0, 0.0, 0.0, 0.2]), name="drive")
     scene = pn.Scene(model, constraints=[drive], laws=[pn.JointFriction("carriage", coulomb=COULOMB)])
-    with pytest.raises(pn.InconsistentConstraintsError, match='"dop853", let it slip'):
+    with pytest.raises(pn.InconsistentConstraintsError, match='"dop853", in which the friction slips'):
         pn.simulate(scene, 1.0, method="Radau")
 
 

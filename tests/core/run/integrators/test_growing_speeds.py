@@ -31,8 +31,8 @@ def test_an_unstable_spring_is_named_with_its_growth(method):
     error = caught.value
     assert re.match(
         r'the speed of joint "slide" grows without bound by t = [\d.]+ s, by a factor of e every 0\.1 s, '
-        r'over many decades, and force "UserForce[^"]*" does most work on it: the motion is unstable; '
-        r"look at the signs, gains and delays there, or follow it all the same with max_steps; the "
+        r'over many decades, and force "UserForce[^"]*" does the most work on it: the motion is unstable; '
+        r"check the signs, gains and delays there, or allow the motion with max_steps; the "
         r"trajectory up to",
         str(error),
     )

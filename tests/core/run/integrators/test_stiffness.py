@@ -40,9 +40,9 @@ def test_stiff_damping_ends_with_its_name_and_rate(method, rtol, viscous):
     error = caught.value
     assert re.match(
         r'joint "slide" is stiff at t = [-+.0-9e]+ s: its motion relaxes at [+.0-9e]+ 1/s, and an explicit '
-        r"method takes steps that short, too many to reach the end; look at its damping, stiffness and "
-        r'inertia, use method="Radau", or allow the steps with max_steps; the trajectory up to there is in '
-        r"error\.trajectory$",
+        r"method needs equally short steps, too many to reach the end; check its damping, stiffness and "
+        r'inertia, use method="Radau", or allow the steps with max_steps; the trajectory up to this time is '
+        r"in error\.trajectory$",
         str(error),
     )
     assert error.joint == "slide"
