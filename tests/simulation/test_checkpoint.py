@@ -440,8 +440,7 @@ def test_a_disk_that_fills_up(tmp_path, monkeypatch):
 
 def test_methods_of_scipy_have_no_checkpoint(tmp_path):
     message = (
-        'simulate: checkpoint needs one of the core\'s methods; "Radau" runs in SciPy, which hides '
-        "its state away"
+        'simulate: checkpoint needs one of the core\'s methods; "Radau" runs in SciPy, which hides its state'
     )
     with refuses(message, InputError):
         pn.simulate(pn.load("four_bar"), 0.1, method="Radau", checkpoint=tmp_path / "run")

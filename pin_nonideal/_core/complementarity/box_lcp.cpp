@@ -9,8 +9,8 @@ namespace pn {
 
 namespace {
 
-// Compute the Cholesky factor of A, scaled to a unit diagonal, by rows, with the inverse pivots. Return false if A is
-// nearly singular.
+// Compute the Cholesky factor of A, scaled to a unit diagonal, in row-major order, with the inverse pivots. Return false if
+// A is nearly singular.
 PN_WIDE bool factor_scaled(int n, const double* A, const double* scale, double* L, double* inverse) {
     for (int i = 0; i < n; ++i) {
         double* Li = L + i * n;
@@ -43,7 +43,7 @@ bool BoxProgram::solve_regular(int n) {
     scale = A.diagonal().cwiseSqrt().cwiseInverse();
     if (!factor_scaled(n, A.data(), scale.data(), L.data(), inverse.data())) return false;
     x.setZero();
-    for (int pass = 0; pass < 2; ++pass) {  // the second pass restores digits lost to the condition
+    for (int pass = 0; pass < 2; ++pass) {  // the second pass restores digits that a large condition number loses
         change = rhs;
         if (pass > 0) change.noalias() -= A * x;
         change.array() *= scale.array();

@@ -8,14 +8,14 @@
 
 namespace pn {
 
-// Responses below this part of the largest count as zero. rank_tolerance_sticking is its square root.
+// Responses below this fraction of the largest count as zero. rank_tolerance_sticking is its square root.
 constexpr double response_rank_threshold = 1e-13;
 
 struct BoxLcpParameters {
-    double zero_acceleration = 1e-9;  // part of the acceleration scale that counts as zero
+    double zero_acceleration = 1e-9;  // fraction of the acceleration scale that counts as zero
     double limit_rounding = 1e-12;    // relative distance within which a force is at its limit
     double rounding = 1e-13;          // rounding, relative to a limit or to the acceleration scale
-    double noise_of_others = 1e-14;   // rounding of other elements, relative to the largest acceleration
+    double noise_of_others = 1e-14;   // rounding error of other elements, relative to the largest acceleration
     // Smallest root of a pivot of W, scaled to a unit diagonal, for which the Cholesky factor is as good as an
     // orthogonal one.
     double min_pivot = 1e-3;
@@ -50,8 +50,8 @@ private:
     std::vector<char> is_free_;
     std::vector<int> list_, wrong_;
     VecX initial_, f_, alpha_, r_, x_, left_;
-    VecX size_;           // scale of the accelerations, by element
-    double noise_ = 0.0;  // rounding that the largest accelerations leave in all elements
+    VecX size_;           // scale of the accelerations, per element
+    double noise_ = 0.0;  // rounding error that the largest accelerations cause in all elements
     Buffer A_, L_, inverse_, scale_, rhs_, part_, change_;
     DenseSolver solver_;
 };

@@ -7,7 +7,8 @@
 
 namespace pn {
 
-// Return the scale that makes the cone |f_t| <= mu f_n circular: forces (root f_n, f_t / root), velocities the other way.
+// Return the scale that makes the cone |f_t| <= mu f_n circular, root = sqrt(mu): forces become (root f_n, f_t / root), and
+// velocities (u_n / root, root u_t).
 inline double circular_scale(ConeKind kind, int tails, double mu) {
     return kind == ConeKind::contact && tails > 0 && mu > 0.0 ? std::sqrt(mu) : 1.0;
 }
@@ -41,9 +42,9 @@ struct PathPoint {
     // Add the change of u due to the step dz.
     void follow(const Cone& dz) { du = du - scaling.back(scaling.back(dz)); }
     void correct(const Cone& dz) { second = product(scaling.back(dz), scaling.forth(du)); }
-    // Return the part of the steps dz and du that reaches the boundary of a cone.
+    // Return the fraction of the steps dz and du that reaches the boundary of a cone.
     double room_for(const Cone& dz) const { return std::min(room(z, dz), room(u, du)); }
-    // Move to a force after a part of the step. Return true if both points are inside their cones.
+    // Move to a force after a fraction of the step. Return true if both points are inside their cones.
     bool move(const Cone& force, double part) {
         z = force;
         u = u + du * part;

@@ -5,8 +5,8 @@
 
 namespace pn {
 
-// Limits of friction forces. The force of an element lies within `size` of `middle`. `middle` is given by row. The middle is
-// zero except for elements of one direction with different limits forward and backward.
+// Limits of friction forces. The force of an element lies within `size` of `middle`. `middle` is given per row. The middle
+// is zero except for elements of one direction with different limits forward and backward.
 struct FrictionLimits {
     VecX size, middle;
 

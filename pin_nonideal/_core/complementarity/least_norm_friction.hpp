@@ -19,7 +19,7 @@ struct LeastNormParameters {
     double force_rounding = 4e-15;   // the same, relative to the largest force
     // Part of the diagonal that is added to the Hessian, which is singular if more limits hold than loads are free.
     double regularization = 1e-9;
-    double value_rounding = 1e-15;  // decrease of the dual function that counts as rounding, relative to it
+    double value_rounding = 1e-15;  // decrease of the dual function that counts as rounding error, relative to it
     int max_iterations = 60;  // maximum number of Newton steps
     int max_halvings = 60;    // maximum number of halvings of a step
 };
@@ -51,7 +51,7 @@ private:
     bool move();
 
     std::vector<Element> elements_;
-    VecX unit_, middle_;  // units and middles by row
+    VecX unit_, middle_;  // units and middles per row
     MatX range_;          // V
     VecX motion_;         // V^T g
     VecX weight_, offset_, g_, change_;

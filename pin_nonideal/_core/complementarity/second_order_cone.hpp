@@ -9,7 +9,7 @@
 
 namespace pn {
 
-// Part of the way to the cone's boundary that a step of an interior-point method may take.
+// Fraction of the way to the cone's boundary that a step of an interior-point method may take.
 constexpr double max_boundary_part = 0.99;
 
 // A vector of the cone's algebra. Elements of fewer directions leave the rest of the tail zero.

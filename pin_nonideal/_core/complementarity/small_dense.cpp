@@ -8,7 +8,7 @@ namespace pn {
 
 namespace {
 
-// Pivot of the elimination, as a part of the largest entry, below which a full rank is uncertain.
+// Pivot of the elimination, as a fraction of the largest entry, below which a full rank is uncertain.
 constexpr double min_elimination_pivot = 1e-9;
 
 // Compute the reflector that maps x = (x0, rest) to (beta, 0): I - tau (1, u)(1, u)^T, with u in place of rest. Returns tau.

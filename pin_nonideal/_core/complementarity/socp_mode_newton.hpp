@@ -16,7 +16,7 @@ struct SocpParameters {
     // Largest z . y of a solution, relative to the acceleration scale. Rounding may end the iteration earlier.
     double gap_tolerance = 1e-17;
     double mode_newton_tolerance = 4e-16;  // relative error of the forces: two units of roundoff
-    double condition_slack = 1e-12;        // violation of a mode's condition that is rounding, relative to a limit
+    double condition_slack = 1e-12;        // violation of a mode's condition that is rounding error, relative to a limit
 };
 
 inline constexpr SocpParameters socp_parameters{};
@@ -28,8 +28,8 @@ VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>&
                       const VecX* initial = nullptr);
 VecX friction_program(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const FrictionLimits& limits,
                       const VecX* initial = nullptr);
-// Return slip accelerations slightly beyond the load of slip onset. At onset the slip accelerations are rounding. If
-// elements share a load, their forces give the directions of a common slip only to the square root of rounding.
+// Return slip accelerations slightly beyond the load of slip onset. At onset the slip accelerations are rounding error. If
+// elements share a load, their forces give the directions of a common slip only to the square root of the rounding error.
 VecX onset_accelerations(const MatX& W, const VecX& alpha0, const std::vector<int>& dims, const FrictionLimits& limits);
 
 }  // namespace pn

@@ -29,7 +29,7 @@ struct Block {
     int dof = -1;                  // first dof, if each row is a dof itself
     int total = 0;                 // rows of the description
     std::vector<int> kept;         // rows that act
-    std::vector<char> holonomic;   // by kept row
+    std::vector<char> holonomic;   // per kept row
     bool comparable_rows = false;  // rows are components of one vector with one unit
     bool affine_rate = true;       // the rate is A(q, t) v + phi_t (a user's rate may depend on v otherwise)
     int user_row = 0;              // first row in the user's numbering
@@ -48,7 +48,7 @@ struct Block {
     void lay_out(const Mechanism& m, SharedSupports& shared);
 };
 
-// Entries of A or B, by block.
+// Entries of A or B, per block.
 using RowEntries = ZeroedVector<double>;
 
 // Values of the rows of all blocks. A block has storage from its first use on: most contacts of many shapes never come
@@ -75,8 +75,8 @@ void fill_A(const Block& block, const Mechanism& m, const Terms& terms, const Ro
 void scale_rows(const Mechanism& m, Terms& terms, const Block& block, const RowValues& values, const double* A,
                 double* B);
 
-// Compute y += B^T lam and r = B x, with lam and r by kept row of the scene. With the array A in place of B, the
-// functions multiply by A.
+// Compute y += B^T lam and r = B x, with lam and r per kept row of the scene. With the array A in place of B, the functions
+// multiply by A.
 void add_transpose(const Block& block, const RowEntries& B, const VecX& lam, VecX& y);
 void multiply(const Block& block, const RowEntries& B, const VecX& x, VecX& r);
 

@@ -46,7 +46,7 @@ public:
 private:
     const RowLayout& layout_;
     std::vector<std::vector<int>> in_group_;
-    std::vector<int> degree_, met_;  // by support; by block: last support that met it
+    std::vector<int> degree_, met_;  // per support; per block: last support that met it
 };
 
 // Return an order of the blocks in which neighbors stand close: breadth first from a block of least degree, reversed

@@ -50,7 +50,7 @@ private:
     std::vector<int> order_;
     std::vector<std::vector<int>> of_support_;  // blocks with the same support that have a place
     std::vector<std::vector<int>> of_group_;    // supports of these blocks, by group of dofs
-    std::vector<int> visitor_;                  // by support: last block paired with it
+    std::vector<int> visitor_;                  // per support: last block paired with it
     std::vector<CommonDofs> commons_;           // common dofs of supports that were in use together
     std::map<std::pair<int, int>, int> common_of_;
 };

@@ -7,8 +7,8 @@
 namespace pn {
 
 struct PullFeasibilityParameters {
-    double binding = 1e-6;           // part of the largest weight below which a row does not bind
-    double margin_rounding = 1e-12;  // rounding of a margin, relative to the loads
+    double binding = 1e-6;           // fraction of the largest weight below which a row does not bind
+    double margin_rounding = 1e-12;  // rounding error of a margin, relative to the loads
 };
 
 inline constexpr PullFeasibilityParameters pull_feasibility_parameters{};

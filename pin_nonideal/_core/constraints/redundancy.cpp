@@ -67,7 +67,7 @@ void DescribedRows::yield(const Block& friction) {
 }
 
 // Return the inverse weights of the rows in use and of the dependent rows. All friction that yields has one factor:
-// `friction_weight` over the largest load of constraints per load of such friction.
+// `friction_weight` divided by the largest load of constraints per unit load of such friction.
 static std::pair<VecX, VecX> inverse_weights(const DescribedRows& all, const std::vector<int>& rows,
                                              const LoadSharing& sharing) {
     VecX used(rows.size()), dependent(sharing.dependent.size());

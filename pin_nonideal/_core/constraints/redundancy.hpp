@@ -10,10 +10,10 @@ struct RedundancyParameters {
     // A dependent row is a weighted sum of independent rows. Normal equations give its weights, and their products of
     // rows square the condition number. A second pass therefore repeats the solution for the remainder of the row.
     // [Bjorck: Stability analysis of the method of seminormal equations, 1987.]
-    double rounding = 1e-14;  // remainder that counts as rounding, relative to the row
+    double rounding = 1e-14;  // remainder that counts as rounding error, relative to the row
     int max_passes = 2;       // maximum passes
     // Weight of multipliers of a joint's friction relative to the constraints that carry the same load, at any scale of
-    // their rows. Friction takes this part of the load, and its limit is checked to a few digits.
+    // their rows. Friction carries this fraction of the load, and its limit is checked to a few digits.
     double friction_weight = 1e-12;
 };
 
@@ -25,11 +25,11 @@ struct DescribedRows {
     struct Row {
         int kept = -1;        // kept row that represents it (-1: nothing moves along it, and its multiplier is zero)
         double factor = 1.0;  // the row is this multiple of the kept row
-        double part = 1.0;    // its minimum-norm multiplier over the multiplier of the kept row
+        double part = 1.0;    // ratio of its minimum-norm multiplier to the multiplier of the kept row
     };
     std::vector<Row> rows;     // constraints and contacts in their order, then directions of friction
-    VecX weight;               // by kept row: sum of the squared factors of the rows that it represents
-    std::vector<char> yields;  // by kept row: belongs to friction that carries only loads that constraints cannot carry
+    VecX weight;               // per kept row: sum of the squared factors of the rows that it represents
+    std::vector<char> yields;  // per kept row: belongs to friction that carries only loads that constraints cannot carry
     bool copied = false;       // some kept row represents several rows
 
     // Compute parts and weights once all rows are known.
@@ -48,13 +48,13 @@ std::vector<int> dependent_rows(const RowSystem& s);
 MatX dependence(const std::vector<Block>& blocks, const RowEntries& B, RowSystem& s,
                 const std::vector<int>& dependent);
 
-// Compute minimum-norm multipliers by kept row from the multipliers of the rows in use. The multiplier of a kept row is
-// the total of the rows that it represents.
+// Compute minimum-norm multipliers per kept row from the multipliers of the rows in use. The multiplier of a kept row is the
+// total of the rows that it represents.
 void share_multipliers(const std::vector<Block>& blocks, const RowEntries& B,
                        const DescribedRows& all, RowSystem& s, const VecX& lam, VecX& shared);
 
-// Basis of the multipliers by kept row that together exert no force. The basis is orthonormal in the norm of the described
-// rows. The basis has entries for the rows in use only, which may be a small part of all rows.
+// Basis of the multipliers that together exert no force, with one entry per kept row. The basis is orthonormal in the norm
+// of the described rows. The basis has entries for the rows in use only, which may be a small part of all rows.
 class FreeMultipliers {
 public:
     FreeMultipliers(const Envelope& envelope, const MatX& basis) : envelope_(envelope), basis_(basis) {}

@@ -10,7 +10,7 @@ namespace pn {
 // Compute the greatest length that each of these rows of a block could have in the metric of M^-1. For a row between two
 // bodies, it covers all directions of the force and couple at the row's point. The row itself may be shorter at this pose,
 // if the joints leave it no freedom. For a row of coordinates, it is the row's own length, with a small part of the longest
-// row of the block as lower bound. Rows of a function that are rounding relative to its longest row count as zero.
+// row of the block as lower bound. Rows of a function that are rounding error relative to its longest row count as zero.
 void greatest_lengths(const Mechanism& m, Terms& terms, const Block& block, const std::vector<int>& rows,
                       const RowValues& values, double* length);
 

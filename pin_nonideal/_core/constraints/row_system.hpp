@@ -19,7 +19,8 @@ struct RowChoice {
     std::vector<char> active;
     bool redundant = false;  // some required row is not active
     // Updated at the starts of steps while `redundant`. longest: greatest squared length of each row in these modes.
-    // longest_chosen: the same since the last choice. chosen_pivot: greatest of the smallest pivots since the last choice.
+    // longest_chosen: greatest squared length since the last choice. chosen_pivot: greatest of the smallest pivots since the
+    // last choice.
     VecX longest, longest_chosen;
     double chosen_pivot = 0.0;
     VecX chosen_scale;  // 1 / length of each row of B by which the last choice scaled it

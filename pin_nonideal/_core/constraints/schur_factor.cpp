@@ -61,8 +61,8 @@ void scale_to_unit_length(const std::vector<char>& use, RowSystem& s) {
     }
 }
 
-// Return the least square of a row's length over that of the longest row of its block, among blocks with comparable
-// rows. Set `vanishes` if a row of any block is so much shorter than another row that it is rounding.
+// Return the least ratio of a row's squared length to that of the longest row of its block, among blocks with comparable
+// rows. Set `vanishes` if a row of any block is so much shorter than another row that it is rounding error.
 static PN_INLINE double shortest_row(const std::vector<Block>& blocks, const RowSystem& s, bool& vanishes) {
     double shortest = 1.0;
     for (int index : s.blocks) {
@@ -81,8 +81,8 @@ static PN_INLINE double shortest_row(const std::vector<Block>& blocks, const Row
     return shortest;
 }
 
-// Return the least square of an active row's length over its greatest length in these modes. Used if other rows depend
-// on the active ones.
+// Return the least ratio of an active row's squared length to its greatest squared length in these modes. Used if other rows
+// depend on the active ones.
 static double shortest_passing(const RowSystem& s) {
     const Envelope& envelope = s.envelope;
     double shortest = 1.0;

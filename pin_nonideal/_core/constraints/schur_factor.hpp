@@ -7,7 +7,7 @@ namespace pn {
 
 // Compute B B^T and its factor for the active rows. Falls back to the orthogonal factorization.
 void factor_rows(const std::vector<Block>& blocks, const RowEntries& B, RowSystem& s);
-// Solve (B B^T) lam = r on the active rows (zero on the others). r and lam are by kept row.
+// Solve (B B^T) lam = r on the active rows (zero on the others). r and lam have one entry per kept row.
 void solve_rows(RowSystem& s, const VecX& r, VecX& lam);
 // Compute the entries of the active rows only. The other entries of lam must be zero.
 void solve_active_rows(RowSystem& s, const VecX& r, VecX& lam);

@@ -31,7 +31,7 @@ bool slip_opposes_friction(const Program& p, Workspace& w, const VecX& v) {
 
 namespace {
 
-using Choice = std::vector<char>;  // closed flag by gap
+using Choice = std::vector<char>;  // closed flag per gap
 
 bool slides_anywhere(const Program& p, const Workspace& w, const VecX& v) {
     for (int e = 0; e < static_cast<int>(p.frictions.size()); ++e)

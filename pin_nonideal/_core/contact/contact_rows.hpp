@@ -6,9 +6,10 @@
 
 namespace pn {
 
-// Evaluate touching contacts as rows without constraint forces and friction. `touching` is by gap.
+// Evaluate touching contacts as rows without constraint forces and friction. `touching` is per gap.
 void free_contacts(const Program& p, Workspace& w, const std::vector<char>& touching);
-// Do the same and compute the motion at (t, q, v). The second form keeps the friction of elements that slip in `modes`.
+// Evaluate these rows and compute the motion at (t, q, v). The second form keeps the friction of elements that slip in
+// `modes`.
 void release_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
                       const std::vector<char>& touching);
 void release_contacts(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,

@@ -76,7 +76,7 @@ VecX poisson(const ContactRows& rows, double t, const VecX& velocity) {
     return P;
 }
 
-// Zero the rounding of velocities that no impulse can change, because constraints or other contacts hold them. Such
+// Zero the rounding error of velocities that no impulse can change, because constraints or other contacts hold them. Such
 // rounding would let sticking contacts slip.
 void clean(const ContactRows& rows, double speed, VecX& w0) {
     const Spectrum modes = symmetric_spectrum(rows.W);
@@ -110,7 +110,7 @@ Impact resolve_impact(const Program& p, Workspace& w, double t, const VecX& q, V
     v += dv;
     out.v_plus = v;
     out.energy_change = kinetic_energy(p.mechanism, w.now.terms, v) - before;
-    // Use the actual velocities: if large impulses have small effects, rounding of W P would violate the energy
+    // Use the actual velocities: if large impulses have small effects, rounding error of W P would violate the energy
     // balance.
     const VecX mean = rows.velocity + 0.5 * rows.change(dv);
     for (size_t i = 0; i < out.gaps.size(); ++i) {

@@ -11,7 +11,7 @@
 namespace pn {
 
 struct ImpactParameters {
-    // Rounding of responses relative to the largest response to an impulse, and of velocities relative to the speed.
+    // Rounding error of responses relative to the largest response to an impulse, and of velocities relative to the speed.
     double min_response = 1e-12, velocity_rounding = 1e-14;
 };
 
@@ -28,8 +28,8 @@ struct Impact {
 // Gap rates below this value are rest [m/s or rad/s].
 double rest_rate(const VecX& v);
 
-// Compute the impact of contacts `touching` (by gap) at (t, q, v). v becomes the velocity after it. Joint friction has
-// a finite limit and gives no impulse. The contacts are closed afterwards, without modes of friction. Without `bounces`
+// Compute the impact of contacts `touching` (per gap) at (t, q, v). v becomes the velocity after it. Joint friction has a
+// finite limit and gives no impulse. The contacts are closed afterwards, without modes of friction. Without `bounces`
 // restitution is ignored, for rebounds that cannot be distinguished from rest.
 Impact resolve_impact(const Program& p, Workspace& w, double t, const VecX& q, VecX& v, const std::vector<char>& touching,
               bool bounces = true);

@@ -9,7 +9,7 @@
 namespace pn {
 
 struct ContactQueryParameters {
-    // Rounding of a sum, relative to the sum of the magnitudes of its terms.
+    // Rounding error of a sum, relative to the sum of the magnitudes of its terms.
     double sum_rounding = 1e-12;
     // Tolerance of coincident lines and points: relative distance from the origin, or sine of an angle.
     double coincidence_tolerance = 1e-12;
@@ -28,7 +28,7 @@ inline double gap_rate(const Program& p, const Workspace& w, int gap) {
     return w.now.values[p.gaps[gap].block].rate[0];
 }
 double gap_acceleration(const Program& p, const Workspace& w, int gap);
-// Rounding of the gap acceleration.
+// Rounding error of the gap acceleration.
 double acceleration_rounding(const Program& p, const Workspace& w, int gap);
 
 // Check if two gaps are between the same two bodies.
@@ -47,7 +47,7 @@ bool opens_later(const Program& p, const Workspace& w, int gap, int other);
 
 // Normal force of a closed contact in the current motion. Redundant contacts have their minimum-norm compressive loads.
 double load(const Program& p, Workspace& w, int gap);
-// Rounding of the normal force.
+// Rounding error of the normal force.
 double load_rounding(const Program& p, const Workspace& w, int gap);
 // Return the contact with the largest tension in the current motion, or -1 if all contacts can be in compression.
 // Redundant contacts have minimum-norm loads here.

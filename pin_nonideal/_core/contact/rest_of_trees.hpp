@@ -9,9 +9,9 @@
 namespace pn {
 
 struct RestOfTreesParameters {
-    // Error of the forces that counts as rounding.
+    // Error of the forces that counts as rounding error.
     double tolerance = 1e-10;
-    // Largest force, relative to the load of all trees. Rounding of larger, squeezing forces is as large as the load.
+    // Largest force, relative to the load of all trees. Rounding error of larger, squeezing forces is as large as the load.
     double max_force_ratio = 1e4;
 };
 

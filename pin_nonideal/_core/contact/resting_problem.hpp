@@ -12,9 +12,9 @@
 namespace pn {
 
 struct OnsetMotion {
-    std::vector<char> closed;     // by gap
-    std::vector<Mode> modes;      // by element
-    std::vector<Vec3> direction;  // slip direction at onset, by element
+    std::vector<char> closed;     // per gap
+    std::vector<Mode> modes;      // per element
+    std::vector<Vec3> direction;  // slip direction at onset, per element
     std::vector<Vec3> friction;   // friction of each element, along its directions
     bool several = false;         // another motion is admissible as well
     int several_element = -1;     // element whose friction differs there, or -1 if this is not known
@@ -39,14 +39,14 @@ bool is_at_rest(const Program& p, const Workspace& w, const VecX& v, const Onset
                 const RunState& before, int element);
 
 struct RestingProblemParameters {
-    double rounding = 1e-12;              // rounding relative to the scale of accelerations
-    double common_slip_rounding = 1e-14;  // rounding of a slip without own terms, relative to all accelerations
+    double rounding = 1e-12;              // rounding error relative to the scale of accelerations
+    double common_slip_rounding = 1e-14;  // rounding error of a slip without own terms, relative to all accelerations
     double min_other_motion = 1e-6;       // motion that differs from rest, relative to the scale of accelerations
-    double limit_rounding = 1e-9;         // rounding relative to the limit of a force
+    double limit_rounding = 1e-9;         // rounding error relative to the limit of a force
     double at_limit_reduction = 1e-6;     // relative reduction of the limit of elements that just reached it
     int max_releases = 4;                 // rounds that set kinetic limits of slipping contacts
     int max_load_iterations = 100;        // maximum iterations of loads and their friction
-    double load_tolerance = 1e-13;        // rounding of the loads' change, relative to the largest acceleration
+    double load_tolerance = 1e-13;        // rounding error of the loads' change, relative to the largest acceleration
 };
 
 class RestingProblem {
@@ -83,7 +83,7 @@ private:
     // beside much lighter bodies.
     double acceleration_scale() const;
     double acceleration_scale(int row, int count) const;
-    // Accelerations of these rows, and of the slip of a cone, that are rounding.
+    // Accelerations of these rows, and of the slip of a cone, that are rounding error.
     double rounding(int row, int count) const;
     double slip_rounding(size_t i) const { return rounding(first[i] + head(i), tail(i)); }
     bool at_its_limit(size_t i) const;

@@ -119,7 +119,7 @@ void assemble_forces(const Program& p, Workspace& w, double t, const VecX& v) {
     if (!p.blocks.empty()) move_rows(p, w, t, v);
 }
 
-// Check if closed contacts balance the load. The acceleration a is then rounding: M a is below the rounding of the
+// Check if closed contacts balance the load. The acceleration a is then rounding: M a is below the rounding error of the
 // summed forces.
 static bool is_balanced(const Program& p, Workspace& w) {
     if (w.now.closed_gaps.empty() || p.moves_in_time) return false;

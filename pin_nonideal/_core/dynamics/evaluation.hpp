@@ -11,9 +11,9 @@ struct EvaluationParameters {
     double refined_pivot_ratio = 1e6;
     // A configuration with a larger inertia [kg m^2] has diverged.
     double runaway_inertia = 1e30;
-    // Rounding of balanced forces, relative to the acceleration of gravity.
+    // Rounding error of balanced forces, relative to the acceleration of gravity.
     double balance_rounding = 1e-14;
-    // Rounding of a sum, relative to the sum of the magnitudes of its terms.
+    // Rounding error of a sum, relative to the sum of the magnitudes of its terms.
     double residual_sum_rounding = 1e-13;
     // Evaluations between two checks of signals and wall time. One evaluation of a large scene takes milliseconds.
     long evaluations_per_watch = 16;

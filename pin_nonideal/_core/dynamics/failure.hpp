@@ -45,7 +45,7 @@ std::optional<Failure> attempt(const Act& act) {
     return std::nullopt;
 }
 
-// Do the same for failures of these kinds. Other failures pass through.
+// Call act() and return its failure if it is of one of these kinds. Other failures pass through.
 template <class Act>
 std::optional<Failure> attempt(std::initializer_list<Failure::Kind> kinds, const Act& act) {
     try {

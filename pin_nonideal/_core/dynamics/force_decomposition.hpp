@@ -21,7 +21,7 @@ private:
 };
 
 struct Split {
-    VecX F_ideal, F_nonideal, C, lam, lam_ideal;  // multipliers by row of the descriptions
+    VecX F_ideal, F_nonideal, C, lam, lam_ideal;  // multipliers per row of the descriptions
 };
 // Compute the ideal and nonideal part of the constraint force at the state last evaluated.
 void split_forces(const Program& p, Workspace& w, Split& out);

@@ -13,7 +13,7 @@ namespace pn {
 struct ImplicitDrives {
     bool active = false;
     double h = 0.0;
-    VecX stiffness, damping;  // K and D by dof
+    VecX stiffness, damping;  // K and D per dof
     VecX theta, inertia;      // inertia: theta h D + theta^2 h^2 K
     VecX force;               // D (v - v0) - (2 theta - 1) h K v0
 

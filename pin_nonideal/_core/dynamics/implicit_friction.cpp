@@ -112,7 +112,7 @@ struct Implicit : Unknowns {
         newton.factorize(arrays, y);
         w.scratch.factored_unknowns = n;
         double last = std::numeric_limits<double>::infinity();
-        for (int it = 0; it < Unknowns::parameters.max_newton; ++it) {  // removes the rounding of the arrays
+        for (int it = 0; it < Unknowns::parameters.max_newton; ++it) {  // removes the rounding error of the arrays
             image(y, newton.image);
             newton.residual = newton.image - y;
             const double error = newton.residual.cwiseAbs().maxCoeff();

@@ -11,9 +11,9 @@
 namespace pn {
 
 struct ImplicitFrictionParameters {
-    double tolerance = 4e-15;           // relative change of y that counts as rounding
-    double newton_tolerance = 3.2e-14;  // the same after a linear solve
-    double stall_tolerance = 1e-12;     // Newton error below this that no longer falls is rounding
+    double tolerance = 4e-15;           // relative change of y that counts as rounding error
+    double newton_tolerance = 3.2e-14;  // relative change of y after a linear solve that counts as rounding error
+    double stall_tolerance = 1e-12;     // Newton error below this that no longer falls is rounding error
     double slow_change = 1e-13;         // slowly contracting changes above this are iterated further
     double max_contraction = 0.25;      // slower fixed-point iterations switch to Newton's method
     int fixed_point_limit = 30;         // maximum fixed-point iterations: 27 contract by 0.25 to rounding
@@ -39,7 +39,7 @@ inline bool laws_act(const Program& p, const Workspace& w) {
 void find_known_forces(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 // Compute C, a and lam for the forces F. `known` is C of the laws that read no reactions.
 void solve_with_laws(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v, const VecX& known);
-// Compute the same with friction limits from the last time step: its impulses divided by its length. The workspace must
+// Compute C, a and lam with friction limits from the last time step: its impulses divided by its length. The workspace must
 // be in the state that a failure of solve_with_laws left.
 void solve_with_step_friction(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v);
 

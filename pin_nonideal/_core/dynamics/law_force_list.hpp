@@ -33,7 +33,7 @@ public:
     }
 
 private:
-    std::vector<int> place_, acting_;  // by law: index of its force, -1 without one
+    std::vector<int> place_, acting_;  // per law: index of its force, -1 without one
     std::vector<VecX> force_;
     VecX zero_;
 };

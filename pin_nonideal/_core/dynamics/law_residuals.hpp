@@ -23,7 +23,7 @@ struct LawResidualParameters {
     // defined.
     double onset_acceleration = 1e-6;
     // Largest residual of friction while rows are so close to a singular position that their orthogonal factorization is
-    // in use. Such rows amplify the rounding of loads.
+    // in use. Such rows amplify the rounding error of loads.
     double singular_tolerance = 1e-8;
 };
 
@@ -42,10 +42,10 @@ struct LargestResidual {
 enum class MotionLaw { motion, signorini, coulomb, dissipation };
 
 struct LawResiduals {
-    LargestResidual motion;       // M a + nle = tau + C + A^T lam, by dof
-    LargestResidual signorini;    // min(N, gap acceleration) = 0 of touching contacts with gap rate zero, by block
-    LargestResidual coulomb;      // |f| <= limit, by friction element
-    LargestResidual dissipation;  // f opposite to the slip velocity, or to the slip acceleration at rest, by element
+    LargestResidual motion;       // M a + nle = tau + C + A^T lam, per dof
+    LargestResidual signorini;    // min(N, gap acceleration) = 0 of touching contacts with gap rate zero, per block
+    LargestResidual coulomb;      // |f| <= limit, per friction element
+    LargestResidual dissipation;  // f opposite to the slip velocity, or to the slip acceleration at rest, per element
     double friction_tolerance = law_residual_parameters.tolerance;  // tolerance of the last two residuals
 
     // Return the law with the largest residual, relative to its tolerance.

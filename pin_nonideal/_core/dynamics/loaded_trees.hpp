@@ -11,8 +11,8 @@
 namespace pn {
 
 struct LoadedTreesParameters {
-    double tolerance = 4e-15;         // error of the limits relative to the largest that counts as rounding
-    double stall_tolerance = 1e-12;   // error below this that no longer falls is rounding
+    double tolerance = 4e-15;         // error of the limits relative to the largest that counts as rounding error
+    double stall_tolerance = 1e-12;   // error below this that no longer falls is rounding error
     double max_contraction = 0.03;    // ratio of errors above which new gradients cost less than further steps
     double min_determinant = 1e-3;    // smaller determinants are near the end of a solution, and decided elsewhere
     double min_pivot = 1e-3;          // smaller pivots, relative to those of M, lose digits

@@ -8,16 +8,16 @@
 namespace pn {
 
 struct MotionForces {
-    VecX given;      // F, and forces of the laws without modes, by dof
+    VecX given;      // F, and forces of the laws without modes, per dof
     VecX magnitude;  // sum of the magnitudes of their terms
-    VecX lam;        // multipliers by kept row, zero for rows that are not in use
-    std::vector<Vec3> friction;  // by element, along its directions
+    VecX lam;        // multipliers per kept row, zero for rows that are not in use
+    std::vector<Vec3> friction;  // per element, along its directions
     // The same forces with the shares among redundant rows that solutions report.
     VecX shared_lam;
     std::vector<Vec3> shared_friction;
-    // By element: false if an element sticks whose share of the load no motion determines.
+    // Per element: false if an element sticks whose share of the load no motion determines.
     std::vector<char> is_determined;
-    std::vector<SlipLimits> limits;  // by element: limits at rest under its load, before the static ratio
+    std::vector<SlipLimits> limits;  // per element: limits at rest under its load, before the static ratio
 };
 
 }  // namespace pn

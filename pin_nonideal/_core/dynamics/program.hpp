@@ -63,7 +63,7 @@ struct Program {
     std::vector<GivenForce> forces;
     Actuation actuation;
     TorqueTable added_torque;     // torques in addition to a sampled control; no times if there are none
-    VecX min_effort, max_effort;  // limits of the actuators, by dof (empty if unlimited)
+    VecX min_effort, max_effort;  // limits of the actuators, per dof (empty if unlimited)
 
     // Flags that skip computations that the scene does not need.
     bool has_laws() const { return !frictions.empty() || !laws.empty(); }
@@ -72,18 +72,18 @@ struct Program {
     const TorqueTable* torque_table() const {
         return added_torque.times.empty() ? std::get_if<TorqueTable>(&actuation) : &added_torque;
     }
-    bool needs_reactions = false;        // some law reads them
+    bool needs_reactions = false;        // some law reads reactions
     bool loads_are_of_trees = false;     // all friction that reads its own reaction acts in the tree joint that it loads
     bool has_contact_friction_only = false;      // the only law is friction of unilateral contacts
-    bool driven = false;           // forces or actuation
+    bool driven = false;           // the scene has forces or actuation
     bool has_body_forces = false;  // given forces that act on bodies
     bool moves_in_time = false;    // some constraint depends on time
-    // By dof: constraints tie it to a constraint that depends on time, which may carry loads of friction on this dof.
+    // Per dof: constraints tie it to a constraint that depends on time, which may carry loads of friction on this dof.
     std::vector<char> tied_to_drives;
-    std::vector<char> elements_of_drives;  // by friction element: its slip is along such a dof
+    std::vector<char> elements_of_drives;  // per friction element: its slip is along such a dof
     // Check if a drive may decide the slip of an element.
     bool follows_drives(int element) const { return elements_of_drives[element]; }
-    bool driven_exactly = false;   // some constraint does, and all rates are exact derivatives, not differences
+    bool driven_exactly = false;   // some constraint depends on time, and all rates are exact derivatives, not differences
     std::vector<double> breaks;    // known break times of the functions of time, ascending
     bool searches_breaks = false;  // some user function of time does not declare its breaks
     bool calls_functions = false;  // the forces depend on user functions
@@ -92,7 +92,7 @@ struct Program {
     bool has_user_rows = false;    // some rows come from user functions, A and b together
     bool affine_rates = true;      // the rate of every row is A(q, t) v + phi_t
     std::vector<int> constrained_joints;     // joints whose bodies the constraints tie, and their ancestors in the tree
-    std::vector<Angle> constrained_angles;   // of these joints
+    std::vector<Angle> constrained_angles;   // angles of the constrained joints
     std::vector<int> constrained_dofs;       // in the supports of the rows, ascending
 
     // Maximum size of the implicit reaction equation: a limit for each element, a force for each user law.
@@ -105,7 +105,7 @@ struct Program {
     // Number of rows of constraints and bilateral contacts, which precede the rows of gaps.
     int bilateral_rows() const { return gaps.empty() ? constraint_rows() : blocks[first_gap].row; }
 
-    // Multiplier of one row of a block's description for multipliers by kept row, see `share_multipliers`.
+    // Multiplier of one row of a block's description for multipliers per kept row, see `share_multipliers`.
     double share(const Block& block, int row, const VecX& lam) const { return described.share(block.user_row + row, lam); }
     // Multipliers of all rows of constraints and contacts in the user's numbering.
     VecX user_multipliers(const VecX& lam) const;

@@ -125,7 +125,7 @@ void move_position(const Program& p, Workspace& w, VecX& q, const Dofs&... dofs)
     retract(p.mechanism, w.scratch.position_start.data(), w.scratch.scaled.data(), q.data());
 }
 
-// Rounding level of residuals. The level is zero near a singular position, which magnifies rounding.
+// Rounding level of residuals. The level is zero near a singular position, which magnifies rounding errors.
 double rounding_part(const Workspace& w) { return w.now.rows.distance < near_singular_pivot ? 0.0 : projection_floor; }
 
 }  // namespace

@@ -12,8 +12,8 @@ const Reactions& reactions(const Program& p, Workspace& w);
 // Check if unilateral contacts may share a load. Then the motion determines the set of contacts with zero load.
 inline bool shares_contact_loads(const Program& p, const Workspace& w) { return !p.gaps.empty() && w.now.rows.redundant; }
 
-// List all possible zero-load sets of contacts that share loads: by gap, true if its load is zero. Empty if there are
-// too many sets.
+// List all possible zero-load sets of contacts that share loads: per gap, true if its load is zero. Empty if there are too
+// many sets.
 std::vector<std::vector<char>> zero_load_sets(const Program& p, const Workspace& w);
 
 // Freezes the zero-load set of the current motion during its lifetime. Loads are linear in the motion for a fixed set.

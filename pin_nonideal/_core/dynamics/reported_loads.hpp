@@ -17,10 +17,10 @@ struct ReportedLoadsParameters {
 
 inline constexpr ReportedLoadsParameters reported_loads_parameters{};
 
-// While it exists, the multipliers of redundant contacts that all stick are the shortest ones within Coulomb's cones that
-// exert the same force. The minimum-norm multipliers alone may leave a cone, although other multipliers hold the
-// contacts at rest. The multipliers do not change if a contact slides, because its friction follows the minimum-norm
-// load, or if none within the cones are found.
+// While an object of this class exists, the multipliers of redundant contacts that all stick are the shortest ones within
+// Coulomb's cones that exert the same force. The minimum-norm multipliers alone may leave a cone, although other multipliers
+// hold the contacts at rest. The multipliers do not change if a contact slides, because its friction follows the
+// minimum-norm load, or if none within the cones are found.
 class ReportedLoads {
 public:
     ReportedLoads(const Program& p, Workspace& w);

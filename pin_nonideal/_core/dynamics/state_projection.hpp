@@ -31,7 +31,7 @@ void project_and_evaluate(const Program& p, Workspace& w, double t, VecX& q, Vec
 // other rows. Project onto the longest rows at this position. The number of rows is kept, because off the constraints
 // dependent rows appear independent.
 bool project_onto_dependent(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
-// Close the gaps of rows that count as dependent while elements stick. Sticking elements hold these rows with parts of
+// Close the gaps of rows that count as dependent while elements stick. Sticking elements hold these rows with fractions of
 // their forces below rank_tolerance_sticking, and creep by the same ratio.
 bool project_past_sticking(const Program& p, Workspace& w, double t, VecX& q, const VecX& v);
 
@@ -43,8 +43,8 @@ bool choose_rows_near(const Program& p, Workspace& w, double t, VecX& q, const V
 // Project a state without factors from an earlier step. Uses the factors and independent rows at the state itself, with
 // all elements slipping.
 void project_anew(const Program& p, Workspace& w, double t, VecX& q, VecX& v);
-// Do the same unless the largest residual exceeds `max_residual`. Return the residual before and after, and the largest
-// rate.
+// Project such a state unless its largest residual exceeds `max_residual`. Return the residual before and after, and the
+// largest rate.
 struct Closure { double before, after, rate; };
 Closure close(const Program& p, Workspace& w, double t, VecX& q, VecX& v, double max_residual);
 

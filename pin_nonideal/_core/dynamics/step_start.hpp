@@ -36,7 +36,7 @@ bool configure_step(const Program& p, Workspace& w, int max_rank = INT_MAX);
 int max_rank_near(const Workspace& w);
 // Choose the rows in a configured workspace, project v onto A v + phi_t = 0, and evaluate. Return true if v changed.
 bool begin_step_on_rates(const Program& p, Workspace& w, double t, VecX& v);
-// Do the same without the choice and without the evaluation.
+// Project v onto A v + phi_t = 0 without a choice of rows and without an evaluation.
 bool meet_rates(const Program& p, Workspace& w, double t, VecX& v);
 // Keep bodies moving after a change of modes. If newly chosen rows would stop the motion, rows of closed contacts and
 // sticking elements that nearly depend on others count as dependent from now on. The workspace is evaluated at (q, v)

@@ -45,10 +45,10 @@ private:
     bool is_well_conditioned(const Program& p, const Workspace& w, int root) const;
     int node_of(const Program& p, const Workspace& w, int root, BlockProblem& problem);
 
-    std::vector<int> root_, local_, size_;  // by dof: first dof of its tree, index in it; by first dof: dofs of the tree
+    std::vector<int> root_, local_, size_;  // per dof: first dof of its tree, index in it; per first dof: dofs of the tree
     bool applies_ = true;
     std::vector<Held> held_;
-    std::vector<char> is_held_;             // by dof
+    std::vector<char> is_held_;             // per dof
     struct HeldEntry {
         int row, dof;
         double value;

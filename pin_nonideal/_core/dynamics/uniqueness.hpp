@@ -6,7 +6,7 @@
 namespace pn {
 
 struct UniquenessParameters {
-    double difference_step = 1e-7;  // relative to the unknowns: square root of the rounding, with a margin
+    double difference_step = 1e-7;  // relative to the unknowns: square root of the rounding error, with a margin
     int max_mixed_laws = 6;         // more laws mirror one branch at a time instead of all combinations
     double same_solution = 1e-9;    // relative residual at which a point is a solution
     double other_solution = 1e-6;   // relative distance beyond which two solutions differ

@@ -8,9 +8,9 @@
 namespace pn {
 
 struct UnknownsParameters {
-    // Rounding of a solution at the boundary of two zero-load sets, relative to the unknowns.
+    // Rounding error of a solution at the boundary of two zero-load sets, relative to the unknowns.
     double zero_load_set_rounding = 1e-11;
-    // Rounding of shared loads, relative to the largest multiplier.
+    // Rounding error of shared loads, relative to the largest multiplier.
     double shared_rounding = 1e-13;
     // Maximum number of steps of Newton's method for y = g(y).
     int max_newton = 30;
@@ -46,7 +46,7 @@ struct Unknowns {
     // Assemble g as arrays from one motion for each unknown. Steps are as large as the unknowns, since g is nonlinear
     // only by vector lengths. If contacts share a load, the frozen zero-load set applies.
     void equation(const VecX& y, ReactionEquation& found);
-    // Rounding of the image due to shared loads. A nearly unloaded contact has its load from the same sums as loaded
+    // Rounding error of the image due to shared loads. A nearly unloaded contact has its load from the same sums as loaded
     // contacts.
     double rounding() const;
     // Check if a solution of the arrays solves y = g(y). Then no unilateral contact has tension, and shared loads are

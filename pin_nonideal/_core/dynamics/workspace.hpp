@@ -25,7 +25,7 @@ namespace pn {
 constexpr int max_projection_iterations = 12;
 
 // Rank tolerance of the rows while elements stick. Sticking elements do not resist motions along which they act with less
-// than this part of their forces. The value is the square root of response_rank_threshold (complementarity/box_lcp.hpp),
+// than this fraction of their forces. The value is the square root of response_rank_threshold (complementarity/box_lcp.hpp),
 // since a response is quadratic in the rows.
 constexpr double rank_tolerance_sticking = 3e-7;
 
@@ -49,7 +49,7 @@ struct VelocityRates {
 // Data that the next step needs from earlier steps, besides the state (q, v) and the choice of independent rows.
 struct RunState {
     Modes mode;
-    std::vector<char> closed;  // closed contacts, by gap (change them by set_closed only)
+    std::vector<char> closed;  // closed contacts, per gap (change them by set_closed only)
     // Slip directions of elements with two or three directions: at the step's start, and the last well-defined one.
     std::vector<Vec3> slip_direction, last_direction;
     std::vector<char> is_sticking_deferred;  // keeps its slip mode at rest: only rounding decides the direction
@@ -59,11 +59,11 @@ struct RunState {
     VecX z;                       // states of laws, at the last evaluated stage
     VecX held_torque;             // torque of sampled control
     bool has_held = false;
-    VecX unknown;                 // last solution of the implicit reaction equation, by element and law (warm start)
+    VecX unknown;                 // last solution of the implicit reaction equation, per element and law (warm start)
     bool warm = false;             // true if `unknown` is an initial guess for the next solution
-    std::vector<Force> bearing_wrench;  // wrenches of joints in that solution, by element with a load in a tree
+    std::vector<Force> bearing_wrench;  // wrenches of joints in that solution, per element with a load in a tree
     bool has_wrenches = false;     // true if that solution was found by sweeps over trees
-    VecX percussion;  // impulses of contacts and friction in the last time step, by row and divided by its length
+    VecX percussion;  // impulses of contacts and friction in the last time step, per row and divided by its length
     VelocityRates last_rates;
     VecX q_without_rest;  // configuration that no forces held at rest in earlier time steps, or empty
     VecX third_order_gap;         // third-order part of the gaps that a step closes, divided by its cubed length
@@ -85,7 +85,7 @@ struct Reactions {
     // is frozen, loads are linear in the motion, and tension is possible.
     std::vector<char> has_zero_load;
     bool is_zero_load_set_frozen = false;
-    VecX lam;              // by kept row, minimum norm among redundant rows
+    VecX lam;              // per kept row, minimum norm among redundant rows
     std::vector<Force> body;  // external forces on each body, later the sums of its subtree
     std::vector<Motion> motion;
     std::vector<Force> momentum;
@@ -107,14 +107,14 @@ struct Evaluation {
     std::vector<char> is_inactive;  // blocks of open contacts, which are neither rows nor evaluated
     std::vector<int> active_blocks;              // the other blocks
     std::vector<int> closed_gaps;                // closed gaps
-    std::vector<char> selected;                  // closed flags by gap, at the last selection of rows
+    std::vector<char> selected;                  // closed flags per gap, at the last selection of rows
     std::vector<int> loaded_elements, slipping;  // elements with load (sticking or slipping), and slipping elements
     RowEntries A, B;
     // Number of rows of constraints that depend on others, at the start of the last time step whose rows were chosen. A
     // negative value means that the number is not known.
     int dependent_at_start = -1;
     RowSystem rows, ideal_rows;  // ideal: of the constraints without sticking elements (see IdealMotion)
-    VecX b, lam;  // by kept row
+    VecX b, lam;  // per kept row
     VecX closing_lam;  // multipliers of the last closing move of the position
     VecX step_gap;     // negative residuals at the end of a step that follows the constraints, before projection
     bool awaits_gap = false;   // such a step has not been projected yet
@@ -184,7 +184,7 @@ struct Scratch {
     std::vector<Force> body_inertia, body_residual;  // refinement in deep trees
     LawForceList law_force;       // C of each law, for its power
     MotionForces forces;          // forces of the motion whose laws are checked
-    VecX law_weight, law_residual, law_magnitude;  // by dof
+    VecX law_weight, law_residual, law_magnitude;  // per dof
 };
 
 struct Workspace {

@@ -8,7 +8,7 @@
 
 namespace pn {
 
-// Rounding of the limits at the boundary of two zero-load sets, relative to the limits.
+// Rounding error of the limits at the boundary of two zero-load sets, relative to the limits.
 constexpr double zero_load_limit_rounding = 1e-10;
 
 static std::vector<int> joined(std::vector<int> list, const std::vector<int>& more) {

@@ -8,7 +8,7 @@
 namespace pn {
 
 struct ModeQuery {
-    std::vector<Mode> modes;  // by element, ignored for elements at rest
+    std::vector<Mode> modes;  // per element, ignored for elements at rest
     std::vector<int> at_rest;
     // Elements at rest that just reached their limit: they slip at the limit even with zero acceleration.
     std::vector<int> at_limit;
@@ -30,8 +30,8 @@ void follow_velocity(const Program& p, Workspace& w, int element, ModeQuery& que
 // Set the slip directions of moving elements from their slip velocities in the rows last evaluated, except for elements at
 // rest.
 void follow_slip(const Program& p, Workspace& w, const VecX& v, const std::vector<int>& at_rest = {});
-// Set the slip directions of moving elements again after a projection, if steps solve for directions. The explicit method
-// reads the slip velocities themselves. Updates the kinematics.
+// After a projection, update the kinematics and set the slip directions of moving elements again. Does nothing unless steps
+// solve for slip directions, since other methods read slip velocities.
 void follow_projection(const Program& p, Workspace& w, double t, const VecX& q, const VecX& v,
                        const std::vector<int>& at_rest);
 

@@ -96,7 +96,7 @@ void FrictionProblem::clean(const Program& p, Workspace& w) {
     each_unit_force(p, w, [&](int i) {
         solve_R(p.mechanism, w.now.terms, force);
         free[i] = force.squaredNorm();
-        if (W(i, i) > min_constrained_response * free[i]) return;  // else the response is rounding
+        if (W(i, i) > min_constrained_response * free[i]) return;  // else the response is rounding error
         W.row(i).setZero();
         W.col(i).setZero();
     });

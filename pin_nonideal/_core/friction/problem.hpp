@@ -36,7 +36,7 @@ struct FrictionProblem {
     // Restore exact properties of W: symmetry, and zeros for directions that the constraints determine, such as the
     // friction of a driven joint.
     void clean(const Program& p, Workspace& w);
-    // Set alpha0 to zero where the constraints hold a direction and alpha0 is rounding of the accelerations that they
+    // Set alpha0 to zero where the constraints hold a direction and alpha0 is rounding error of the accelerations that they
     // prevent.
     void unload_held(const Program& p, Workspace& w);
 

@@ -11,7 +11,7 @@ namespace pn {
 struct SlipOnsetParameters {
     double residual_to_acceleration = 10.0;  // factor from the residual of the equation to the error of accelerations
     double max_acceleration = 1e-6;          // accelerations below this fraction are slip onset exactly at a limit
-    double limit_rounding = 1e-13;           // rounding relative to a limit
+    double limit_rounding = 1e-13;           // rounding error relative to a limit
     double condition_slack = 1e-9;           // allowed violation of a mode's condition, relative to a limit
 };
 

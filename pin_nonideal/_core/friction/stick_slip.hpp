@@ -12,13 +12,13 @@ namespace pn {
 
 struct StickSlipParameters {
     double limit_tolerance = 1e-12;  // relative change of the limits at convergence
-    // Change of a limit that counts as rounding, relative to the largest given force. A limit in a part of a
-    // long chain without large loads may be as small as this rounding.
+    // Change of a limit that counts as rounding error, relative to the largest given force. A limit in a part of a long
+    // chain without large loads may be as small as this rounding error.
     double limit_force_rounding = 64 * std::numeric_limits<double>::epsilon();
     int max_limit_iterations = 100;  // maximum iterations of forces and limits
-    // Deviation of a slip's acceleration from the direction of its friction (1 - cosine) that counts as rounding.
+    // Deviation of a slip's acceleration from the direction of its friction (1 - cosine) that counts as rounding error.
     double max_direction_deviation = 1e-10;
-    double settled_direction = 1e-11;  // turn of a slip direction that counts as rounding [rad]
+    double settled_direction = 1e-11;  // turn of a slip direction that counts as rounding error [rad]
     int max_turns = 20;                // maximum iterations of the directions of a nearby motion
 };
 

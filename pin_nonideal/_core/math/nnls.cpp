@@ -179,7 +179,7 @@ MaxMin max_min(const MatX& Z, const VecX& N) {
     MaxMin found{size, VecX()};
     for (int cut = 0; cut < nnls_parameters.max_cuts; ++cut) {
         const VecX violation = min_violation(Z, (N.array() - value).matrix());
-        if (largest(violation) <= nnls_parameters.met_rounding * size) break;  // smaller violations are rounding
+        if (largest(violation) <= nnls_parameters.met_rounding * size) break;  // smaller violations are rounding error
         found.weight = violation / violation.sum();
         const double bound = found.weight.dot(N);
         if (!(bound < value - nnls_parameters.rounding * size)) { value = bound; break; }

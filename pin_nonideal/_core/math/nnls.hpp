@@ -9,17 +9,18 @@
 namespace pn {
 
 struct NnlsParameters {
-    // Rounding of a few products, relative to the numbers that cancel.
+    // Rounding error of a few products, relative to the numbers that cancel.
     double rounding = 1e-13;
     // Relative pivot below which a column counts as spanned by the others.
     double min_column_pivot = 1e-11;
     // Slack for the search of binding numbers if no z is feasible, relative to max |N|. The slack must exceed rounding.
     double binding_slack = 1e-9;
-    // Rounding of a zero in a least-squares solution, relative to the numbers that it sums.
+    // Rounding error of a zero in a least-squares solution, relative to the numbers that it sums.
     double met_rounding = 1e-11;
     // Projections that make a column orthogonal to others, up to rounding.
     int orthogonal_passes = 2;
-    // Maximum number of exchanges per column. The method is finite and takes about one. Further exchanges are rounding.
+    // Maximum number of exchanges per column. The method is finite and takes about one. Further exchanges are rounding
+    // error.
     int exchanges = 10;
     int max_cuts = 50;  // updates of the bound in max_min, each exact for the binding numbers
 };

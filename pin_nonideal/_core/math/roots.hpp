@@ -1,4 +1,4 @@
-// Roots and minima of event functions (margins) of the part of a step.
+// Roots and minima of event functions (margins), as functions of the fraction of a step.
 #pragma once
 
 #include <algorithm>
@@ -16,9 +16,9 @@ struct RootSearchParameters {
 
 inline constexpr RootSearchParameters root_search_parameters{};
 
-constexpr double no_crossing = 2.0;  // part of a step that means no crossing
+constexpr double no_crossing = 2.0;  // fraction of a step that stands for no crossing
 
-// Return the root of a margin that is positive at `low` and negative at `high`, as parts of a step. Uses secants that
+// Return the root of a margin that is positive at `low` and negative at `high`, as fractions of a step. Uses secants that
 // stay inside the bracket (Illinois).
 template <class Margin>
 double root_between(double low, double margin_low, double high, double margin_high, const Margin& margin) {

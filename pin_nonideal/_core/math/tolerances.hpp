@@ -17,32 +17,33 @@ constexpr double near_singular_pivot = 2.5e-3;
 constexpr double min_null_space_entry = 1e-9;
 
 // --- Projection onto the constraints
-// Residual that is rounding, relative to the scene's size: a few hundred operations of unit roundoff.
+// Residual that is rounding error, relative to the scene's size: a few hundred operations of unit roundoff.
 constexpr double projection_floor = 2e-14;
 // Largest gap after a successful projection, relative to the scene's size. Projection closes gaps to rounding after every
 // step, in singular positions too.
 constexpr double max_projected_gap = 1e-9;
-// Largest velocity [rad/s or m/s] of a scene without freedom that counts as rounding of the last event.
+// Largest velocity [rad/s or m/s] of a scene without freedom that counts as rounding error of the last event.
 constexpr double immobile_speed = 1e-8;
 
 // --- Slip. Speeds are relative to 1 + the largest speed of the scene [rad/s or m/s].
-// Speed of a slip that is rest, because event location leaves rounding.
+// Slip speed that counts as rest: event location leaves such rounding errors.
 constexpr double rest_speed = 1e-11;
-// Speed of a slip below which its direction is rounding only.
+// Slip speed below which rounding errors determine the slip direction.
 constexpr double min_directed_speed = 1e-9;
 
 // --- Forces and accelerations
-// Rounding of accelerations, relative to their scale.
+// Rounding error of accelerations, relative to their scale.
 constexpr double relative_acceleration_rounding = 1e-12;
-// Acceleration of a tree at rest that counts as rounding, relative to the acceleration without forces.
+// Acceleration of a tree at rest that counts as rounding error, relative to the acceleration without forces.
 constexpr double tree_acceleration_rounding = 1e-9;
-// Minimum response to a force under constraints, relative to its free response. Smaller responses are rounding.
+// Minimum response to a force under constraints, relative to its free response. Smaller responses are rounding error.
 constexpr double min_constrained_response = 1e-13;
-// Impulse that is rounding, relative to the largest impulse of an impact.
+// Impulse that is rounding error, relative to the largest impulse of an impact.
 constexpr double impulse_rounding = 1e-14;
 
 // --- Gaps
-// Width below which a gap touches [m or rad]. Penetrations after a step are compared with it times the scene's size.
+// Width of a gap below which its contact touches [m or rad]. Penetrations after a step are compared with this width times
+// the scene's size.
 constexpr double touching_width = 1e-12;
 // Minimum difference of the biases of two gaps, or of one gap before and after a hand-over, relative to all accelerations.
 constexpr double min_bias_jump = 1e-6;

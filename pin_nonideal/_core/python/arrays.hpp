@@ -41,7 +41,7 @@ inline Numbers to_numpy(std::vector<double>&& x) {
     auto* kept = static_cast<std::vector<double>*>(owner.data());
     return Numbers(kept->data(), {kept->size()}, owner);
 }
-inline Table to_table(std::vector<double>&& x, size_t rows, size_t columns) {  // x by rows
+inline Table to_table(std::vector<double>&& x, size_t rows, size_t columns) {  // x in row-major order
     const nb::capsule owner = owner_of(std::move(x));
     return Table(static_cast<std::vector<double>*>(owner.data())->data(), {rows, columns}, owner);
 }
@@ -93,7 +93,7 @@ inline void read_into(const nb::object& from, VecX& to) {
     to = map(a);
 }
 
-using FrameTuple = std::tuple<int, std::vector<double>, std::vector<double>>;  // joint, R (by rows), p
+using FrameTuple = std::tuple<int, std::vector<double>, std::vector<double>>;  // joint, R (row-major), p
 
 inline Vec3 vec3(const std::vector<double>& x) { return Vec3(x[0], x[1], x[2]); }
 

@@ -50,8 +50,8 @@ struct Runner {
     Instant solve(const Array& q_in, const Array& v_in, double t, const std::optional<Array>& tau,
                   const std::optional<std::vector<Mode>>& modes, bool frozen, const std::optional<Array>& directions);
     int constraint_rank() const;
-    // Return the rows of some blocks, including removed rows: A (by rows), b, residual, rate. Without a choice, return
-    // the rows of all constraints and contacts in the order of their descriptions.
+    // Return the rows of some blocks, including removed rows: A (row-major), b, residual, rate. Without a choice, return the
+    // rows of all constraints and contacts in the order of their descriptions.
     std::tuple<Numbers, Numbers, Numbers, Numbers> rows(const Array& q_in, const Array& v_in, double t,
                                                         const std::optional<std::vector<int>>& chosen);
     // Return the residuals of all these rows.
@@ -62,7 +62,7 @@ struct Runner {
                         const std::optional<std::vector<int>>& chosen);
     // Return the slip directions of all friction elements as rows, whose rates are slip velocities.
     Numbers slip_rows(const Array& q_in, const Array& v_in, double t);
-    // Return M (dense, by rows) and the bias forces.
+    // Return M (dense, row-major) and the bias forces.
     std::pair<Numbers, Numbers> terms(const Array& q_in, const Array& v_in);
     // Return the kinetic energy, and the potential energy in gravity [J].
     std::pair<double, double> energies(const Array& q_in, const Array& v_in);

@@ -92,7 +92,7 @@ Outcome samples_inside(const Program& p, const Options& options, const Array& t,
     return {w.counters, std::move(out)};
 }
 
-// Return the states at parts of the steps of an interpolant, from its values at the points of each step.
+// Return the states at fractions of the steps of an interpolant, from its values at the points of each step.
 Numbers inside_steps(const Array3& states, const Indices& step, const Array& part) {
     const size_t size = states.shape(2);
     const StepPolynomials steps(states.data(), static_cast<int>(states.shape(1)), static_cast<int>(size));

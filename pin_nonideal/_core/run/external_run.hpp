@@ -14,9 +14,9 @@ struct ExternalRunParameters {
     // Relative step of central differences: cube root of the unit roundoff, which balances rounding and truncation
     // errors.
     double derivative_step = 6e-6;
-    // Minimum slip acceleration at an onset, relative to the acceleration by friction alone. The inverse ratio is the
-    // rate at which the slip direction relaxes, times the time since the onset. Implicit steps resolve inverse ratios
-    // up to about 30.
+    // Minimum slip acceleration at an onset, relative to the acceleration due to friction alone. The inverse ratio is the
+    // rate at which the slip direction relaxes, times the time since the onset. Implicit steps resolve inverse ratios up to
+    // about 30.
     double min_onset_acceleration = 1.0 / 30.0;
 };
 
@@ -42,7 +42,7 @@ public:
     }
 
     // Return an element with several slip directions whose slip begins very slowly from rest, if there is one. Slow is
-    // relative to the acceleration by its friction alone. The slip direction then relaxes faster than any step of an
+    // relative to the acceleration due to its friction alone. The slip direction then relaxes faster than any step of an
     // integrator that does not solve for the direction.
     std::optional<int> singular_onset();
 

@@ -117,7 +117,7 @@ protected:
     ModeChanges modes;
 
     // Data of the current step only.
-    VecX projection_move;  // move by the projection of the step's end
+    VecX projection_move;  // displacement due to the projection of the step's end
     std::optional<FoundEvent> event;  // event in the step just taken
     RunState before_step;      // run state at the step's start, set if `watched`
     VecX guess;                // loads at the step's start, the initial guess of its first stage

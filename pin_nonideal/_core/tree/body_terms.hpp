@@ -24,10 +24,10 @@ struct Body {
 
 // Quantities of a deep tree that replace the rows of M.
 struct Articulation {
-    std::vector<Vec3> shift;  // by joint: from the parent's reference point to its own
-    std::vector<Force> bias;  // by joint: bias force of the body alone
-    std::vector<ArticulatedInertia> inertia;  // by joint: articulated inertia of its subtree
-    std::vector<Force> gain;  // by dof: force taken from the body per unit of net force on the dof
+    std::vector<Vec3> shift;  // per joint: from the parent's reference point to its own
+    std::vector<Force> bias;  // per joint: bias force of the body alone
+    std::vector<ArticulatedInertia> inertia;  // per joint: articulated inertia of its subtree
+    std::vector<Force> gain;  // per dof: P S / D, by which a unit of net force on the dof reduces the force on the body
     std::vector<Force> forces;    // forces of the sweep toward the roots
     std::vector<Motion> motions;  // motions of the sweep toward the leaves
 };

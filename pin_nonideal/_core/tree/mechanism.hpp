@@ -57,14 +57,14 @@ struct Mechanism {
     int nq = 0, nv = 0;
     Vec3 gravity = Vec3::Zero();
     VecX armature;
-    // Radius of the tree: largest radius of gyration of its bodies about the axes of their joints, or 1 without one. By
+    // Radius of the tree: largest radius of gyration of its bodies about the axes of their joints, or 1 without one. Per
     // dof: displacement that compares with 1 rad (1 if the dof turns, the radius if it slides), and length of a unit
     // displacement (the radius if the dof turns, 1 if it slides).
     VecX unit, lever;
     std::vector<int> dof_parent, depth, row_offset;  // row of dof j: row_offset[j] + 0 .. depth[j]
     std::vector<int> dof_joint;  // joint that each dof belongs to
     std::vector<int> deep_joints, deep_dofs;  // joints and dofs of deep trees, each after its parent
-    std::vector<char> is_deep;                // by dof
+    std::vector<char> is_deep;                // per dof
     std::vector<int> ancestors;  // dof of each entry of the rows
     int row_entries = 0;
     std::shared_ptr<const void> model;  // copy of the Pinocchio model, for quantities that only Pinocchio computes

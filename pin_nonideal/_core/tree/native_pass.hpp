@@ -12,7 +12,7 @@ struct CosSin {  // cosine and sine of an angle
 };
 
 struct NativePass {
-    std::vector<CosSin> cos_sin;  // by joint, set if its configuration is an angle
+    std::vector<CosSin> cos_sin;  // per joint, set if its configuration is an angle
     PinocchioJoints others;       // joints of kind `other`
     JointMotion motion;           // motion of the joint evaluated last
     VecX rest;                    // zero velocity, to evaluate placements of these joints

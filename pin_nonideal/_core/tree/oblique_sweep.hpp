@@ -38,12 +38,12 @@ private:
     struct Blocks {
         Mat3 lin, couple, cross, ang;
     };
-    std::vector<Blocks> inertia_;  // by joint: part that its parent carries
-    std::vector<Force> force_;     // by joint: force on the bodies beyond it that its parent carries
-    std::vector<Force> taken_;     // by dof: P S, force per unit acceleration
-    std::vector<Force> row_;       // by dof: P^T T
-    std::vector<Motion> motion_;   // by joint: acceleration of its body
-    VecX inverse_, left_;          // by dof: 1/D, and net force over D
+    std::vector<Blocks> inertia_;  // per joint: part that its parent carries
+    std::vector<Force> force_;     // per joint: force on the bodies beyond it that its parent carries
+    std::vector<Force> taken_;     // per dof: P S, force per unit acceleration
+    std::vector<Force> row_;       // per dof: P^T T
+    std::vector<Motion> motion_;   // per joint: acceleration of its body
+    VecX inverse_, left_;          // per dof: 1/D, and net force divided by D
 };
 
 }  // namespace pn

@@ -74,7 +74,7 @@ void place_deep(const pinocchio::Data& data, BodyTerms& terms, const Joint& j, s
 }  // namespace
 
 struct PinocchioJoints::Data {
-    std::vector<std::unique_ptr<SingleJoint>> joints;  // by joint, null if the core has a formula
+    std::vector<std::unique_ptr<SingleJoint>> joints;  // per joint, null if the core has a formula
 };
 
 PinocchioJoints::PinocchioJoints() = default;

@@ -29,7 +29,7 @@ class BlockFactor {
 public:
     // Choose an order of elimination with little fill, if the pattern differs from the last one.
     void analyse(const BlockProblem& p, const Island& island);
-    // Factor H. G has nine numbers an element, by rows. Returns false if H is singular.
+    // Factor H. G has nine numbers per element, row-major. Returns false if H is singular.
     bool factor(const BlockProblem& p, const Island& island, const std::vector<double>& G, bool symmetric);
     // x := H^-1 x on the nodes of the island.
     void solve(VecX& x) const;

@@ -99,7 +99,7 @@ void BlockInteriorPoint::scale(const Island& island, Slip slip) {
     }
 }
 
-// Compute the step to z o u = target that leaves the part `keep` of the residual.
+// Compute the step to z o u = target that leaves the fraction `keep` of the residual.
 void BlockInteriorPoint::direction(const BlockProblem& p, const Island& island, const BlockFactor& factor, double target,
                                    double keep) {
     for (int n : island.nodes) dx_.segment(p.nodes[n].first, p.nodes[n].size).setZero();
@@ -153,7 +153,7 @@ double BlockInteriorPoint::residual() const {
     return largest;
 }
 
-// Take a part of the step. Return false, without a change of f, if rounding leads out of a cone.
+// Take a fraction of the step. Return false, without a change of f, if rounding leads out of a cone.
 bool BlockInteriorPoint::move(double part, VecX& f) {
     before_ = f;
     bool inside = true;

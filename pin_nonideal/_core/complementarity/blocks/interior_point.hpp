@@ -14,7 +14,7 @@ struct BlockInteriorPointParameters {
     int max_steps = 40;              // maximum steps along the path
     double gap_tolerance = 1e-9;     // mean of force times velocity, z . u, of the elements at the end of the path
     double residual_tolerance = 1e-6;  // largest residual at the end of the path
-    double min_step = 1e-5;          // part of a step below which rounding allows no further progress
+    double min_step = 1e-5;          // fraction of a step below which rounding allows no further progress
     double smooth_speed = 1e-12;     // slip speed below which the direction is undefined
     double proximal = 1e-8;          // weight of the proximal term of elements without a cone
 };

@@ -1,4 +1,4 @@
-// Dense kernels on small matrices stored by rows. Blocks of six, the free bodies, have loops of fixed length.
+// Dense kernels on small matrices stored in row-major order. Blocks of six, the free bodies, have loops of fixed length.
 #pragma once
 
 #include <algorithm>
@@ -12,15 +12,15 @@ namespace pn {
 // Pivots whose multiples leave the remaining rows of a large matrix together. A row is then read once for all of them.
 constexpr int panel = 4;
 
-// Subtract multiples f[0] ... f[3] of the first `n` numbers of four rows, `stride` apart, from x.
+// Subtract from x the first `n` numbers of four rows, `stride` apart, times f[0] ... f[3].
 PN_INLINE void subtract_panel(double* __restrict x, const double* f, const double* __restrict rows, int stride, int n) {
     const double *__restrict a = rows, *__restrict b = a + stride, *__restrict c = b + stride, *__restrict d = c + stride;
     const double fa = f[0], fb = f[1], fc = f[2], fd = f[3];
     for (int j = 0; j < n; ++j) x[j] = (((x[j] - fa * a[j]) - fb * b[j]) - fc * c[j]) - fd * d[j];
 }
 
-// A := its lower Cholesky factor, with inverses on the diagonal. The upper triangle takes the transpose of the factor.
-// Returns false if a pivot is not positive.
+// A := its lower Cholesky factor, with inverse pivots on the diagonal. The upper triangle receives the transpose of the
+// factor. Returns false if a pivot is not positive.
 PN_INLINE bool cholesky(double* A, int n) {
     for (int first = 0; first < n; first += panel) {
         const int end = std::min(first + panel, n);

@@ -244,8 +244,8 @@ void BlockNewton::find_step(const BlockProblem& p, const Island& island, const B
     }
 }
 
-// Compute the forces and the motion of the full step. The motion follows from the forces alone, without the rounding of
-// the steps so far.
+// Compute the forces and the motion of the full step. The motion follows from the forces alone, without the rounding error
+// of the steps so far.
 void BlockNewton::try_step(const BlockProblem& p, const Island& island, const VecX& f) {
     for (int i : island.elements)
         for (int r = p.elements[i].row; r < p.elements[i].row + p.elements[i].dim(); ++r) f_full_[r] = f[r] + df_[r];

@@ -17,11 +17,11 @@ namespace pn {
 
 // Errors are relative to an element's forces, as `solve` returns them.
 struct BlockNewtonParameters {
-    double tolerance = 1e-12;       // error that needs no further step
+    double tolerance = 1e-12;       // error at which the iteration ends
     double stall_tolerance = 1e-9;  // error near the solution: steps without progress end, and rounding is removed
     double stall_ratio = 0.25;      // ratio of two errors that counts as no progress near the solution
     int max_steps = 40;             // maximum number of steps
-    double decrease = 0.01;         // required part of the predicted decrease of the squared error
+    double decrease = 0.01;         // required fraction of the predicted decrease of the squared error
     int max_refusals = 4;           // refused steps in a row, each with a larger proximal term
     int max_halvings = 2, max_patient_halvings = 6;  // halvings of a step of a bold and of a patient search
     int max_unguarded_steps = 3;    // full steps without decrease
@@ -51,7 +51,7 @@ public:
     // Begin an island: errors of elements without force are relative to its largest free velocity, w under no forces.
     void begin(const BlockProblem& p, const Island& island, const VecX& free_w);
     // Solve the laws of an island from the forces f with their motion x, w = J x + offset. Return the error of the best
-    // forces found, and store these forces and their motion. All elements yield by the part `compliance` of their own
+    // forces found, and store these forces and their motion. Each element has a compliance of `compliance` times its own
     // response. `factor` keeps the order of elimination of the island.
     double solve(const BlockProblem& p, const Island& island, BlockFactor& factor, Search search, double compliance,
                  VecX& f, VecX& x, VecX& w);
@@ -88,7 +88,7 @@ private:
         Piece piece = Piece::open;
         double P[3] = {0.0, 0.0, 0.0};
         double t[3] = {0.0, 0.0, 0.0};
-        double ratio = 0.0;  // radius over length
+        double ratio = 0.0;  // radius divided by length
     };
 
     Projection projection(const BlockElement& e, const double* y) const;
@@ -104,13 +104,13 @@ private:
 
     std::vector<double> rho_, root_rho_, G_;
     std::vector<int> listed_;      // all elements
-    std::vector<Mat3> responses_;  // by element
+    std::vector<Mat3> responses_;  // per element
     std::vector<double> unit_force_;  // inverse of root_rho_: forces in units of the root of an energy
     std::vector<Piece> piece_;
     std::vector<Projection> there_;  // at the last evaluation
     VecX y_, e_, z_, df_, dx_, dw_, f_best_;
     VecX f_full_, x_full_, w_full_;  // forces and motion of the full step
-    VecX f_part_, w_part_;           // the same for a shorter step
+    VecX f_part_, w_part_;           // forces and motion of a shorter step
     double compliance_ = 0.0;
     double yielding_ = 0.0;      // compliance and proximal weight of the last factor, 0 if the last solution needed none
     bool keeps_factor_ = false;  // the next step uses the last factor

@@ -2,9 +2,9 @@
 //
 // A node is a tree with its inertia matrix M. An element acts on one or two nodes:
 //     M (x - free) = J^T f,   w = J x + offset,
-// with x the accelerations, or velocities at the end of a step over its length. cone/problem.hpp states the laws
-// between f and w. M has one block a node, and J one block for each node of an element. Matrices are stored by rows.
-// Free bodies may have mass-normalized unknowns L^T x, with M = L L^T: their inertia is then the identity.
+// with x the accelerations, or the velocities at the end of a step divided by its length. cone/problem.hpp states the laws
+// between f and w. M has one block per node, and J one block for each node of an element. Matrices are stored in row-major
+// order. Free bodies may have mass-normalized unknowns L^T x, with M = L L^T: their inertia is then the identity.
 #pragma once
 
 #include <vector>
@@ -42,7 +42,7 @@ public:
     std::vector<BlockNode> nodes;
     std::vector<BlockElement> elements;
     std::vector<double> M, J;
-    VecX free, offset;  // x without forces by unknown of the whole scene, and offset by row
+    VecX free, offset;  // x without forces per unknown of the whole scene, and offset per row
     int rows = 0;
 
     void clear();
@@ -72,7 +72,7 @@ public:
     // x += J^T f of an element or of several.
     void push(const BlockElement& e, const VecX& f, VecX& x) const;
     void push(const std::vector<int>& elements, const VecX& f, VecX& x) const;
-    // Compute the responses of the rows of listed elements to the element's own forces, J M^-1 J^T, by element.
+    // Compute the responses of the rows of listed elements to the element's own forces, J M^-1 J^T, per element.
     void own_responses(const std::vector<int>& elements, std::vector<Mat3>& W) const;
 
 private:

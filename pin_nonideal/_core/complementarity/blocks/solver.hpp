@@ -7,7 +7,7 @@
 namespace pn {
 
 struct BlockSolverParameters {
-    double tolerance = 1e-9;  // error of a solution; in most problems Newton's method reaches rounding, which is far smaller
+    double tolerance = 1e-9;  // error of a solution; Newton's method mostly reaches rounding error, which is far smaller
     // Error that is accepted without a search from zero forces, which would cost twenty factorizations.
     double near_tolerance = 1e-8;
     double shared_tolerance = 1e-6;   // error of a solution with `shared_compliance`
@@ -18,7 +18,7 @@ struct BlockSolverParameters {
     double min_swept_error = 1e-2;  // error from which sweeps from no forces replace the best forces found
     int last_sweeps = 400;          // number of these sweeps
     double rest_speed = 1e-9;       // speed of an island at rest, relative to that without forces
-    double path_rest_speed = 1e-3;  // the same at the end of the central path
+    double path_rest_speed = 1e-3;  // speed of an island at rest at the end of the central path
     // Steps in an island, times its elements, after which no other search begins: about 100 ms. The bound is a count
     // instead of a time, so that runs stay the same.
     int max_work = 100000;
@@ -33,7 +33,7 @@ public:
 
     // Prepare the problem once its nodes and elements are set. Return false if an inertia is not positive definite.
     bool pose();
-    // Set the motion without forces, by unknown of the whole scene, and add the motion due to constant forces.
+    // Set the motion without forces, per unknown of the whole scene, and add the motion due to constant forces.
     void release(const VecX& free, const VecX& constant);
     // Solve for the forces f from a guess, usually those of the last step. Return the largest error of an element,
     // relative to its forces, and at least `min_swept_error` for forces of sweeps. The contacts of a single node share its

@@ -15,7 +15,7 @@ double outside_dual(const ConeElement& e, const Eigen::Ref<const VecX>& u) {
 }
 
 // Find y that shows that no forces prevent penetration. The method projects zero on { w_n + p >= 0 of some forces }.
-// Farkas' alternative is its optimality condition.
+// Farkas' alternative is the optimality condition of this projection.
 bool no_forces(const ConeProblem& p, VecX& y) {
     std::vector<int> rows;
     std::vector<ConeElement> elements = p.elements;

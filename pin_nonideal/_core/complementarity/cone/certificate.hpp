@@ -6,9 +6,9 @@
 namespace pn {
 
 struct CertificateParameters {
-    double min_margin = 1e-7;      // part of |y| |w0| by which y . w0 must be negative
+    double min_margin = 1e-7;      // fraction of |y| |w0| by which y . w0 must be negative
     double zero_tolerance = 1e-9;  // tolerance of quantities that must vanish
-    double zero_force_parts[5] = {1e-5, 1e-4, 1e-3, 1e-6, 1e-7};  // parts of the largest force that count as zero
+    double zero_force_parts[5] = {1e-5, 1e-4, 1e-3, 1e-6, 1e-7};  // fractions of the largest force that count as zero
     double rank_threshold = 1e-8;  // rank threshold of the rows that y satisfies, relative to the largest
     int max_sharpenings = 6;       // Newton steps of y onto the edges of its cones
 };

@@ -10,7 +10,7 @@ namespace pn {
 struct ConeInteriorPointParameters {
     int max_steps = 60;            // maximum steps along the path
     double gap_tolerance = 1e-15;  // mean z . u of the elements at the end, in the problem's units: rounding
-    double min_step = 1e-7;        // part of a step below which rounding allows no further progress
+    double min_step = 1e-7;        // fraction of a step below which rounding allows no further progress
     double smooth_speed = 1e-12;   // slip speed below which the direction is undefined
 };
 

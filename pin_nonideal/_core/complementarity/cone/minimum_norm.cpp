@@ -10,7 +10,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// Nearest point to z of a set, and its derivative.
+// Point of a set nearest to z, and its derivative by z.
 struct Nearest {
     Vector3d point = Vector3d::Zero();
     Matrix3d derivative = Matrix3d::Zero();

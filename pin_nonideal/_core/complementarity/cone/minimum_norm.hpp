@@ -7,9 +7,9 @@
 namespace pn {
 
 struct MinimumNormForcesParameters {
-    double rest_velocity = 1e-9;     // w below this part of the largest w0 counts as zero
+    double rest_velocity = 1e-9;     // w below this fraction of the largest w0 counts as zero
     double tolerance = 3e-15;        // relative to the forces
-    double stall_tolerance = 1e-12;  // the same if steps make no progress
+    double stall_tolerance = 1e-12;  // accepted residual if steps make no progress
     double damping = 1e-10;          // damping of Newton's method, relative to the residual
     int max_steps = 60;              // maximum Newton steps
     int max_halvings = 10;           // maximum halvings of a step that does not reduce the residual
@@ -22,7 +22,7 @@ public:
 
     // Replace f, a solution, by the one of minimum norm in the units before scaling. E is an orthonormal basis of the
     // forces that W distinguishes. The result is f = P(E y) with E^T f unchanged. P projects on the set that the modes
-    // of w allow: a cone if nothing moves, a ray if the contact slips. Return false and keeps f if y was not found.
+    // of w allow: a cone if nothing moves, a ray if the contact slips. Return false, with f unchanged, if y was not found.
     bool minimize_norm(const ConeProblem& problem, Eigen::Ref<VecX> f);
 
 private:

@@ -10,7 +10,7 @@ namespace pn {
 struct ConeNewtonParameters {
     // Error that ends the iteration, and error that ends the iteration if steps make no progress.
     double tolerance = 1e-15, stall_tolerance = 1e-11;
-    double decrease = 1e-4;     // required part of the predicted decrease
+    double decrease = 1e-4;     // required fraction of the predicted decrease
     int max_halvings = 7;       // maximum halvings of a step that does not decrease the squared error
     int max_blind_steps = 3;    // steps without decrease that let the modes change
     int max_stalled_steps = 2;  // steps at rounding without progress
@@ -26,7 +26,7 @@ public:
     // Return the relative error of f.
     double error(const ConeProblem& problem, const Eigen::Ref<const VecX>& f);
     bool regular() const { return regular_; }  // the last equations had full rank
-    // Return the sign of the determinant of the equations at f, or 0 if it is rounding.
+    // Return the sign of the determinant of the equations at f, or 0 if it is rounding error.
     int orientation(const ConeProblem& problem, const Eigen::Ref<const VecX>& f);
     int steps() const { return steps_; }       // total of all calls
 
@@ -39,7 +39,7 @@ private:
 
     DenseSolver solver_;
     Buffer J_, F_, w_, step_, ahead_, best_, size_;
-    std::vector<signed char> mode_;  // by element: mode of the factored equations, if these are linear
+    std::vector<signed char> mode_;  // per element: mode of the factored equations, if these are linear
     bool regular_ = false;
     int steps_ = 0, blind_ = 0;
 };

@@ -30,7 +30,7 @@ using ConeKind = ConeElement::Kind;
 struct ConeProblemParameters {
     // Smallest response of an element that counts, relative to the largest response.
     double min_element_response = 1e-14;
-    // Part of large forces that counts as their rounding: 1e12 times the machine precision.
+    // Fraction of large forces that counts as their rounding error: 1e12 times the machine precision.
     double squeeze = 1e-4;
 };
 
@@ -62,9 +62,9 @@ public:
         w = w0();
         w.noalias() += W() * f;
     }
-    // Compute the scale of the errors of each element's equations: the response to the largest w0, plus the rounding of
-    // much larger forces. The scale grows only by a small part of the forces, so that forces without a response do not hide
-    // an error.
+    // Compute the scale of the errors of each element's equations: the response to the largest w0, plus the rounding error
+    // of much larger forces. The scale grows only by a small part of the forces, so that forces without a response do not
+    // hide an error.
     void force_scales(const Eigen::Ref<const VecX>& f, Eigen::Ref<VecX> size) const;
 
 private:

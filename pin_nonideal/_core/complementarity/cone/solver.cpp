@@ -72,7 +72,7 @@ bool ConeComplementarity::hold(const Eigen::Ref<const MatX>& W, const Eigen::Ref
     return true;
 }
 
-// Check if all velocities are rounding of their own terms, along the normal and across it. The largest velocity of all
+// Check if all velocities are rounding error of their own terms, along the normal and across it. The largest velocity of all
 // would hide slip beside much lighter bodies.
 bool ConeComplementarity::stands_still(const Eigen::Ref<const VecX>& f) {
     auto w = w_.vector(problem_.n);

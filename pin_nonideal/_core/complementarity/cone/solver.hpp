@@ -17,7 +17,7 @@ struct ConeComplementarityParameters {
     double no_force = 1e10;                 // larger forces, in the problem's units, squeeze bodies without moving them
     double path_rest_velocity = 1e-7;       // velocity of rest at the end of the central path, relative to the largest w0
     double rest_velocity = 1e-12;           // velocity of rest of a solution, relative to its terms
-    double velocity_rounding = 1e-14;       // rounding relative to the largest velocity
+    double velocity_rounding = 1e-14;       // rounding error relative to the largest velocity
     double minimum_norm_tolerance = 1e-13;  // error of a minimum-norm solution
     // Newton steps from near a solution, from a guess, and from the end of the central path or of a continuation.
     int few_steps = 3, first_steps = 20, more_steps = 30;

@@ -14,11 +14,11 @@
 namespace pn {
 
 struct ConeUniquenessParameters {
-    // Rounding of the largest eigenvalue.
+    // Rounding error of the largest eigenvalue.
     double rounding = 1e-9;
     // Smallest eigenvalue of W that counts, relative to the largest. Forces along the other directions move nothing.
     double min_response = 1e-11;
-    // Largest squared part of a normal force along such directions that counts as rounding.
+    // Largest squared component of a normal force along such directions that counts as rounding error.
     double max_share = 1e-12;
     // Maximum number of rows. The cost grows by the cube of the number.
     int max_rows = 120;

@@ -14,7 +14,7 @@ struct SpectralBoundParameters {
     int max_passes = 200;       // maximum passes of the power iteration
     double min_improved = 0.5;  // smaller bounds are not improved
     double settled = 1e-4;      // relative improvement of the bound by a pass that ends the iteration
-    double kept_weight = 1e-2;  // part of the previous weights that stays, so that none becomes zero or alternates
+    double kept_weight = 1e-2;  // fraction of the previous weights that stays, so that none becomes zero or alternates
 };
 
 inline constexpr SpectralBoundParameters spectral_bound_parameters{};
@@ -45,7 +45,7 @@ struct ReactionEquation {
 
 struct ReactionNewtonParameters {
     double tolerance = 1e-15;        // residual relative to the solution
-    double stall_tolerance = 1e-12;  // the same for worse rounding, if the residual no longer falls
+    double stall_tolerance = 1e-12;  // accepted residual if the residual no longer falls
     // Maximum number of steps of Newton's method for a solution of the equation.
     int max_steps = 30;
 };

@@ -19,7 +19,7 @@ private:
 
     struct Part {
         int fixed;  // coordinate that is one, while the others run from zero to one
-        std::array<double, parameters.max_bisected + 1> center, half;  // by bisected unknown, then of s
+        std::array<double, parameters.max_bisected + 1> center, half;  // per bisected unknown, then of s
     };
 
     void divide();

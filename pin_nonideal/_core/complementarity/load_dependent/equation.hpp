@@ -20,17 +20,17 @@ struct RestElement {
     VecX direction;           // direction of its slip, if known
     double constant = 0.0;    // limit of a slipping element without load
     double middle = 0.0;      // middle of its limits, if it has one direction
-    double factor = 1.0;      // static over kinetic limit, or 1 once it has begun to slip
+    double factor = 1.0;      // ratio of the static to the kinetic limit, or 1 once it has begun to slip
     double rho = 1.0;         // rho of the equation: force per acceleration
     int vector = 0, vectors = 0;  // rows of its load in `loads`, three per vector
     bool directed = false;        // only the first component counts, and only if positive
 };
 
 struct RestEquationParameters {
-    double difference_step = 1e-7;     // relative to the forces: square root of the rounding, with a margin
+    double difference_step = 1e-7;     // relative to the forces: square root of the rounding error, with a margin
     double min_response_pivot = 1e-8;  // pivot of the Cholesky factor of W, relative to its diagonal
-    double null_response = 1e-13;      // eigenvalues of W below this part of the largest count as zero
-    double unmoved = 1e-9;             // part of the loads that forces without motion may change
+    double null_response = 1e-13;      // eigenvalues of W below this fraction of the largest count as zero
+    double unmoved = 1e-9;             // fraction of the loads that forces without motion may change
     double limit_rounding = 1e-9;      // relative excess of a sticking force over its limit
     double unbounded_force = 1e9;      // unbounded forces, relative to those of limits and accelerations
     int max_signed_elements = 6;       // elements with all combinations of slip signs
@@ -48,7 +48,7 @@ struct RestEquation {
     MatX loads;  // and per unit of each force
     // Set if laws are known only as functions: computes slip accelerations, and limits before `factor`, for the forces x.
     std::function<void(const VecX& x, VecX& alpha, FrictionLimits& limits)> evaluate_laws;
-    // Part of the limits that comes from `fixed` instead of the load (continuation parameter).
+    // Fraction of the limits that comes from `fixed` instead of the load (continuation parameter).
     double frozen = 0.0;
     FrictionLimits fixed;
 
@@ -56,7 +56,7 @@ struct RestEquation {
     void respond(const VecX& x, VecX& alpha, FrictionLimits& limits) const;
     // Compute derivatives of alpha (n, n), of the limits' sizes (elements, n) and of their middles (n, n).
     void differentiate(const VecX& x, MatX& dalpha, MatX& dlimits, MatX& dmiddle) const;
-    // Residual of the equation at x by row, and its largest value relative to each element's forces.
+    // Residual of the equation at x per row, and its largest value relative to each element's forces.
     VecX residual(const VecX& x) const;
     double error(const VecX& x) const;
     // Return the largest of an element's force, of its limit and of the force that would stop it.
@@ -75,8 +75,8 @@ struct RestEquation {
 };
 
 // Return a bound on the contraction of the limits. If it is below 1, the motion is unique: the difference of the limits
-// of two motions would shrink to this part of itself. With W = G G^T and u = G^T (x - y) for two solutions x, y,
-// |u|^2 <= sum_i |G_i u| |limit_i(x) - limit_i(y)|, and |limit_i(x) - limit_i(y)| <= l_i |u|.
+// of two motions would shrink by this factor. With W = G G^T and u = G^T (x - y) for two solutions x, y, |u|^2 <= sum_i |G_i
+// u| |limit_i(x) - limit_i(y)|, and |limit_i(x) - limit_i(y)| <= l_i |u|.
 double contraction_bound(const RestEquation& equation);
 
 }  // namespace pn

@@ -144,7 +144,7 @@ void rest_residual(const RestEquation& equation, const VecX& x, VecX& residual, 
     }
 }
 
-// Rounding of the residual of rest.
+// Rounding error of the residual of rest.
 double rest_rounding(const RestEquation& equation, const VecX& x) {
     VecX alpha;
     FrictionLimits limits;

@@ -8,15 +8,15 @@ namespace pn {
 
 struct LoadDependentParameters {
     double tolerance = 1e-13;            // largest error of the equation, relative to each element's forces
-    double stall_tolerance = 1e-10;      // the same if no step reduces the error
+    double stall_tolerance = 1e-10;      // error accepted if no step reduces it
     double max_alternation_ratio = 0.5;  // error ratio of the alternation, above which Newton's method takes over
     double limit_rounding = 1e-13;       // excess of a sticking force over its limit, relative to the largest force
     double min_residual_gain = 1e-3;     // required relative decrease of the residual by a step
-    double forces_rounding = 1e-15;      // rounding of forces, relative to the largest and for a condition of one
+    double forces_rounding = 1e-15;      // rounding error of forces, relative to the largest and for a condition of one
     int max_alternations = 40;           // maximum alternations of forces and limits
     int max_newton = 40;                 // maximum Newton steps
     int max_halvings = 12;               // maximum halvings of a Newton step that does not decrease the residual
-    double decrease = 1e-4;              // required part of the predicted decrease
+    double decrease = 1e-4;              // required fraction of the predicted decrease
     double first_continuation_step = 0.25, min_continuation_step = 1e-4;  // steps of the continuation parameter
 };
 

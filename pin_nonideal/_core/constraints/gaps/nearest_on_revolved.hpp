@@ -29,7 +29,7 @@ struct Revolved {
     double support(const Vec3& direction) const {
         return support(direction[2], std::hypot(direction[0], direction[1]));
     }
-    // Same for a direction with the given components along the axis and across it.
+    // Return this component for a direction with the given components along the axis and across it.
     template <class Scalar>
     Scalar support(const Scalar& along, const Scalar& across) const {
         const Scalar high = half * along + above * across, low = below * across - half * along;

@@ -54,7 +54,7 @@ private:
     struct Contact {  // contact point and its rate
         using Vec = typename Sides::Vec;
         Vec point, rate;
-        typename Sides::Scalar support = 1.0;  // height of the center over the radius
+        typename Sides::Scalar support = 1.0;  // height of the center divided by the radius
 
         PN_INLINE Contact(const RollingRows& c, const Sides& s) {
             const Vec n = s.b.R * c.normal, dn = s.b.omega().cross(n);

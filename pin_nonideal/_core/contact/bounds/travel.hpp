@@ -11,12 +11,12 @@ namespace pn {
 // Travel data that lasts from step to step. Travel of a body bounds the path length [m] of its contact points. Travel of a
 // joint is in the joint's unit, and rotation in radians.
 struct TravelState {
-    std::vector<double> body, joint, turn;  // by joint: travel of its body, of the joint, rotation of its body
+    std::vector<double> body, joint, turn;  // per joint: travel of its body, of the joint, rotation of its body
     double scene = 0.0;                     // sum over the steps of the largest body travel
     // Distance [m] of points that a joint moves from its origin. Valid until sliding joints travel beyond slid_until.
     std::vector<double> lever, slid_until;
     bool placed = false;  // lever and slid_until are computed
-    // By joint, since the last sum over bodies: translation and rotation of its body relative to its parent.
+    // Per joint, since the last sum over bodies: translation and rotation of its body relative to its parent.
     std::vector<double> slid, turned;
     // Travel over the current step. Entries of bodies are valid only if `summed`.
     std::vector<double> body_step, joint_step, turn_step, slid_step, turned_step;
@@ -100,8 +100,8 @@ private:
     const Program& p;
     std::vector<Moved> moved_;    // each after its parent
     bool drift_ = false;          // some joint drifts
-    std::vector<double> extent_;  // by joint: distance of contact points of its body from its origin [m]
-    std::vector<Pair> pairs_;     // by gap
+    std::vector<double> extent_;  // per joint: distance of contact points of its body from its origin [m]
+    std::vector<Pair> pairs_;     // per gap
 };
 
 }  // namespace pn

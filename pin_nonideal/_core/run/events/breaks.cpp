@@ -102,7 +102,7 @@ bool Breaks::pass() {
         jump(before, after);
         if (system_.has_events()) return true;
     } else {
-        // The rates agree up to the rounding of the time, which fast accelerations magnify.
+        // The rates agree up to the rounding error of the time, which fast accelerations magnify.
         begin_rows(p, w, progress_.t, system_.q, system_.v);
         project_velocity(p, w, progress_.t, system_.v);
         system_.write(progress_.y);

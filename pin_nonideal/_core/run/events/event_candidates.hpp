@@ -31,10 +31,10 @@ struct EventCandidatesParameters {
     // A minimum speed between two stages counts as a dip below zero if it is below this fraction of the speeds' range.
     // The error of the cubics through the stages is smaller.
     double dip_part = 0.02;
-    // Rounding of the margin of a sticking element under a constant force, relative to the friction limit.
+    // Rounding error of the margin of a sticking element under a constant force, relative to the friction limit.
     double limit_rounding = 1e-12;
     // Slip that may remain if sticking rows are almost redundant, relative to 1 + the largest speed of the scene [rad/s
-    // or m/s]. Such rows amplify rounding.
+    // or m/s]. Such rows amplify rounding errors.
     double raised_rest_speed = 1e-9;
 };
 

@@ -19,7 +19,7 @@ namespace pn {
 
 struct EventLocationParameters {
     // Speed below which slip in several directions has come to rest in fixed steps, relative to 1 + the largest
-    // velocity. Fixed steps do not locate this rest.
+    // velocity. Fixed steps do not locate the instant of rest.
     double arrived_speed = 1e-7;
     // Slip passes by rest if it keeps more than `rest_part` of its speed at the step's start and exceeds
     // `passing_speed`.

@@ -121,7 +121,7 @@ bool EventSearch::slows_down(int e, double rest) const {
     return stepper_.h * system_.slip_rate(stepper_.start_rate(), e) < -rest;
 }
 
-// Return the part of the step at which a margin first falls below zero, searched on a grid and between its points.
+// Return the fraction of the step at which a margin first falls below zero, searched on a grid and between its points.
 // Return `no_crossing` if it does not.
 double EventSearch::first_crossing(const Watch& watch, Source source) {
     const auto margin_at = [&](double part) { return margin_inside(watch, source, part); };

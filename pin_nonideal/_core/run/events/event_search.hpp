@@ -14,7 +14,7 @@ namespace pn {
 
 struct Crossing {
     Watch watch;
-    double part, slope;  // part of the step, and rate of the margin at this part per step
+    double part, slope;  // fraction of the step at the crossing, and rate of the margin there per step
     bool jumps = false;  // the margin jumps below zero without a root
 };
 

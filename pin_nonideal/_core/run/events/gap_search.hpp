@@ -12,13 +12,13 @@
 namespace pn {
 
 struct GapSearchParameters {
-    // Rounding of a closed gap [m], relative to the scene's size.
+    // Rounding error of a closed gap [m], relative to the scene's size.
     double width_rounding = 1e-14;
     // Bound of the accelerations between the stages of an accepted step, relative to the largest one at the stages.
     double between_stages = 2.0;
     // Maximum number of samples of a gap that stays near its plane. After that it counts as closed.
     int max_samples = 4000;
-    // Parts of a step at which a gap is sampled that may stay on its plane throughout.
+    // Fractions of a step at which a gap that may stay on its plane is sampled.
     double plane_parts[5] = {0.11, 0.29, 0.5, 0.73, 0.93};
     // Safety factor on the travel of bodies, for the moves of projections.
     double travel_factor = 2.0;
@@ -41,7 +41,7 @@ public:
     };
     const std::vector<Candidate>& find_candidates();
     const std::vector<Candidate>& candidates() const { return candidates_; }  // candidates of the last search
-    // Part of the step at which a candidate closes, and rate of its gap at this instant per step. The search leaves the
+    // Fraction of the step at which a candidate closes, and rate of its gap at this instant per step. The search leaves the
     // workspace at another state.
     struct Touch { double part, slope; };
     std::optional<Touch> first_touch(int gap);  // `gap`: a candidate

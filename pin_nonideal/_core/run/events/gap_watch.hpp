@@ -69,7 +69,7 @@ struct GapWatchParameters {
     // Factors on the travel since a skipped gap's last sample, and on the travel in one step. The gap is monitored again
     // if their sum can close it.
     double recheck_factor = 2.0, steps_ahead = 2.0;
-    // Rounding of a difference of travels, relative to the travel so far.
+    // Rounding error of a difference of travels, relative to the travel so far.
     double travel_rounding = 1e-15;
     // Minimum time [s] before a blocked gap is retried. Later it is retried after as long as it has been blocked.
     double min_retry_delay = 1e-4;
@@ -99,7 +99,7 @@ public:
     void skip_wide();
     // Check if a monitored gap was wider at its sample than its bodies can close by the end of this step of time stepping.
     bool stays_open_in_step(int gap) const;
-    // Return the gaps that stay open while the dofs travel `path_length` from the state of the last call of `advance`, by
+    // Return the gaps that stay open while the dofs travel `path_length` from the state of the last call of `advance`, per
     // gap. The width of these gaps is positive there, although it is not measured.
     const std::vector<char>& open_after(const VecX& path_length);
     // Begin time stepping: all gaps are monitored, except skipped gaps wider than `least`.

@@ -11,13 +11,13 @@
 namespace pn {
 
 struct HandOverParameters {
-    // A jump keeps at least this part of a change in one half of each bisected interval. A smooth function keeps less.
+    // A jump keeps at least this fraction of a change in one half of each bisected interval. A smooth function keeps less.
     double kept_bias_change = 0.3;
     // Longest time [s, or relative to the time above 1 s] in which the change of the acceleration is negligible.
     double steady_time = 1e-12;
     // Time [s, or relative to the time above 1 s] in which features pass each other by more than rounding.
     double passing_time = 1e-13;
-    // Part of the time to a hand-over that is left to the next step, since the acceleration changes meanwhile.
+    // Fraction of the time to a hand-over that is left to the next step, since the acceleration changes meanwhile.
     double left_before = 1e-3;
     // Width [s, or relative to the time above 1 s] of the interval that contains a hand-over. The width is below the spacing
     // of times, so the state after the interval lies at the feature up to rounding.

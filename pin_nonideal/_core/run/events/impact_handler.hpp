@@ -7,7 +7,7 @@
 namespace pn {
 
 struct ImpactHandlerParameters {
-    // Energy gain of an impact that counts as rounding, relative to its works.
+    // Energy gain of an impact that counts as rounding error, relative to its works.
     double gain_rounding = 1e-12;
     // Maximum number of consecutive impacts at one instant. An impact can reverse the separation of other
     // contacts.

@@ -128,7 +128,7 @@ bool ModeChanges::follow_drive() {
     return true;
 }
 
-// A motion that starts smoothly has no acceleration at first. Once the speed is above the rounding of a time step, the
+// A motion that starts smoothly has no acceleration at first. Once the speed is above the rounding error of a time step, the
 // speed shows which elements slip. `before`: modes after the time steps, which record their own events.
 bool ModeChanges::step_with_drive(RunState& before) {
     const double last = progress_.t - progress_.drive_end < progress_.drive_length ? progress_.drive_length : 0.0;

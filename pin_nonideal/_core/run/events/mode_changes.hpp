@@ -15,7 +15,7 @@ struct ModeChangeParameters {
     double max_creep_speed = 1e-8;
     // Length of a tiny step, relative to the time, in seconds below 1 s. Motions over shorter steps are lost in rounding.
     double tiny_step = 1e-10;
-    // Length [s] of the first time step in which a prescribed motion starts, or its part of a fixed step. Further steps
+    // Length [s] of the first time step in which a prescribed motion starts, or its fraction of a fixed step. Further steps
     // are twice as long.
     double drive_step = 1e-7, drive_part = 1e-4;
     int max_drive_steps = 14;  // maximum number of these steps

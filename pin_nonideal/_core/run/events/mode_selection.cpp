@@ -130,7 +130,7 @@ struct FrictionSwitch {
     const std::vector<Mode>& before;
     ModeQuery mode_query;
     int held = -1;  // element that has just reached its limit
-    std::vector<char> rest;  // contacts at rest, by gap
+    std::vector<char> rest;  // contacts at rest, per gap
 
     // `joint_motion`: onset motion of all contacts, if known.
     void find(const OnsetMotion* joint_motion) {
@@ -171,7 +171,7 @@ struct FrictionSwitch {
     }
 };
 
-// Set the velocity to zero if only rounding of it is left.
+// Set the velocity to zero if only rounding error of it is left.
 void rest(System& system, double t) {
     system.v.setZero();
     begin_step(system.p, system.w, t, system.q, system.v);

@@ -12,10 +12,10 @@ struct ReboundParameters {
     // Maximum height of flights that are too low to be integrated, relative to the scene's size.
     double low_flight = 4e-12;
     int max_bounces = 10000;  // number of flights after which the bouncing is judged
-    // The bouncing dies out if the second half of the flights takes less than this part of the time of the first half.
+    // The bouncing dies out if the second half of the flights takes less than this fraction of the time of the first half.
     // With a restitution of 1 it does not die out, and contacts that land later come to rest.
     double max_time_ratio = 0.9;
-    double state_rounding = 1e-15;  // change of the state that is rounding, relative to 1 + the largest entry
+    double state_rounding = 1e-15;  // change of the state that is rounding error, relative to 1 + the largest entry
 };
 
 inline constexpr ReboundParameters rebound_parameters{};

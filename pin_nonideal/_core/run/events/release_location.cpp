@@ -81,7 +81,7 @@ std::optional<FoundEvent> ReleaseLocator::lift_together() {
     return FoundEvent::joint_lift(stepper_.t0 + stepper_.h);
 }
 
-// Return the part of the step at which its interpolant releases the sticking elements. `rate`: their slip acceleration
+// Return the fraction of the step at which its interpolant releases the sticking elements. `rate`: their slip acceleration
 // at the step's end. The search approaches the instant from later times. The search uses secants of the acceleration, which
 // falls to zero toward the instant if limits do not jump, and bisection otherwise.
 double ReleaseLocator::release_part(double rate, const std::vector<Mode>& modes, ModeQuery& mode_query) {

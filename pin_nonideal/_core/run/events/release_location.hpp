@@ -19,7 +19,7 @@ struct ReleaseLocationParameters {
     // Extension of a repeated step that does not show the release of its interpolant. The first extension is relative
     // to the step, and each further one is longer by a factor.
     double min_extension = 1e-11, further_part = 10.0;
-    int places_inside = 8;  // parts of a step at rest, at whose ends sticking elements are checked
+    int places_inside = 8;  // intervals of a step at rest, at whose ends sticking elements are checked
 };
 
 class ReleaseLocator {

@@ -10,7 +10,7 @@ namespace pn {
 
 struct UnloadedContactsParameters {
     // Loads above this multiple of their rounding are compressive beyond doubt. Contacts near each other amplify the
-    // rounding of their loads, by the ratio of the size of the body to their distance.
+    // rounding error of their loads, by the ratio of the size of the body to their distance.
     double surely_pressing = 1e6;
     // Maximum difference of equal accelerations, relative to all accelerations. Bodies that pass an edge between
     // two others have 1e-11 from rounding.

@@ -53,7 +53,7 @@ private:
     double value_inside(int k, double part);
     int direction(int k) const { return k < users() ? events_[k].direction : 0; }
     bool counts(int k) const { return direction(k) == 0 || direction(k) == -side_[k]; }
-    // Return the part of the step at which value k first crosses zero, `beyond` if it does not.
+    // Return the fraction of the step at which value k first crosses zero, `beyond` if it does not.
     double first_crossing(int k);
     void end_step_at(double size);
     void step_onto(int k, double part);

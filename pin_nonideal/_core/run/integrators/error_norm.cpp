@@ -40,7 +40,7 @@ void ErrorNorm::set_tolerances(const VecX& y0, const VecX& y1, double h) {
     limited_ = false;
     const int nv = system_.nv;
     for (int k = 0; k < static_cast<int>(rounding_.size()); ++k) {
-        // Positions integrate the velocities of the stages, which have the rounding of accelerations over the step.
+        // Positions integrate the velocities of the stages, which have the rounding error of accelerations over the step.
         const double rate = rounding_[k] + (k < nv ? std::abs(h) * rounding_[nv + k] : 0.0);
         const double floor = std::abs(h) * rate;
         limited_ |= floor > tolerance_[k];

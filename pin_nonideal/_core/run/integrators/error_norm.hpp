@@ -11,19 +11,18 @@ namespace pn {
 struct ErrorNormParameters {
     // Tolerance of the force of a sticking element over a step, relative to its limit.
     double share_part = 1e-4;
-    // Rounding of the force of a sticking element, relative to the largest given force. A friction limit
-    // in a part of a long chain without large loads may be as small as this rounding.
+    // Rounding error of the force of a sticking element, relative to the largest given force. A friction limit in a part of
+    // a long chain without large loads may be as small as this rounding error.
     double stuck_force_rounding = 64 * std::numeric_limits<double>::epsilon();
     // Shortest step [s] that resolves a load. The error of a load that jumps does not decrease with the step, so
     // shorter steps skip it.
     double min_resolved_step = 1e-9;
-    // Rounding of a velocity, relative to the largest one. A joint that constraints drive slowly beside fast joints has
-    // no digits below it at any step size.
+    // Rounding error of a velocity, relative to the largest one. A joint that constraints drive slowly beside fast joints
+    // has no digits below it at any step size.
     double velocity_rounding = 64 * std::numeric_limits<double>::epsilon();
-    // Residuals below this multiple of the rounding of a projection are no error of a step.
+    // Residuals below this multiple of the rounding error of a projection are no error of a step.
     double residual_spacings = 8.0;
-    // Rounding of the time in a step's stages, in floating-point spacings. This rounding shifts prescribed
-    // motions.
+    // Rounding error of the time in a step's stages, in floating-point spacings. This rounding shifts prescribed motions.
     double time_spacings = 4.0;
     // First step [Hairer, Norsett, Wanner, sec. II.4]. The move of Euler's rule is bounded relative to the size of the
     // state. The error of the method, estimated from the derivatives, is bounded relative to the tolerance.
@@ -46,7 +45,7 @@ public:
     void set_tolerances(const VecX& y0, const VecX& y1, double h);
     // Check if rounding exceeds the tolerances.
     bool is_limited() const { return limited_; }
-    // Raise the rounding of each rate to the size of dy.
+    // Raise the rounding error of each rate to the size of dy.
     void raise(VecX& rounding, const VecX& dy, const VecX& y);
     // Return the root mean square of dy at y, each coordinate relative to its tolerance.
     double operator()(const VecX& dy, const VecX& y);

@@ -27,7 +27,7 @@ struct Method {
 
     // The interpolant has one of two forms:
     // - the cubic through both ends and their rates, plus terms of weights D over all rates, including further stages,
-    // - a polynomial in the part of the step, with coefficients P.
+    // - a polynomial in the fraction of the step, with coefficients P.
     int further_stages = 0, terms = 0, powers = 0;
     const double *A_further = nullptr, *C_further = nullptr, *D = nullptr, *P = nullptr;
 

@@ -28,9 +28,9 @@ RoundingFloor::RoundingFloor(System& system, Stepper& stepper, ErrorNorm& norm, 
     tolerance_factor_ = parameters.sample_factor * std::sqrt(sum) / StepControl::aim(method);
 }
 
-// Measure the rounding of the rates. Changes of the last digits of the state alter the rounding of all operations. Opposite
-// changes of the state give opposite changes of the rates, except for rounding. The second difference of the rates has 1 +
-// 1 + 4 times the variance of the rounding of one rate.
+// Measure the rounding error of the rates. Changes of the last digits of the state alter the rounding error of all
+// operations. Opposite changes of the state give opposite changes of the rates, except for rounding. The second difference
+// of the rates has 1 + 1 + 4 times the variance of the rounding error of one rate.
 void RoundingFloor::measure() {
     const double end = stepper_.t0 + stepper_.h, epsilon = std::numeric_limits<double>::epsilon();
     const RunState kept = system_.w.state;

@@ -1,4 +1,4 @@
-// Lower bound on the tolerances of the step control, since no step has an error below the rounding of accelerations.
+// Lower bound on the tolerances of the step control, since no step has an error below the rounding error of accelerations.
 #pragma once
 
 #include "run/output/checkpoint.hpp"
@@ -11,7 +11,7 @@ struct RoundingFloorParameters {
     // Noise that requires ever shorter steps causes runs of so many steps. In most shorter runs rounding is far below
     // the tolerances, so they omit the measurement.
     long min_measured_steps = 20000, steps_between_measurements = 64;
-    // Safety factor on a measurement, which is only a sample. Part of the previous value that bounds the next one from
+    // Safety factor on a measurement, which is only a sample. Fraction of the previous value that bounds the next one from
     // below.
     double sample_factor = 3.0, lasting_part = 0.5;
     double max_spacings = 16.0;  // maximum change of a state in a sample, in floating-point spacings
@@ -25,7 +25,7 @@ public:
 
     RoundingFloor(System& system, Stepper& stepper, ErrorNorm& norm, Progress& progress, Recording& out);
 
-    // Measure the rounding of the rates at intervals, in runs with many steps. Call it after a step that the error
+    // Measure the rounding error of the rates at intervals, in runs with many steps. Call it after a step that the error
     // control accepts. The workspace is evaluated at the step's end before and after the call. The norm raises the tolerance
     // by the rounding, so that noise alone does not shorten the next step.
     void check_step();
@@ -38,7 +38,7 @@ private:
     ErrorNorm& norm_;
     Progress& progress_;
     Recording& out_;
-    double tolerance_factor_ = 0.0;  // factor from the rounding of a rate to the raised tolerance, per step
+    double tolerance_factor_ = 0.0;  // factor from the rounding error of a rate to the raised tolerance, per step
     VecX change_, probe_, rate_, noise_;
 };
 

@@ -19,8 +19,8 @@ using radau::with_weights;
 
 namespace {
 
-// Error estimate: defect of the polynomial's rate at the start, times this part of the step. For a smooth motion it is
-// a few times the error of the interpolant.
+// Error estimate: defect of the polynomial's rate at the start, times this fraction of the step. For a smooth motion it is a
+// few times the error of the interpolant.
 constexpr double defect_part = 1.0 / (2 * Collocation::stages + 1);
 
 }  // namespace

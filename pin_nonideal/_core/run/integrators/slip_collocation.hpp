@@ -22,8 +22,8 @@ struct CollocationParameters {
     // Convergence, relative to the tolerance: sum of the remaining changes, or the first change alone.
     double solved_part = 0.05, solved_at_once = 0.005;
     double diverging = 0.9, diverging_first = 3.0;  // ratio of two changes at which the iteration stops
-    double rounding_part = 0.5;    // relative to the tolerance: smaller changes that no longer shrink are rounding
-    double perturbation = 1e-6;    // step of a direction for its response: above the root of the rounding
+    double rounding_part = 0.5;    // relative to the tolerance: smaller changes that no longer shrink are rounding error
+    double perturbation = 1e-6;    // step of a direction for its response: above the root of the rounding error
     double rank_threshold = 1e-5;  // relative rank threshold: slip at rest does not determine the turn of its direction
 };
 
@@ -88,13 +88,13 @@ private:
     bool has_warm_start_ = false, converged_ = false;
     double stiffness_ = 0.0, warm_start_size_ = 0.0;
     std::vector<VecX> F_, Y_, next_;  // rates, states and next states of the stages
-    std::vector<VecX> u_, n_;         // slip velocities and directions of all elements, by stage
+    std::vector<VecX> u_, n_;         // slip velocities and directions of all elements, per stage
     std::vector<VecX> turned_;        // change of the accelerations by the last turns
     VecX start_n_, n_before_;
-    MatX sigma_;                      // slip speeds: element by stage
-    std::vector<MatX> A_;             // rows of the slip velocities by stage
+    MatX sigma_;                      // slip speeds, (elements, stages)
+    std::vector<MatX> A_;             // rows of the slip velocities per stage
     MatX G_;                          // da/dn, including the loads that follow n
-    std::vector<MatX> T_, P_, Q_;     // tangents to n, T^T A, G T by stage
+    std::vector<MatX> T_, P_, Q_;     // tangents to n, T^T A, G T per stage
     MatX K_;
     VecX turn_, residual_, error_;
 };

@@ -8,8 +8,8 @@ namespace pn {
 
 namespace {
 
-// Return the rounding of an acceleration at the sine s to a singular position, with pivot = s^2. Unit roundoff grows by
-// 1/s in the position, by 1/s^2 in the velocity after projection, and by 1/s^3 in the solution of the rows.
+// Return the rounding error of an acceleration at the sine s to a singular position, with pivot = s^2. Unit roundoff grows
+// by 1/s in the position, by 1/s^2 in the velocity after projection, and by 1/s^3 in the solution of the rows.
 double rounding_at(double pivot) { return std::numeric_limits<double>::epsilon() / (pivot * std::sqrt(pivot)); }
 
 }  // namespace

@@ -23,7 +23,7 @@ public:
     void move_end(double dt);
     // Repeat the step with another length. Throw a Failure if it is not solved.
     void repeat(double size);
-    // Do the same, then project and evaluate its end.
+    // Repeat the step with another length, then project and evaluate its end.
     void end_at(double size);
     // Follow a step from t that an outside integrator has taken, and evaluate the rates inside.
     void follow(double t, double size, OutsideStep::Interpolant interpolant);

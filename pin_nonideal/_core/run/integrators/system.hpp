@@ -25,7 +25,7 @@ struct System {
     bool on_constraints = false;
     bool can_solve_directions = true;  // steps can solve for slip directions that slow slip does not define
     double smallest_pivot = 1.0;  // smallest pivot of the rows' factor since the last reset
-    double numerical_energy = 0.0;  // energy change by the last projection of a step's end [J], if the ledger is kept
+    double numerical_energy = 0.0;  // energy change due to the last projection of a step's end [J], if the ledger is kept
     const int nq, nv, nz, nw, ne, ng, ns, ny;  // sizes of q, v, z, work, elements, gaps, y without watch, y
     VecX q, v;                         // state read last
     TouchingCache touching;            // touching contacts of the last state

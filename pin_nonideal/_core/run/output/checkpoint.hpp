@@ -18,7 +18,7 @@ struct Progress {
     // Time and state of the workspace's last configuration: the current state, or a sample inside the last step.
     double configured_t = 0.0;
     VecX configured_y;
-    double numerical_energy = 0.0;  // total energy change by projections and by the scheme of time stepping [J]
+    double numerical_energy = 0.0;  // total energy change due to projections and to the scheme of time stepping [J]
     long samples = 0;           // number of samples on the output grid
     long next_period = 0;       // index of the next period of sampled control
     double detected_break = HUGE_VAL;  // time of a break that was detected in a user's time function
@@ -29,14 +29,14 @@ struct Progress {
     int counted_steps = 0;      // accepted steps since `counted_from`, for the detection of stalled steps
     double counted_from = -HUGE_VAL;  // time [s]
     double bridged_time = 0.0, bridged_end = 0.0;  // length and end of the last bridged stretch [s]
-    std::vector<double> slip_at_start;  // slip speed at the step's start, by element
+    std::vector<double> slip_at_start;  // slip speed at the step's start, per element
     std::vector<char> in_tension;  // true for each bilateral contact in tension
     GapState gaps;                      // gaps at the step's start
     double forced_switch_time = -HUGE_VAL;  // time of the last forced mode switch
     double impact_energy = 0.0;         // total work of impacts [J]
     bool several_motions = false;  // several motions are possible, which was recorded
     long stiff_steps = 0, quiet_steps = 0;  // steps near the stability limit, later steps away from it
-    VecX rounding;          // last measured rounding of the rates, scaled to the tolerances that it requires
+    VecX rounding;          // last measured rounding error of the rates, scaled to the tolerances that it requires
     long next_rounding_check = 0;     // step number of the next measurement of rounding
     // Decades of the largest speed: time, value and number of steps when it was reached.
     std::vector<double> growth_times, growth_speeds;

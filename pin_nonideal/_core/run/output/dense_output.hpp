@@ -21,15 +21,15 @@ struct DenseOutput {
     std::vector<double> directions;
     std::vector<std::int8_t> sought;  // whether the step solved for the directions
     std::vector<double> torque;  // torque held over each step, NaN if none, empty if the run holds none
-    std::vector<double> moved;   // total energy change by projections at the end of each step [J]
-    std::vector<double> impacts;  // total energy change by impacts at the start and at the end of each step [J]
+    std::vector<double> moved;   // total energy change due to projections at the end of each step [J]
+    std::vector<double> impacts;  // total energy change due to impacts at the start and at the end of each step [J]
 };
 
 class DenseRecorder {
 public:
     // Number of points in each step, at least the number of coefficients of the interpolant.
     static int points(const Method& method) { return method.outside() ? 13 : 8; }
-    // Return the position of a point, as a part of the step.
+    // Return the position of a point, as a fraction of the step.
     static double part(int point, int points);
 
     DenseRecorder(System& system, Stepper& stepper, bool holds_torque, DenseOutput& out);

@@ -21,9 +21,9 @@ public:
     void now();
     // Record a sample at the end of a step without mode changes, if one is due or `is_needed` is true.
     void end_step(bool is_needed);
-    // Check if a sample is due at the end of a step of time stepping, up to the rounding of the end.
+    // Check if a sample is due at the end of a step of time stepping, up to the rounding error of the end.
     bool is_due(double rounding) const;
-    // Record this sample if it is due. `open_gaps`: gaps that are known to be open, by gap.
+    // Record this sample if it is due. `open_gaps`: gaps that are known to be open, per gap.
     void end_time_step(double rounding, const std::vector<char>* open_gaps);
     // Record samples of the grid inside the step just taken, and one at the time `between`.
     void inside_step(std::optional<double> between);

@@ -66,7 +66,7 @@ struct Recording {
     DenseOutput dense;
     long steps = 0, rejected = 0;
     long limited = 0;       // steps whose rounding exceeded the tolerances
-    double rounding = 0.0;  // largest measured rounding of an acceleration, relative to the largest acceleration
+    double rounding = 0.0;  // largest measured rounding error of an acceleration, relative to the largest acceleration
     std::optional<Failure> failure;
     std::exception_ptr error;  // exception of a user function
 };

@@ -12,8 +12,8 @@ class StepPolynomials {
 public:
     StepPolynomials(const double* states, int points, int size);
 
-    // Compute the state at this part of a step. [Berrut, Trefethen, "Barycentric Lagrange interpolation", SIAM Review
-    // 46 (2004), eq. 4.2, 5.4]
+    // Compute the state at this fraction of a step. [Berrut, Trefethen, "Barycentric Lagrange interpolation", SIAM Review 46
+    // (2004), eq. 4.2, 5.4]
     void at(size_t step, double part, double* out) const;
 
 private:
@@ -24,7 +24,7 @@ private:
 
 // States inside steps, each with the modes, closed contacts and torques of its step.
 struct InsideStates {
-    std::vector<double> t, moved, impacts;  // times, and total energy changes by projections and impacts
+    std::vector<double> t, moved, impacts;  // times, and total energy changes due to projections and impacts
     std::vector<VecX> y, torque;
     std::vector<int> turning;      // elements with slip directions
     std::vector<VecX> directions;  // slip directions of these elements

@@ -1,5 +1,5 @@
-// Edges and rims that approach others in time stepping. Their normals are defined up to a penetration by their rounding, so
-// steps end before.
+// Edges and rims that approach others in time stepping. Their normals are defined up to a penetration of their rounding
+// radius, so steps end earlier.
 #pragma once
 
 #include <vector>
@@ -9,7 +9,7 @@
 namespace pn {
 
 struct ApproachingEdgesParameters {
-    // Maximum penetration of edges and rims with a defined normal, relative to their rounding.
+    // Maximum penetration of edges and rims with a defined normal, relative to their rounding radius.
     double nearly_all = 0.999;
 };
 
@@ -20,9 +20,9 @@ public:
 
     ApproachingEdges(System& system, const GapWatch& watch);
 
-    // Return the longest step from y at t, up to h. Approaching edges and rims may penetrate by half of their rounding.
-    // If they already penetrate, the middle of the step may reach half of the remaining rounding. Deeper edges and rims
-    // have no defined normal, and may pass through each other.
+    // Return the longest step from y at t, up to h. Approaching edges and rims may penetrate by half of their rounding
+    // radius. If they already penetrate, the middle of the step may reach half of the remaining rounding radius. Deeper
+    // edges and rims have no defined normal, and may pass through each other.
     double allowed(double t, double h, const VecX& y);
     // Check if such an edge or rim has lost its normal since the call of `allowed`, at the end y of a step, at t. An impact
     // inside the step may turn a body toward it.
@@ -35,8 +35,8 @@ private:
     const Program& p;
     Workspace& w;
     const GapWatch& watch_;
-    std::vector<double> rounded_by_;  // rounding of each gap
-    bool rounded_ = false;            // a gap has rounding
+    std::vector<double> rounded_by_;  // rounding radius of the edges of each gap
+    bool rounded_ = false;            // a gap has a rounding radius
     std::vector<int> near_;           // gaps of edges and rims with a normal that a step may reach
 };
 

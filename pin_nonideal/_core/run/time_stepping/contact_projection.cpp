@@ -221,7 +221,7 @@ void ContactProjection::meet_rates(const Program& p, Workspace& w, VecX& v) {
     }
 }
 
-// Set velocities of rounding to zero where the rows leave no freedom.
+// Set velocities of the size of rounding errors to zero where the rows leave no freedom.
 void ContactProjection::rest(const Program& p, Workspace& w, VecX& v) {
     for (size_t n = 0; n < least_.problem.nodes.size(); ++n) {
         const BlockNode& node = least_.problem.nodes[n];

@@ -9,8 +9,8 @@
 namespace pn {
 
 struct ContactProjectionParameters {
-    // Past the first moves, an iteration that keeps more than this part of the largest residual has reached rounding,
-    // or rows that contradict each other.
+    // Past the first moves, an iteration that keeps more than this fraction of the largest residual has reached rounding
+    // error, or rows that contradict each other.
     double stall_ratio = 0.5;
     int sure_moves = 1, max_moves = 12;  // first moves, which `stall_ratio` does not judge, and maximum number of moves
     // Maximum height by which the moves may lift all bodies, relative to the largest gap that they close. Rows that nearly
@@ -19,11 +19,11 @@ struct ContactProjectionParameters {
     // Maximum number of choices of closed contacts.
     int max_choices = 4;
     // A contact that departs opens if its rate needs a pull above this multiple of the push of its step. Over an edge of
-    // small rounding the normal turns within a step, and no load holds a body on the edge.
+    // small rounding radius the normal turns within a step, and no load holds a body on the edge.
     double max_pull = 2.0;
 };
 
-// Rounding of the gaps and rates of closed contacts at the end of a step with velocity v.
+// Rounding error of the gaps and rates of closed contacts at the end of a step with velocity v.
 struct ContactRounding {
     double gap, rate;
     ContactRounding(const Program& p, const Workspace& w, const VecX& v);
@@ -39,8 +39,8 @@ public:
     // After a step of length h, project q and v onto the closed contacts and sticking elements of the workspace: gaps
     // close, and v satisfies their rows. Contacts open if other contacts hold their bodies apart. The move penetrates open
     // contacts of the list `near` by at most the travel of the step or the largest gap that closes. A tree that the rows
-    // hold, with a velocity of rounding, comes to rest. Return false if the trees cannot be projected one by one. The
-    // state (q, v) is then undefined.
+    // hold, with a velocity of the size of rounding errors, comes to rest. Return false if the trees cannot be projected one
+    // by one. The state (q, v) is then undefined.
     bool project(const Program& p, Workspace& w, double t, double h, const std::vector<int>& near, VecX& q, VecX& v);
     // Check if motions are prescribed to joints.
     bool has_prescribed() const { return !blocks_.held().empty(); }
@@ -77,17 +77,17 @@ private:
     LeastMove least_;
     std::vector<StepRow> rows_;
     std::vector<ConeElement> elements_;
-    std::vector<int> gap_;  // by row: gap whose residual it closes, -1 for sliding
+    std::vector<int> gap_;  // per row: gap whose residual it closes, -1 for sliding
     VecX r_, move_, q_from_, q_best_, v_best_, q_start_, v_start_;
     std::vector<char> closed_;
-    std::vector<Mat3> responses_;  // own responses of the elements, by element
+    std::vector<Mat3> responses_;  // own responses of the elements, per element
     std::vector<int> departing_;   // elements of contacts that depart
     struct Open {
         int gap;
         double width;  // before the projection, at most 0
     };
     std::vector<Open> open_, penetrating_;  // open contacts, and contacts that the moves let penetrate
-    std::vector<double> width_;             // by row: width that its gap gets
+    std::vector<double> width_;             // per row: width that its gap gets
     double moved_energy_ = 0.0, weight_ = 0.0;
 };
 

@@ -23,8 +23,8 @@ public:
     bool is_rest(double slip, double error = 0.0) const { return slip <= still_ + error; }
     // Check if a slip is so slow that an element stops if its force can hold it.
     bool is_stopped(double slip) const { return slip <= parameters.max_stopped_slip * fastest_; }
-    // Check if a slip misses rest by less than the force misses its limit, each relative to its scale. An element whose
-    // solution satisfies neither condition then sticks.
+    // Check if the slip speed exceeds rest by less than the force exceeds its limit, each relative to its scale. An element
+    // whose solution satisfies neither condition then sticks.
     bool is_nearer_to_rest(double slip, double force, double limit) const {
         return slip * limit <= (limit - force) * fastest_;
     }

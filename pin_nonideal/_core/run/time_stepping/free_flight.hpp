@@ -13,7 +13,7 @@ namespace pn {
 
 struct FreeFlightParameters {
     int max_newton = 20;           // Newton steps for the angular velocity
-    double turn_rounding = 1e-15;  // change that counts as rounding, relative to the angular velocity
+    double turn_rounding = 1e-15;  // change that counts as rounding error, relative to the angular velocity
 };
 
 class FreeFlight {

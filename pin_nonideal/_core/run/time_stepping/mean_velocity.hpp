@@ -8,13 +8,13 @@
 namespace pn {
 
 struct MeanVelocityParameters {
-    // Change of the configuration in a step that counts as rounding [rad, or radius of the tree].
+    // Change of the configuration in a step that counts as rounding error [rad, or radius of the tree].
     double configuration_rounding = 1e-13;
-    // Change by a further sweep below which no sweep follows. Rounding decides if changes near this tolerance exceed it.
-    // The velocity at the step's end then differs by a small part of tolerance / h. Sweeps of contacts cost more.
+    // Change in a sweep below which no sweep follows. Rounding decides if changes near this tolerance exceed it. The
+    // velocity at the step's end then differs by a small part of tolerance / h. Sweeps of contacts cost more.
     double configuration_tolerance = 1e-12, contact_tolerance = 1e-9;
     int max_sweeps = 6;  // maximum number of sweeps of a step
-    // Slip of an element that constraints hold which counts as rounding, relative to the velocities of the step.
+    // Slip of an element held by constraints that counts as rounding error, relative to the velocities of the step.
     double held_rounding = 1e-12;
     // Maximum error of a prediction of the last rate, relative to this rate, for the next rate to be predicted.
     double max_unpredicted = 0.1;
@@ -59,12 +59,12 @@ public:
     const VecX& value() const { return value_; }  // velocity at which the forces are taken
     const VecX& start() const { return start_; }  // velocity of the start, in the axes at the middle of the step
     const VecX& finish() const { return end_; }   // velocity of the end, in these axes
-    // Compute the rates of a block's kept rows at the velocity of the start, and half of their change by turning axes.
+    // Compute the rates of a block's kept rows at the velocity of the start, and half of their change due to turning axes.
     // The rows are evaluated at the mean velocity. The rates are stored in w.scratch.r at the block's rows.
     void start_rates(const Program& p, Workspace& w, int block) const;
     // Check if a friction element has no slip at the velocity of the start, up to rounding.
     bool starts_at_rest(const Program& p, Workspace& w, const Friction& friction) const;
-    // Return the slip over the step's length that counts as rounding, for the acceleration a without friction.
+    // Return the slip, divided by the step's length, that counts as rounding error, for the acceleration a without friction.
     double held_slip(const Program& p, const VecX& a) const;
     // Set the right-hand sides b that satisfy the constraints at the end of the step. The rows are evaluated at the
     // middle of the step, so half of their change over the step remains.
@@ -78,10 +78,10 @@ private:
     double size(const X& x) const { return x.cwiseQuotient(unit_).cwiseAbs().maxCoeff(); }
 
     std::vector<FreeFlyer> flyers_;
-    VecX unit_;  // by dof
+    VecX unit_;  // per dof
     double h_ = 0.0;
     VecX value_, first_, start_, end_, next_;
-    VecX turning_;  // rates of the linear velocities by turning axes
+    VecX turning_;  // rates of the linear velocities due to turning axes
     VecX start_difference_;     // velocity of the start minus mean, plus h/2 of these rates
     int moves_ = 0;  // sweeps after the first one
     bool is_predicted_ = false;

@@ -272,7 +272,7 @@ void Moreau::apply() {
 }
 
 // Elements at rest can share loads in many ways, so that limits which follow the loads need not converge. Solve the step
-// with a part of these limits. Return true if all elements rest and their forces are within the limits that follow.
+// with a fraction of these limits. Return true if all elements rest and their forces are within the limits that follow.
 bool Moreau::rest_within_limits(double t) {
     elements_.reduce_limits();
     if (!forces_.solve(h_, q0_, v0_)) return false;

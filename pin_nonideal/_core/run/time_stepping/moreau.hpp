@@ -1,9 +1,9 @@
 // Step of time stepping at velocity level (Moreau's midpoint rule). With the slip velocities u at the step's end and the
-// percussions P of constraints and P_f of friction and contacts,
+// impulses P of constraints and P_f of friction and contacts,
 //     q_m = q0 + h/2 v0,   M (v1 - v0) = h (F + C)(q_m, (v0 + v1)/2) + A^T P + N^T P_f,   q1 = q_m + h/2 v1,
 //     A v1 + phi_t = 0,
 // and friction opposes u within h times its limit. A contact takes part if its gap is closed at the step's middle. With
-// the rate u_n- of its gap before the step, the restitution e and the percussion (P_n, P_t),
+// the rate u_n- of its gap before the step, the restitution e and the impulse (P_n, P_t),
 //     0 <= P_n,   0 <= u_n + e min(u_n-, 0),   one of them zero,     |P_t| <= mu P_n,
 // and P_t opposes the slip velocity. These laws and the limits of the other friction elements form one cone problem. The
 // scheme has order 2 between events and no creep: sticking elements have zero velocity.
@@ -27,8 +27,8 @@ namespace pn {
 struct MoreauParameters {
     // Maximum number of passes for load-dependent limits.
     int max_load_passes = 60;
-    // Change of limits without closed contacts that counts as rounding if passes no longer reduce it, relative to the
-    // largest force: loads of long chains have more rounding.
+    // Change of limits without closed contacts that counts as rounding error if passes no longer reduce it, relative to the
+    // largest force: loads of long chains have larger rounding errors.
     double stalled_limits = 1e-9;
     double width_rounding = 1e-12;  // uncertainty of a gap at rest, relative to the scene's size
 };
@@ -55,7 +55,7 @@ public:
     // must then project the end onto all rows of the scene. Contacts that depart open in both cases.
     bool project(double t, VecX& y, double& numerical_energy);
 
-    // Return the gaps that are open at the end y of the last step, by gap. Narrow open gaps may be missing.
+    // Return the gaps that are open at the end y of the last step, per gap. Narrow open gaps may be missing.
     const std::vector<char>& open_gaps(const VecX& y);
 
     // Check if the last step was solved tree by tree.
@@ -103,7 +103,7 @@ private:
     std::vector<char> was_closed_, closed_, open_;
     std::vector<Mode> modes_, unloaded_;
     bool had_contacts_ = false;  // the last step had a closed contact or an active element
-    bool has_unknown_percussions_ = true;  // other rows than these may have percussions
+    bool has_unknown_percussions_ = true;  // other rows than these may have impulses
     std::vector<StepRow> rows_of_percussions_;
     std::vector<int> loaded_;  // blocks of the contacts with a load before the step, ascending
     bool repeats_ = false;     // the next step is another attempt

@@ -20,7 +20,7 @@ public:
     // Solve the laws for the forces f, from a guess. The limits of an element without a cone bound its force about
     // `middle`. Return the largest error of an element, relative to its forces.
     double solve(const std::vector<ConeElement>& cones, const VecX& middle, VecX& f);
-    // Change the forces f of the last call of `solve` where others hold trees at rest that move.
+    // Change the forces f of the last call of `solve` if other forces hold moving trees at rest.
     void hold(const VecX& middle, VecX& f);
     // Compute the acceleration a and the rows w under the forces f. `middle` as in `solve`.
     void move(const VecX& middle, const VecX& f, VecX& a, VecX& w);
@@ -29,7 +29,7 @@ public:
                          VecX& lam);
     // Set the velocity v1 of trees to zero that were at rest, v0 = 0, and whose forces cancel over the step h.
     void keep_rest(double h, const VecX& v0, VecX& v1);
-    // Check if the accelerations a of the trees under the forces of the last motion are rounding.
+    // Check if the accelerations a of the trees under the forces of the last motion are rounding error.
     bool rests(const VecX& a);
     // Element with the largest error of the laws, and this error as a velocity.
     const BlockSolver::Miss& miss() const { return solver_.miss(); }
@@ -47,7 +47,7 @@ private:
     VecX force_, rows_, change_, inertia_;  // in `add_multipliers`
     VecX f_moved_;           // forces of the last motion
     bool is_moved_ = false;  // the motion of f_moved_ is known
-    std::vector<double> balanced_;  // by node: largest acceleration that forces cancel
+    std::vector<double> balanced_;  // per node: largest acceleration that forces cancel
 };
 
 }  // namespace pn

@@ -15,11 +15,11 @@
 namespace pn {
 
 struct StepElementsParameters {
-    double load_tolerance = 1e-12;  // change of limits that counts as rounding, relative to the largest limit
+    double load_tolerance = 1e-12;  // change of limits that counts as rounding error, relative to the largest limit
     // Maximum ratio of successive changes of limits in convergent passes. Larger ratios occur if the cones do not determine
     // a force component, such as the direction of slow slip.
     double max_load_contraction = 0.5;
-    // Part of the limits that elements at rest use if their limits do not converge.
+    // Fraction of the limits that elements at rest use if their limits do not converge.
     double kept_limit = 0.9;
 };
 
@@ -40,8 +40,8 @@ public:
     };
 
     std::vector<StepRow> rows;
-    std::vector<Part> parts;         // by element
-    std::vector<ConeElement> cones;  // by element
+    std::vector<Part> parts;         // per element
+    std::vector<ConeElement> cones;  // per element
 
     explicit StepElements(const Program& p);
 
@@ -76,7 +76,7 @@ public:
     bool give_way(const Program& p, const Workspace& w, const VecX& f, const VecX& slips, double clear, double still);
     // Return the force that is left to the limit of an element with forces f from row `at` on.
     double limit_left(size_t e, int at, const VecX& f) const;
-    // Reduce the limits of dry friction to a part of them.
+    // Reduce the limits of dry friction to a fraction of their values.
     void reduce_limits();
     // Set the limits of dry friction to the loads of the current motion. Return true if the forces f are within them.
     bool limits_hold(const Program& p, Workspace& w, double t, const MeanVelocity& mean, const VecX& f);

@@ -68,7 +68,7 @@ void StepForces::drop_prevented_slip() {
     SharedFriction::drop_prevented_slip(W, rows, free_rows_);
 }
 
-// Remove friction from elements that the constraints alone hold. The rounding of their slip has no sign.
+// Remove friction from elements that the constraints alone hold. The rounding error of their slip has no sign.
 void StepForces::unload_held(const MeanVelocity& mean, const VecX& a_free) {
     const auto W = responses_.matrix(static_cast<int>(elements_.rows.size()));
     if (W.diagonal().all()) return;
@@ -116,8 +116,8 @@ double acceleration_of_bodies(const Mechanism& m, const Terms& terms, const Bloc
 
 }  // namespace
 
-// Half of the change of a row's rate in a step at zero acceleration of the joints, over the step. At edges of small
-// rounding the directions turn far within a step. The rate is not linear in the step then, and the direction at the
+// Half of the change of a row's rate in a step at zero acceleration of the joints, divided by the step. At edges of small
+// rounding radius the directions turn far within a step. The rate is not linear in the step then, and the direction at the
 // middle of the step serves for the whole step.
 double StepForces::turning_rate(const StepRow& row, double h) const {
     const Block& block = p.blocks[row.block];
@@ -131,7 +131,7 @@ double StepForces::turning_rate(const StepRow& row, double h) const {
     return 0.5 * h * std::abs(turn) <= bound ? 0.5 * bias : 0.0;
 }
 
-// Compute the velocities at the step's end without the forces, over h.
+// Compute the velocities at the step's end without the forces, divided by h.
 void StepForces::measure_free(const MeanVelocity& mean, double h, const VecX& a_free) {
     const auto& rows = elements_.rows;
     const auto& parts = elements_.parts;
@@ -204,7 +204,7 @@ bool StepForces::has_few_boxes() const {
            static_cast<int>(elements_.rows.size()) <= parameters.max_boxes_with_responses;
 }
 
-// Solve a problem of boxes, which is convex, for forces from their middles. The rows without forces are in end_rows.
+// Solve a convex problem of boxes for the forces minus the middles of their limits. The rows without forces are in end_rows.
 bool StepForces::solve_boxes() {
     const int n = static_cast<int>(elements_.rows.size());
     box_rows_ = end_rows.head(n);

@@ -28,7 +28,7 @@ struct StepForcesParameters {
     double limit_rounding = 1e-9;
     // Rows at the step's end that count as rest, relative to the rows without the forces.
     double rest_rounding = 1e-9;
-    // Rounding of the rows without forces, relative to the largest acceleration. Smaller rows show no residual.
+    // Rounding error of the rows without forces, relative to the largest acceleration. Smaller rows show no residual.
     double row_rounding = 1e-12;
     // Accepted residual relative to the velocities, and accepted error of a limit relative to the forces. A step of a
     // turning body can have no exact solution if corners share its load. The statistics report both.
@@ -40,8 +40,8 @@ public:
     using Parameters = StepForcesParameters;
     static constexpr Parameters parameters{};
 
-    VecX f;         // force of each row, the percussion over the step's length
-    VecX end_rows;  // rows at the step's end under the forces, over the step's length
+    VecX f;         // force of each row: its impulse divided by the step's length
+    VecX end_rows;  // rows at the step's end under the forces, divided by the step's length
 
     StepForces(const Program& p, Workspace& w, const StepElements& elements);
 
@@ -64,7 +64,7 @@ public:
     double response(int row) const { return responses_.diagonal(row); }
     // Error of the rows at, ..., at + dim - 1 of an element at the step's end, if the forces satisfy the laws.
     double row_error(int at, int dim) const;
-    // Return the rate of rows at the step's end that counts as rest, over the step's length.
+    // Return the rate of rows at the step's end that counts as rest, divided by the step's length.
     double rest_of_rows() const;
     // Errors of the laws for the forces.
     ConeResiduals residuals();
@@ -123,7 +123,7 @@ private:
     BoxProgram box_;
     LawMiss law_miss_;
     VecX free_rows_, offset_, middle_, guess_, best_f_, a_;
-    VecX centered_;           // forces from the middles of their limits
+    VecX centered_;           // forces minus the middles of their limits
     VecX box_rows_, bounds_;  // rows without forces and limits of a problem of boxes
 };
 

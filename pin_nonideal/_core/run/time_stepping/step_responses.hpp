@@ -18,9 +18,9 @@ public:
     // Response of the first n rows to the forces of these rows. Rows that the constraints hold do not respond.
     auto matrix(int n) const { return W_.topLeftCorner(n, n); }
     double diagonal(int row) const { return W_(row, row); }
-    // Add the acceleration by the first n forces.
+    // Add to `a` the acceleration due to the first n forces.
     void add_motion(const Program& p, Workspace& w, const VecX& f, int n, VecX& a);
-    // Add the multipliers of the constraints by the first n forces.
+    // Add to `lam` the multipliers of the constraints due to the first n forces.
     void add_multipliers(const VecX& f, int n, VecX& lam) const;
 
 private:

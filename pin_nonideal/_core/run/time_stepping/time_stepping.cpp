@@ -138,7 +138,7 @@ void TimeStepping::take(double end, double t_end) {
     progress_.is_stationary = progress_.y.head(system_.ns) == y_from_;
 }
 
-// Remove the rounding from a motion held at rest. Law states continue.
+// Remove the rounding error from a motion held at rest. Law states continue.
 void TimeStepping::stay_at_rest() {
     VecX& y = progress_.y;
     y.head(system_.nq + system_.nv) = y_from_.head(system_.nq + system_.nv);
