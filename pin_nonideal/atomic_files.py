@@ -27,7 +27,7 @@ def file_path(what: str, value: object) -> Path:
         value: the argument.
 
     Raises:
-        InputError: the argument is no path, or is empty.
+        InputError: the argument is not a path, or is empty.
     """
     if not isinstance(value, (str, os.PathLike)) or not isinstance(os.fspath(value), str):
         raise InputError(f"{what} must be the name of a file; got {short_repr(value)}")
@@ -47,7 +47,7 @@ def check_writable(path: Path, what: str) -> None:
 
     Args:
         path: the file.
-        what: words for messages.
+        what: name of the argument in messages.
 
     Raises:
         OutputError: the folder does not exist or cannot be written, or `path` is a folder, device or pipe.
@@ -74,7 +74,7 @@ def whole_file(path: Path, what: str) -> Iterator[IO[bytes]]:
 
     Args:
         path: the file; an existing file stays until the new one is complete.
-        what: words for messages.
+        what: name of the argument in messages.
 
     Raises:
         OutputError: the folder does not exist or cannot be written, or `path` is a folder, device or pipe.
@@ -112,7 +112,7 @@ def mode_of(path: Path, what: str) -> int:
 
     Args:
         path: the file, or a symbolic link to it.
-        what: words for messages.
+        what: name of the argument in messages.
 
     Raises:
         OutputError: the path is a device, a pipe or a socket, or its links form a cycle.

@@ -1,7 +1,7 @@
 """The explicit equation of motion, Eq. (40), on plain arrays.
 
 A system has mass matrix M, given force F and constraints A a = b, whose rows may be redundant. On every
-virtual displacement w (A w = 0), the force of constraint F_c does the prescribed work w^T F_c = w^T C,
+virtual displacement w (A w = 0), the constraint force F_c does the prescribed work w^T F_c = w^T C,
 Eq. (9). Then
 
     M a = F + F_ideal + F_nonideal                                             Eq. (40)
@@ -47,7 +47,7 @@ SYMMETRY_TOLERANCE = 1e-10
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Acceleration and forces of constraint at one instant.
+    """Acceleration and constraint forces at one instant.
 
     The multipliers belong to the total motion, M a = F + C + A^T lam, so that
     A^T lam = F_ideal + F_nonideal - C. For redundant rows the multipliers are not unique: `lam` has minimum
@@ -55,8 +55,8 @@ class Solution:
 
     Attributes:
         a: acceleration, (n,).
-        F_ideal: ideal part of the force of constraint, (n,), Eq. (39).
-        F_nonideal: nonideal part of the force of constraint, (n,), Eq. (39).
+        F_ideal: ideal part of the constraint force, (n,), Eq. (39).
+        F_nonideal: nonideal part of the constraint force, (n,), Eq. (39).
         lam: multipliers of the rows of A, (m,); a pair of shapes in a scene has one, the sum of the normal
             forces at its points.
         rank: number of independent rows of A, the paper's k.
@@ -92,7 +92,7 @@ def solve(
     b: ArrayLike | None = None,
     C: ArrayLike | None = None,
 ) -> Solution:
-    """Compute the acceleration and the forces of constraint by Eq. (40).
+    """Compute the acceleration and the constraint forces by Eq. (40).
 
     Units follow from the coordinates: for a joint angle, F in N m and M in kg m^2; for a length, N and kg.
 
@@ -101,7 +101,7 @@ def solve(
         F: given force, (n,).
         A: constraint rows, (m, n); redundant, zero and repeated rows are allowed.
         b: right-hand side of A a = b, (m,).
-        C: force that prescribes the work of the force of constraint on virtual displacements, (n,), Eq. (9);
+        C: force that prescribes the work of the constraint force on virtual displacements, (n,), Eq. (9);
             None for ideal constraints.
 
     Returns:

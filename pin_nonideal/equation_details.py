@@ -36,8 +36,8 @@ class SolutionDetails:
             columns as long as they are orthonormal.
         J: inverse of B^T B + V V^T, (n, n), Eqs. (21), (33).
         B_pinv: Moore-Penrose inverse of B, equal to J B^T, (n, m), Eqs. (41)-(46).
-        F_ideal: ideal part of the force of constraint, (n,), Eq. (39).
-        F_nonideal: nonideal part of the force of constraint, (n,), Eq. (39).
+        F_ideal: ideal part of the constraint force, (n,), Eq. (39).
+        F_nonideal: nonideal part of the constraint force, (n,), Eq. (39).
         a: acceleration, (n,), Eq. (40).
         lam: multipliers of the rows of A, (m,), as in `Solution`.
         rank: number of independent rows of A, the paper's k.
@@ -74,7 +74,7 @@ def solve_details(
         F: given force, (n,).
         A: constraint rows, (m, n); redundant, zero and repeated rows are allowed.
         b: right-hand side of A a = b, (m,).
-        C: force that prescribes the work of the force of constraint on virtual displacements, (n,), Eq. (9);
+        C: force that prescribes the work of the constraint force on virtual displacements, (n,), Eq. (9);
             None for ideal constraints.
 
     Returns:

@@ -55,7 +55,7 @@ def number(what: str, value: object) -> float:
     """Return a finite real number as a float.
 
     Raises:
-        InputError: `value` is no real number, or NaN, or infinite.
+        InputError: `value` is not a real number, or NaN, or infinite.
     """
     if type(value) is float and math.isfinite(value):
         return value
@@ -94,7 +94,7 @@ def positive(what: str, value: object) -> float:
 
 
 # Bounds of relative tolerances: no step satisfies a tolerance below rounding, and an error of more than a
-# tenth of a coordinate is no approximation.
+# tenth of a coordinate is not an approximation.
 MIN_RTOL, MAX_RTOL = 1e-14, 0.1
 
 
@@ -102,7 +102,7 @@ def relative_tolerance(what: str, value: object) -> float:
     """Return a relative tolerance within its bounds, or 0.
 
     Raises:
-        InputError: `value` is no number, or outside the bounds.
+        InputError: `value` is not a number, or outside the bounds.
     """
     relative = nonnegative(what, value)
     if relative and not MIN_RTOL <= relative <= MAX_RTOL:
@@ -117,7 +117,7 @@ def fraction(what: str, value: object) -> float:
     """Return a number from 0 to 1.
 
     Raises:
-        InputError: `value` is no number from 0 to 1.
+        InputError: `value` is not a number from 0 to 1.
     """
     result = nonnegative(what, value)
     if result > 1.0:
@@ -129,7 +129,7 @@ def flag(what: str, value: object) -> bool:
     """Return True or False.
 
     Raises:
-        InputError: `value` is no bool.
+        InputError: `value` is not a bool.
     """
     if not isinstance(value, (bool, np.bool_)):
         raise InputError(f"{what} must be True or False; got {short_repr(value)}")
@@ -140,7 +140,7 @@ def count(what: str, value: object, *, min_value: int = 0, max_value: int = 1_00
     """Return an integer from `min_value` to `max_value`.
 
     Raises:
-        InputError: `value` is no integer, too small or too large.
+        InputError: `value` is not an integer, too small or too large.
     """
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
         raise InputError(f"{what} must be an integer; got {short_repr(value)}")
@@ -155,7 +155,7 @@ def text(what: str, value: object) -> str:
     """Return a name, which is a nonempty string.
 
     Raises:
-        InputError: `value` is no string, or empty.
+        InputError: `value` is not a string, or empty.
     """
     if not isinstance(value, str):
         raise InputError(f"{what} must be a name (a string); got {short_repr(value)}")
@@ -197,7 +197,7 @@ def sequence(what: str, value: object) -> tuple[Any, ...]:
     """Return a list or tuple as a tuple.
 
     Raises:
-        InputError: `value` is no list or tuple, for example a single description.
+        InputError: `value` is not a list or tuple, for example a single description.
     """
     if not isinstance(value, (list, tuple)):
         raise InputError(f"{what} must be a list; got {short_repr(value)}")
@@ -217,7 +217,7 @@ def floats(
             value = np.ma.filled(value.astype(float), np.nan)
         source = np.asarray(value)
         result = np.array(source, dtype=float, copy=copy or None) if source.dtype.kind in kinds else None
-    except (TypeError, ValueError):  # rows of unequal length, or objects that are no numbers
+    except (TypeError, ValueError):  # rows of unequal length, or objects that are not numbers
         result = None
     if result is None or (result.size <= MAX_PYTHON_SUM and math.isfinite(sum(result.ravel().tolist()))):
         return result, None
@@ -230,7 +230,7 @@ def array(what: str, value: object, shape: Sequence[int | None], copy: bool = Tr
     """Return a finite array of the given shape, copied and read-only.
 
     Args:
-        what: words for messages.
+        what: name of the argument in messages.
         value: any value that NumPy converts to an array of floats.
         shape: expected shape; None accepts any length.
         copy: whether to copy the array; False for large arrays that are read during the call only.
@@ -261,7 +261,7 @@ def function(what: str, value: object, signature: str) -> Callable[..., Any]:
     """Return `value` if it is callable.
 
     Args:
-        what: words for messages.
+        what: name of the argument in messages.
         value: the argument.
         signature: expected signature, shown in the message.
 
@@ -278,7 +278,7 @@ def unit_axis(what: str, value: object) -> Vector3:
     """Return an axis as a unit vector.
 
     Args:
-        what: words for messages.
+        what: name of the argument in messages.
         value: "x", "y", "z", or three numbers of any nonzero length.
 
     Raises:

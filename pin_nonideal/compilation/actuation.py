@@ -234,7 +234,7 @@ def _require_vectors(model: Model, kp: Array, who: str) -> None:
         part = kp[place.v_first : place.v_first + place.nv]
         if place.nq != place.nv and place.nv > 1 and (part != 0.0).any():
             raise InputError(
-                f'{who} must be zero on joint "{place.name}", whose configuration is no vector; '
+                f'{who} must be zero on joint "{place.name}", whose configuration is not a vector; '
                 "drive it by a function or by a TrackTrajectory"
             )
 

@@ -93,7 +93,7 @@ def numbers_of(part: object, shape: tuple[int, ...], who: str) -> Array:
         who: prefix of error messages.
 
     Raises:
-        UserFunctionError: the result is no finite array of this size.
+        UserFunctionError: the result is not a finite array of this size.
     """
     result, where = floats(part, "fiubOUS")  # any kind that float() accepts
     if result is None:
@@ -161,7 +161,7 @@ def breaks(function: object, who: str) -> list[float]:
         who: prefix of error messages.
 
     Raises:
-        InputError: the attribute is no ascending sequence of times.
+        InputError: the attribute is not an ascending sequence of times.
     """
     attribute = getattr(function, "breaks", None)
     if attribute is None or isinstance(function, Spline):

@@ -71,7 +71,7 @@ class Groups:
         """Check if any entry of each group is true.
 
         Args:
-            values: values by entry.
+            values: values of the entries.
             axis: axis of the entries.
         """
         return values if self.single else np.logical_or.reduceat(values, self.starts, axis)
@@ -80,7 +80,7 @@ class Groups:
         """Compute the sum over the entries of each group.
 
         Args:
-            values: values by entry.
+            values: values of the entries.
             axis: axis of the entries.
         """
         return values if self.single else np.add.reduceat(values, self.starts, axis)
@@ -89,7 +89,7 @@ class Groups:
         """Return the least value of each group.
 
         Args:
-            values: values by entry.
+            values: values of the entries.
             axis: axis of the entries.
         """
         return values if self.single else np.minimum.reduceat(values, self.starts, axis)

@@ -52,13 +52,13 @@ class FrictionSite(NamedTuple):
         part: name of this part of the law; empty if the law has one part.
         dof: first degree of freedom of the slip directions, or -1.
         dofs: number of these degrees of freedom.
-        block: core block of the slip directions if they are no degrees of freedom, else -1.
+        block: core block of the slip directions if they are not degrees of freedom, else -1.
         joint: joint that carries the load, or -1.
         anchor: core block of the constraint that carries the load, or -1.
         row: row of the anchor whose multiplier is the load.
         axis: bearing axis, in the joint's frame or in frame 1 of the anchor.
         axis_dof: degree of freedom whose axis is the bearing axis, if no frame carries it; else -1.
-        mu: limit over load; None for the coefficient of the law.
+        mu: ratio of limit to load; None for the coefficient of the law.
         lever: lever arm of a turning element [m]: torque over friction force, and sliding speed over rate.
     """
 
@@ -77,7 +77,7 @@ class FrictionSite(NamedTuple):
 
 
 def friction_joint(name: str, who: str, context: LoweringContext, *, freedoms: tuple[int, ...] = (1,)) -> int:
-    """Return the index of a movable joint that is no mimic joint, for a friction law.
+    """Return the index of a movable joint that is not a mimic joint, for a friction law.
 
     Args:
         name: name of the joint.

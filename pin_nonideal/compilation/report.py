@@ -88,7 +88,7 @@ def _skipped_parts(scene: CompiledScene) -> list[str]:
 
 
 def _joints_without_stops(scene: CompiledScene) -> list[int]:
-    """Return the joints with position limits that are no stops of the scene."""
+    """Return the joints with position limits that are not stops of the scene."""
     stops = {c.joint for c in scene.spec.contacts if isinstance(c, JointLimit)}
     model = scene.model
     return [

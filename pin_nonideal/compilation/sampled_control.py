@@ -72,7 +72,7 @@ def sampled_torque(u: SampledControl, model: Model) -> Callable[..., object]:
 
 
 def _other_torque(tau: Array, others: Mask, model: Model) -> str:
-    """Return words on the first torque of a joint that a control does not command."""
+    """Return a text about the first torque of a joint that a control does not command."""
     dof = int(np.flatnonzero(others & (tau != 0.0))[0])
     name = next(p.name for p in joint_places(model) if p.v_first <= dof < p.v_first + p.nv)
     return f'no torque for joints that are not in joints; got {tau[dof]:g} for "{name}"; add it to joints'

@@ -231,7 +231,7 @@ def checked_gain(what: str, value: object) -> float | Array | dict[str, Array]:
     """Return a number, an array or a table by joint name of numbers that are not negative.
 
     Args:
-        what: words for messages.
+        what: name of the argument in messages.
         value: the argument.
 
     Raises:
@@ -275,7 +275,7 @@ def checked_samples(what: str, values: object, count: int) -> Array | dict[str, 
     """Return samples of all joints, (nt, n), or by joint name, (nt,) or (nt, n) for each joint.
 
     Args:
-        what: words for messages.
+        what: name of the argument in messages.
         values: the argument: an array, a dict or a pandas DataFrame.
         count: nt.
 

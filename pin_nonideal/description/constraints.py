@@ -305,8 +305,8 @@ class Rolling:
         axis: axis of the disk in the frame; None for a sphere.
         plane: name of a frame with origin in the plane (its body may move); None for the world's origin.
         normal: normal of the plane, in the axes of the plane's frame.
-        torsional: torque against spinning over normal force [m].
-        rolling: torque against rolling over normal force [m], the lever arm of rolling resistance.
+        torsional: ratio of the torque against spinning to the normal force [m].
+        rolling: ratio of the torque against rolling to the normal force [m], a lever arm.
         name: used in messages and results.
     """
 

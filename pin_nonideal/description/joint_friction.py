@@ -73,14 +73,14 @@ class JointFriction:
         axial_radius: mean friction radius of the axial load [m].
         span: lever arm at which the moment loads the bearing [m]: half the distance between two bearings.
         preload: dry friction of a preloaded bearing, present without load [N m or N].
-        static_ratio: static over kinetic friction, at least 1.
+        static_ratio: ratio of static to kinetic friction, at least 1.
         stribeck_velocity: velocity scale of the decrease from static to kinetic friction [rad/s or m/s].
         viscous: viscous coefficient [N m s/rad or N s/m].
         reaction: "total" solves the implicit equation for the reaction with friction; "ideal" evaluates the
             law on the ideal reaction, as in the paper's Example (c).
         lead_angle: lead angle of the thread of a coupling [rad], between 0 and pi/2; with `mu`.
         pressure_angle: flank angle of the thread in its normal section [rad]: 0 for a square thread.
-        efficiency: power at joint1 over power at joint2 while joint2 drives, between 0 and 1.
+        efficiency: ratio of the power at joint1 to the power at joint2 while joint2 drives, between 0 and 1.
         efficiency_back: power at joint2 over power at joint1 while joint1 drives, below 1; zero or negative
             if joint1 cannot drive. None: equal to `efficiency`, as for a gear mesh.
         name: used in messages and results.

@@ -185,7 +185,7 @@ class UserFriction:
         direction: (t, q) -> row, shape (nv,).
         limit: (t, q, v, reactions) -> kinetic friction force, not negative: one number, or two numbers
             against forward slip (along `direction`) and backward slip.
-        static_ratio: static over kinetic friction, at least 1.
+        static_ratio: ratio of static to kinetic friction, at least 1.
         name: used in messages and results.
     """
 

@@ -157,7 +157,7 @@ def constant(value: float) -> Constant:
         The function t -> (value, rate, acceleration).
 
     Raises:
-        InputError: `value` is no finite number.
+        InputError: `value` is not a finite number.
     """
     return Constant(value)
 
@@ -175,7 +175,7 @@ def sinusoid(amplitude: float, omega: float, phase: float = 0.0, offset: float =
         The function t -> (value, rate, acceleration).
 
     Raises:
-        InputError: an argument is no finite number.
+        InputError: an argument is not a finite number.
     """
     return Sinusoid(amplitude, omega, phase, offset)
 
@@ -190,7 +190,7 @@ def polynomial(coefficients: Sequence[float]) -> Polynomial:
         The function t -> (value, rate, acceleration).
 
     Raises:
-        InputError: there is no coefficient, or a coefficient is no finite number.
+        InputError: there is no coefficient, or a coefficient is not a finite number.
     """
     return Polynomial(coefficients)  # type: ignore[arg-type]
 

@@ -83,7 +83,7 @@ def placement(what: str, place: Placement | ArrayLike | None) -> Placement:
     """Return a pose or a position as a pinocchio.SE3.
 
     Args:
-        what: words for messages.
+        what: name of the argument in messages.
         place: pinocchio.SE3, position (3,) or None.
 
     Raises:
@@ -101,7 +101,7 @@ def shape_color(what: str, color: ArrayLike | None) -> Array | None:
     """Return red, green, blue and opacity, (4,), or None.
 
     Args:
-        what: words for messages.
+        what: name of the argument in messages.
         color: three or four numbers from 0 to 1, or None.
 
     Raises:

@@ -58,8 +58,8 @@ class GeometryContact:
         geometry2: name of a geometry object on another body, or a pinocchio.GeometryObject on the world that
             need not be in the collision model, such as `ground()`.
         mu: kinetic coefficient of friction.
-        static_ratio: static over kinetic friction, at least 1.
-        restitution: opening rate of the gap after an impact over its closing rate before, 0 to 1.
+        static_ratio: ratio of static to kinetic friction, at least 1.
+        restitution: ratio of the opening rate of the gap after an impact to its closing rate before, 0 to 1.
         name: name in messages and results, by default "SHAPE on OTHER".
         rounding: radius of rounded edges [m], for boxes and convex meshes against each other and against
             cylinders or cones. The same length rounds the rims of two cylinders or cones, and is the inset of
@@ -117,7 +117,7 @@ def geometry_contacts(
         adjacent: whether the shapes of two bodies with a common joint may touch. The shapes of most robots
             overlap at their joints; an SRDF file disables these pairs by name.
         mu: kinetic coefficient of friction of all contacts.
-        static_ratio: static over kinetic friction of all contacts, at least 1.
+        static_ratio: ratio of static to kinetic friction of all contacts, at least 1.
         restitution: coefficient of restitution of all contacts, 0 to 1.
 
     Returns:
@@ -258,7 +258,7 @@ def _shapes_of_links(
 
 
 def _shaped(link: str, model: Model, carriers: Sequence[set[str]]) -> str:
-    """Return words on the links with shapes that move with a link, or on links of similar names."""
+    """Return a text about the links with shapes that move with a link, or about links of similar names."""
     own_frames = [frame for frame in model.frames if frame.name == link]
     joint = str(model.names[own_frames[0].parentJoint]) if own_frames else link
     own = sorted(set().union(*(names for names in carriers if joint in names)) - {joint})

@@ -136,7 +136,7 @@ def _corners(what: str, mesh: CollisionGeometry, scale: Array) -> Array:
     """Return the corners of a convex mesh.
 
     Raises:
-        InputError: the shape is no mesh, or is not convex.
+        InputError: the shape is not a mesh, or is not convex.
     """
     kind = type(mesh).__name__
     if kind.startswith("Convex"):

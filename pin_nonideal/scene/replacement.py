@@ -45,7 +45,7 @@ def parts_after(
         remove: names of descriptions to leave out.
 
     Raises:
-        InputError: a list is no list of descriptions.
+        InputError: an argument is not a list of descriptions.
         UnknownNameError: there is no description of a name in `remove`.
     """
     spec = compiled.spec
@@ -91,7 +91,7 @@ def parts_of_replacement(
         others: new actuation, or UNCHANGED; new "q0", "v0" and "name", or None for the present ones.
 
     Raises:
-        InputError: a list is no list of descriptions, or a state does not fit the model.
+        InputError: an argument is not a list of descriptions, or a state does not fit the model.
         UnknownNameError: there is no description of a name in `remove`.
     """
     arguments = parts["made"] | parts_after(compiled, lists, added, remove)

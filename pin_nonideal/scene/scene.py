@@ -352,7 +352,7 @@ def require_scene(who: str, scene: object) -> None:
         scene: the argument.
 
     Raises:
-        InputError: it is no Scene; the message states how a name or a model becomes a scene.
+        InputError: the argument is not a Scene; the message states how a name or a model becomes a scene.
     """
     if isinstance(scene, Scene):
         return

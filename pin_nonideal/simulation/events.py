@@ -26,7 +26,7 @@ class RunRequests(NamedTuple):
     Attributes:
         watched: functions with direction and terminal count, in the form of the core.
         names: unique names of the functions.
-        separate: whether events are no samples of the trajectory.
+        separate: whether events are not samples of the trajectory.
     """
 
     watched: list[Watched]

@@ -167,7 +167,7 @@ def _states_of_runs(values: object, size: int, one: Callable[[State, str], Array
         values: array (n, size), a table of columns (n,) or (n, k) by joint name, or a list of n tables.
         size: nq or nv.
         one: function that returns one state from a table by joint name.
-        what: words for messages.
+        what: name of the argument in messages.
 
     Raises:
         InputError: a shape does not fit, or a number is not finite.

@@ -81,7 +81,7 @@ def simulate(
         events: functions (t, q, v) -> number whose zeros are events, as in SciPy's solve_ivp. A function may
             have the attributes `terminal` (True, or the number of events that ends the run) and `direction`
             (positive for rising zeros only, negative for falling ones). A step ends at each event, with the
-            accuracy of the step. A zero at the start is no event. `run.user_events` holds the events.
+            accuracy of the step. A zero at the start is not an event. `run.user_events` holds the events.
             "separate", alone or in the list, keeps all events out of the samples, which then lie exactly on
             the grid.
         callback: function called as callback(t, q, v) before every step. True ends the run, torques (nv,)

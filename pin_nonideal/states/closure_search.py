@@ -109,7 +109,7 @@ class ClosureSearch:
         selected: NDArray[np.bool_],
         free: NDArray[np.bool_],
     ) -> Rows:
-        """Return the wanted rows of free coordinates over their scales, without duplicate and zero rows."""
+        """Return the rows of free coordinates divided by their scales, without duplicate and zero rows."""
         zero, generator = np.zeros(self.model.nv), np.random.default_rng(1)
         moves = [unit * generator.standard_normal(self.model.nv) for _ in range(3)]
         samples = [self._sample(q, move) for move in moves]

@@ -31,7 +31,7 @@ class UnilateralClosure(Search):
     """Search for closures around a configuration without penetration.
 
     Args:
-        gaps: q -> (G, gap) of the unilateral contacts over their row scales, (k, nv) and (k,).
+        gaps: q -> (G, gap) of the unilateral contacts divided by their row scales, (k, nv) and (k,).
         arguments: arguments of `Search`.
     """
 

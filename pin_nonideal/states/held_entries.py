@@ -16,7 +16,7 @@ from .joint_layout import JointPlace, joint_places
 from .rows import MIN_SINGULAR_VALUE, minimum_norm, row_lengths, rows_at
 from .scales import coordinate
 
-# Tolerance of row rates over their greatest lengths, relative to the scale of the velocities.
+# Tolerance of row rates divided by their greatest lengths, relative to the scale of the velocities.
 RATE_TOL = 1e-9
 # Rounding of a projection, relative to the largest velocity or to the unit of a coordinate.
 ROUNDING = 1e-12

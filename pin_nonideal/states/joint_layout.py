@@ -87,7 +87,7 @@ def configuration(
     Args:
         model: pinocchio.Model.
         q: configuration, (nq,).
-        what: words for messages.
+        what: name of the argument in messages.
         parts: result of `unit_parts`, if known.
 
     Raises:

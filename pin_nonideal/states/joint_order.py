@@ -64,7 +64,7 @@ def describe_order(model: Model, values: object, what: str, sizes: Literal["nqs"
     Args:
         model: pinocchio.Model.
         values: values of all joints.
-        what: words for messages.
+        what: name of the argument in messages.
         sizes: attribute of the model with the number of values of each joint.
     """
     if not isinstance(values, (list, tuple)):

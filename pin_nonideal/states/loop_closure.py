@@ -421,7 +421,7 @@ class Search:
 
 
 def conditioning(M: Array) -> float:
-    """Return the smallest over the largest eigenvalue of M scaled to unit diagonal; 0 if M overflows.
+    """Return the ratio of the smallest to the largest eigenvalue of M with unit diagonal; 0 on overflow.
 
     Args:
         M: mass matrix, (nv, nv).

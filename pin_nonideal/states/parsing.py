@@ -74,7 +74,7 @@ def named_configuration(
         model: pinocchio.Model.
         state: see above.
         base: configuration that a table changes, (nq,).
-        what: words for messages.
+        what: name of the argument in messages.
         parts: result of `unit_parts`, if known.
 
     Raises:
@@ -109,7 +109,7 @@ def named_velocity(model: Model, state: State, base: Array, what: str) -> Array:
         model: pinocchio.Model.
         state: see above.
         base: velocity that a table changes, (nv,).
-        what: words for messages.
+        what: name of the argument in messages.
 
     Raises:
         InputError: wrong shape, or not finite.
@@ -137,7 +137,7 @@ def named_joint_values(model: Model, joint_values: object, what: str, others: fl
     Args:
         model: pinocchio.Model.
         joint_values: array (nv,), or a table by joint name.
-        what: words for messages.
+        what: name of the argument in messages.
         others: value of the joints that a table leaves out.
 
     Raises:
@@ -184,7 +184,7 @@ def named_joint_samples(model: Model, joint_samples: object, count: int, what: s
         joint_samples: array (nt, nv), or by joint name samples (nt,) or (nt, n) of a joint of n degrees of
             freedom.
         count: nt.
-        what: words for messages.
+        what: name of the argument in messages.
 
     Raises:
         InputError: wrong shape, or not finite.
@@ -219,7 +219,7 @@ def named_configuration_samples(
             of which an angle [rad] replaces (cos, sin).
         base: configuration of the joints that a table leaves out, (nq,).
         count: nt.
-        what: words for messages.
+        what: name of the argument in messages.
 
     Raises:
         InputError: wrong shape, not finite, or a part far from unit length.
@@ -288,7 +288,7 @@ def find_joint(model: Model, name: object, what: str) -> int:
     Args:
         model: pinocchio.Model.
         name: name of the joint.
-        what: words for messages.
+        what: name of the argument in messages.
 
     Raises:
         UnknownNameError: no joint has that name.
@@ -318,7 +318,7 @@ def _values(model: Model, j: int, level: int, value: object, now: Array, what: s
         level: see above.
         value: the given number, values, table or SE3.
         now: current values, kept for coordinates that a table omits.
-        what: words for messages.
+        what: name of the argument in messages.
     """
     kind = model.joints[j].shortname()
     if isinstance(value, Mapping):
@@ -359,7 +359,7 @@ def with_unit_lengths(model: Model, q: Array, what: str) -> Array:
     Args:
         model: pinocchio.Model.
         q: configuration, (nq,), modified in place.
-        what: words for messages.
+        what: name of the argument in messages.
 
     Raises:
         InputError: a quaternion or pair is far from unit length.

@@ -360,7 +360,7 @@ class Projection:
         )
 
     def _furthest(self, move: Array) -> int:
-        """Return the coordinate with the largest displacement over its unit."""
+        """Return the coordinate with the largest displacement relative to its unit."""
         return int(np.argmax(np.abs(move) / self.unit))
 
     def notes(self, q: Array, on: Array, held: NDArray[np.bool_] | None = None) -> list[str]:

@@ -97,7 +97,7 @@ def break_times(model: Model, times: Array, with_rates: bool) -> Array:
 
 
 def _is_curved(model: Model) -> bool:
-    """Check if a joint has configurations that are no vectors, with more than one axis of rotation."""
+    """Check if a joint has configurations that are not vectors, with more than one axis of rotation."""
     return any(place.nq != place.nv and place.nv > 1 for place in joint_places(model))
 
 

@@ -21,9 +21,9 @@ class ProjectionReport:
 
     Attributes:
         distance: sqrt(d^T M(q) d) of the displacement d = q' - q in tangent coordinates [sqrt(kg) m].
-        coordinate: name of the coordinate with the largest displacement over its unit, a radian or the length
-            of the mechanism. The name is the joint's name, with an index from 0 if the joint has several
-            coordinates. Empty without a displacement.
+        coordinate: name of the coordinate with the largest displacement relative to its unit, a radian or the
+            length of the mechanism. The name is the joint's name, with an index from 0 if the joint has
+            several coordinates. Empty without a displacement.
         moved: displacement of this coordinate [rad or m].
         gap: largest residual before [m or rad, in the scale of its row].
         iterations: steps of the search; 0 if Newton's method sufficed.
@@ -31,8 +31,8 @@ class ProjectionReport:
             distance, and no other start led to a nearer one. After a long displacement, two starts of the
             search must end at the same configuration.
         velocity_distance: sqrt(d^T M d) of the change d = v' - v of the velocity [sqrt(kg) m/s].
-        velocity_coordinate: name of the coordinate with the largest change of velocity over its unit; empty
-            without a change.
+        velocity_coordinate: name of the coordinate with the largest change of velocity relative to its unit;
+            empty without a change.
         velocity_changed: change of velocity of this coordinate [rad/s or m/s].
         held: names of the named coordinates, which are held.
         held_velocities: names of the named velocities, which are held.

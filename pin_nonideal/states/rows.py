@@ -116,13 +116,13 @@ def row_lengths(
     return np.asarray(runner.row_lengths(q, v, t, own, blocks))
 
 
-# Singular value of rows over their greatest lengths below which rows are dependent or vanish. Closures and
-# rounding give about 1e-12; directions of light mechanisms lie above 1e-7.
+# Singular value of rows divided by their greatest lengths below which rows are dependent or vanish. Closures
+# and rounding give about 1e-12; directions of light mechanisms lie above 1e-7.
 MIN_SINGULAR_VALUE = 1e-9
 
 
 def metric_rows(runner: core.Runner, M: Array, q: Array, v: Array, t: float) -> Array:
-    """Compute all rows over their greatest possible lengths in the metric of M^-1, (m, nv).
+    """Compute all rows divided by their greatest possible lengths in the metric of M^-1, (m, nv).
 
     Args:
         runner: a workspace of the core; its friction elements are unloaded afterwards.
@@ -145,7 +145,8 @@ def minimum_norm(scaled: Array, y: Array, lengths: Array) -> Array:
     """Solve min |scaled diag(lengths) x - y| for the x of least norm, (n,).
 
     Args:
-        scaled: matrix with columns over their greatest lengths; its singular values define the rank, (m, n).
+        scaled: matrix with columns divided by their greatest lengths; its singular values define the rank,
+            (m, n).
         y: right-hand side, (m,).
         lengths: greatest lengths of the columns, (n,); entries of x are zero for zero lengths.
     """

@@ -26,8 +26,8 @@ Mask = NDArray[np.bool_]
 MIN_INDEPENDENT_VELOCITY = 1e-6
 MAX_MOVE = 0.1  # move of a given coordinate between two closures, in rad or relative to the scene's length
 LOG_ROUNDING = 1e-3  # largest move of a given coordinate, in rad or relative to the scene's length
-# Largest change of a given velocity over the largest given velocity. Differences of logged positions stay
-# below this bound.
+# Largest change of a given velocity, relative to the largest given velocity. Differences of logged positions
+# stay below this bound.
 RATE_ROUNDING = 0.1
 CLOSURE_TOL = 1e-9  # residual of a reference on the constraints, relative to the scene's length or 1 m
 
@@ -158,7 +158,7 @@ class ClosedReference:
         """Return the error of a sample that violates the constraints.
 
         Args:
-            what: words on the sample.
+            what: name of the sample in messages.
             unit: unit of residuals or rates.
             rows: residuals or rates of the sample, (m,).
             away: difference of the sample from the one on the constraints, (nv,).

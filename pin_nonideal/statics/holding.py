@@ -226,7 +226,7 @@ class _Joint:
         torque = self.tau.copy()
 
         def power(x: float) -> float:
-            """Power of all forces along the motion, which rises with sign times the torque."""
+            """Power of all forces along the motion; the power rises with sign times the torque."""
             torque[self.dof] = x
             now = self.rest.runner.solve(self.q, speed, self.rest.t, torque, modes, frozen=True)
             clipped = x - float((now.F - undriven)[self.dof])
@@ -299,7 +299,7 @@ class _Joint:
 
 
 def _root(power: Callable[[float], float], start: float, sign: float, scale: float) -> float:
-    """Return the torque of zero power, which rises with sign times the torque, or an infinite one."""
+    """Return the torque with zero power, infinite if there is none; the power rises along sign * torque."""
     from scipy.optimize import brentq
 
     at = power(start)

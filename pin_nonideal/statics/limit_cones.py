@@ -22,8 +22,9 @@ class LimitCones:
     """Friction and contact cones of one configuration at rest.
 
     The unknowns are lam (m), the friction forces (d) and a torque that is added to one drive. In the program
-    they are measured in the metric of M^-1, over the greatest length of their row or element, and over the
-    largest force. Tolerances are therefore independent of units and of the mount. The program has no unknowns
+    they are measured in the metric of M^-1, relative to the greatest length of their row or element and to
+    the largest force. Tolerances are therefore independent of units and of the mount. The program has no
+    unknowns
     of rows and elements that exert no force: open contacts and friction without a load.
 
     Args:

@@ -41,7 +41,7 @@ class TrackTrajectory(SceneDrive):
     of the components of both velocities. The reference passes through the samples: q_r is a cubic in
     tangent coordinates between two samples, v_r and a_r are its derivatives. Before the first and after the
     last sample, the reference rests at the end of the samples: v_r = a_r = 0. Steps end at the first and the
-    last sample. Steps end at all samples if v is given, or if the configurations of a joint are no vectors.
+    last sample. Steps end at all samples if v is given, or if the configurations of a joint are not vectors.
 
     The drive commands the joints of `joints`. If `joints` is None, the drive commands the joints that q
     names. If q is an array, the drive commands the joints that kp or kd name. A number acts on joints with

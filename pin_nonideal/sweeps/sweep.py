@@ -39,7 +39,7 @@ MAX_JOBS = 100_000  # also of negative numbers: -n leaves n - 1 processors free
 # Maximum number of runs in one task of a worker, and number of tasks for each worker. Large tasks reduce the
 # overhead; many tasks balance the load.
 MAX_TASK_RUNS, TASKS_PER_WORKER = 200, 16
-# Arguments of `simulate` that are no options of a sweep.
+# Arguments of `simulate` that are not options of a sweep.
 EXCLUDED_OPTIONS = ("scene", "duration", "progress", "checkpoint_interval")
 
 

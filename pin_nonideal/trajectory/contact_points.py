@@ -48,7 +48,7 @@ def contact_bodies(compiled: CompiledScene, name: str) -> ContactBodies:
 
 
 def side_of_point(compiled: CompiledScene, name: str) -> float:
-    """Return 1 if the force of a point acts on the body of the force of its contact, else -1.
+    """Return 1 if the forces of a point and of its contact act on the same body, else -1.
 
     Args:
         compiled: the compiled scene.

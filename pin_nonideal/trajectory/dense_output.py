@@ -38,9 +38,9 @@ class DenseOutput:
         sought: whether each step solved for the slip direction of each element, as in slow slip, (n, ne).
         torque: torque that each step holds constant, (n, nv), NaN for steps without one; (0, nv) if no step
             has one.
-        moved: energy change by projection from the start of the run to the end of each step [J], (n,).
-        impacts: energy change by impacts from the start of the run to the start and to the end of each step
-            [J], (n, 2).
+        moved: energy change due to projection from the start of the run to the end of each step [J], (n,).
+        impacts: energy change due to impacts from the start of the run to the start and to the end of each
+            step [J], (n, 2).
         options: options of the run, a RunOptions.
     """
 

@@ -194,7 +194,8 @@ def _inertia_beyond(model: Model, index: int, who: str) -> pin.Inertia:
                 "frame leads to no joint, as behind a joint that was locked; keep that joint free, or hold "
                 "it by a PrescribedMotion"
             )
-        if is_beyond and (i == index or not locked):  # a locked joint has the inertia of all of its links
+        # The frame of a locked joint has the inertia of all links of the joint.
+        if is_beyond and (i == index or not locked):
             total += each.placement.act(each.inertia)
     links = any(f.type == pin.FrameType.BODY and f.parentFrame == index for f in model.frames)
     if total.mass == 0.0 and not (frame.type == pin.FrameType.FIXED_JOINT and links):

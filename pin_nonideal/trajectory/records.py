@@ -34,8 +34,8 @@ class Event:
         impulse: impulse of an impact [N s], (3,), along the contact's normal, then along its slip directions,
             a sum over the points of a pair of shapes; for a jump (impulse, 0, 0) of the motion's row [N s or
             N m s].
-        energy_change: change of the kinetic energy by an impact at this contact [J], negative for a loss; for
-            a jump, the work of the motion's impulse.
+        energy_change: change of the kinetic energy due to an impact at this contact [J], negative for a loss;
+            for a jump, the work of the motion's impulse.
         v_minus: velocity before an impact or jump, (nv,).
         v_plus: velocity after an impact or jump, (nv,).
         miss: velocity by which a "relaxed" step violates the laws [m/s or rad/s].

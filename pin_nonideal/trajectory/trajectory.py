@@ -46,8 +46,8 @@ class Trajectory(RunFields):
         violation_rate: maximum |rate| over all rows [m/s or rad/s], (nt,).
         a: accelerations, (nt, nv); record "a".
         tau: torques of the actuation [N m or N], (nt, nv); record "tau" or "forces".
-        F_ideal: ideal part of the force of constraint, (nt, nv), Eq. (39); record "forces".
-        F_nonideal: nonideal part of the force of constraint, including the forces of sticking elements, (nt,
+        F_ideal: ideal part of the constraint force, (nt, nv), Eq. (39); record "forces".
+        F_nonideal: nonideal part of the constraint force, including the forces of sticking elements, (nt,
             nv), Eq. (39); record "forces".
         lam: multipliers of all rows in M a = F + C + A^T lam, (nt, m); record "forces". A pair of shapes has
             one column, the sum of the normal forces at its points.

@@ -1,4 +1,4 @@
-"""Figures of runs: quantities over time or over each other, events and modes, for a screen or in print."""
+"""Figures of runs: quantities over time or against each other, events and modes, for a screen or in print."""
 
 from __future__ import annotations
 
@@ -49,10 +49,10 @@ def plot(
         path: file to write, in the format of its suffix (.png, .pdf, .svg); None writes no file.
         what: names of plots. Over time: "q", "v", "a", "tau", "F_nonideal", "energy", "work", "power",
             "violation", "reactions", "contacts", "gaps" (of unilateral contacts), "modes", names of joints,
-            or pairs of a title "name [unit]" and curves by label, (nt,) each. Quantities over each other:
-            "phase", "phase JOINT" (velocity over position), "friction", "friction LAW" (over slip velocity,
-            with its limit), "load", "load LAW" (friction over the load of the bearing). None selects plots by
-            the scene and the recorded fields.
+            or pairs of a title "name [unit]" and curves by label, (nt,) each. Quantities against each other:
+            "phase", "phase JOINT" (velocity against position), "friction", "friction LAW" (against slip
+            velocity, with its limit), "load", "load LAW" (friction against the load of the bearing). None
+            selects plots by the scene and the recorded fields.
         ax: matplotlib axes for one plot, instead of a new figure.
         columns: 1 or 2 columns of a printed page, 85 or 176 mm wide; None for a screen.
         title: heading; None for the name of the scene on a screen and no heading in print, "" for no heading.
@@ -211,7 +211,7 @@ def _draw_plot(axes: Axes, parts: Sequence[Plot], labels: Sequence[str], look: S
 
 
 def _draw_relation(axes: Axes, parts: Sequence[Relation], labels: Sequence[str], look: Style) -> None:
-    """Draw one quantity over another, of all runs, and the limits of the law as points."""
+    """Draw one quantity against another, of all runs, and the limits of the law as points."""
     for number, item in enumerate(parts):
         for index, (label, (x, y)) in enumerate(item.curves.items()):
             name = label if len(parts) == 1 else f"{label}, {labels[number]}"

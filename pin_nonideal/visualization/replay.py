@@ -128,7 +128,7 @@ def replay(
         title: heading of the page; None for the name of the scene.
         plots: names of plots: "energy", "work", "power", "violation", "reactions", "contacts", "gaps", "tau",
             "F_nonideal" (friction in joints), "q", "v", "a", names of joints, or pairs of a title
-            "name [unit]" and curves by label, (nt,) each; and of one quantity over another "phase",
+            "name [unit]" and curves by label, (nt,) each; and of one quantity against another "phase",
             "phase JOINT", "friction", "friction LAW", "load" and "load LAW", as in `plot`. None selects tau
             and F_nonideal of a driven robot, then energy, gaps, violation, reactions and q, if recorded.
         compress: False for a page that also opens in browsers older than 2023, and is three times as large.

@@ -140,7 +140,7 @@ MISFITS = {
     ),
     "gain of a ball joint": (
         {"actuation": pn.HoldPosition(np.ones(12), 1.0)},
-        'HoldPosition: kp must be zero on joint "j2", whose configuration is no vector; '
+        'HoldPosition: kp must be zero on joint "j2", whose configuration is not a vector; '
         "drive it by a function or by a TrackTrajectory",
     ),
     "held configuration": (

@@ -56,7 +56,7 @@ class TestParticle:
         assert_close(run.q[-1, :2], (x, y), CLOSED)
 
     def test_driven_motion_and_forces(self):
-        """With drive and given forces: the printed force of constraint, Eq. (59), integrated by SciPy."""
+        """With drive and given forces: the printed constraint force, Eq. (59), integrated by SciPy."""
         particle = self.script.Particle()
         q0 = np.array([0.3, -0.2, 0.5])
         v0 = particle.start(q0, (0.8, -0.3))

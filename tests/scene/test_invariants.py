@@ -51,7 +51,7 @@ def test_ideal_forces_do_no_work_on_virtual_displacements(robot):
         assert len(w) == scene.model.nv - s.rank
         size = np.abs(A.T) @ np.abs(runner.solve(q, v, 0.0).lam_ideal)
         assert np.abs(w @ s.F_ideal).max(initial=0.0) <= ROUNDING * size.max(initial=0.0)
-        # Eq. (9): on them the whole force of constraint does the work that C prescribes.
+        # Eq. (9): on them the whole constraint force does the work that C prescribes.
         C = runner.solve(q, v, 0.0).C
         total = s.F_ideal + s.F_nonideal
         in_play = size.max(initial=0.0) + np.abs(C).max()

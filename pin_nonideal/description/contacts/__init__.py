@@ -63,16 +63,16 @@ class PointContact:
     Args:
         frame: name of a frame of the model.
         mu: kinetic coefficient of friction.
-        static_ratio: static over kinetic friction for sliding, spinning and rolling, at least 1.
+        static_ratio: ratio of static to kinetic friction for sliding, spinning and rolling, at least 1.
         plane: name of a frame with origin in the plane (its body may move); None for the world's origin.
         normal: normal of the plane, in the axes of the plane's frame: "x", "y", "z" or three numbers.
         radius: radius of the sphere around the frame's origin [m]; 0 for a point.
         offset: position of the point or the sphere's center, in the axes of the frame [m].
         height: height of the plane above the origin of its frame, along the normal [m].
-        torsional: torque against spinning over normal force [m]. For a circular contact area of radius R, it
-            is 2/3 mu R under uniform pressure and 3/16 pi mu R under a sphere (Hertz).
-        rolling: torque against rolling over normal force [m], the lever arm of rolling resistance.
-        restitution: opening rate of the gap after an impact over its closing rate before, 0 to 1.
+        torsional: ratio of the torque against spinning to the normal force [m]. For a circular contact area
+            of radius R, it is 2/3 mu R under uniform pressure and 3/16 pi mu R under a sphere (Hertz).
+        rolling: ratio of the torque against rolling to the normal force [m], a lever arm.
+        restitution: ratio of the opening rate of the gap after an impact to its closing rate before, 0 to 1.
         unilateral: whether the contact may open.
         name: used in messages and results.
     """
@@ -165,8 +165,8 @@ class UserContact:
         rate: (t, q, v) -> dg/dt; A v plus a difference in time when None.
         directions: (t, q) -> orthogonal slip rows, (1, nv) or (2, nv); needed with mu.
         mu: kinetic coefficient of friction.
-        static_ratio: static over kinetic friction, at least 1.
-        restitution: opening rate of the gap after an impact over its closing rate before, 0 to 1.
+        static_ratio: ratio of static to kinetic friction, at least 1.
+        restitution: ratio of the opening rate of the gap after an impact to its closing rate before, 0 to 1.
         name: used in messages and results.
     """
 

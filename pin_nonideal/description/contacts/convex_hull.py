@@ -41,7 +41,7 @@ def convex_hull(points: Array, what: str) -> ConvexHull:
 
     Args:
         points: points, (n, 3).
-        what: words for messages.
+        what: name of the argument in messages.
 
     Raises:
         InputError: the points span no solid.
@@ -94,7 +94,7 @@ def shrunk(points: Array, by: float, what: str) -> Array:
     Args:
         points: points, (n, 3).
         by: inward displacement of the faces [m].
-        what: words for messages.
+        what: name of the argument in messages.
 
     Raises:
         InputError: the hull is too thin.
@@ -121,7 +121,7 @@ def check_convex(points: Array, triangles: NDArray[np.int64], what: str) -> None
     Args:
         points: points, (n, 3).
         triangles: indices of the corners of each triangle, (m, 3).
-        what: words for messages.
+        what: name of the argument in messages.
 
     Raises:
         InputError: a part of the surface lies inside the hull, or is missing.

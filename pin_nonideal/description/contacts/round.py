@@ -38,8 +38,8 @@ class SphereContact:
         radius1: radius of the first sphere [m].
         radius2: radius of the second sphere [m]; 0 for a point.
         mu: kinetic coefficient of friction.
-        static_ratio: static over kinetic friction, at least 1.
-        restitution: opening rate of the gap after an impact over its closing rate before, 0 to 1.
+        static_ratio: ratio of static to kinetic friction, at least 1.
+        restitution: ratio of the opening rate of the gap after an impact to its closing rate before, 0 to 1.
         name: used in messages and results.
     """
 
@@ -77,8 +77,8 @@ class CapsuleContact:
         radius1: radius of the first capsule [m].
         radius2: radius of the second capsule [m].
         mu: kinetic coefficient of friction.
-        static_ratio: static over kinetic friction, at least 1.
-        restitution: opening rate of the gap after an impact over its closing rate before, 0 to 1.
+        static_ratio: ratio of static to kinetic friction, at least 1.
+        restitution: ratio of the opening rate of the gap after an impact to its closing rate before, 0 to 1.
         name: used in messages and results.
     """
 
@@ -118,8 +118,8 @@ class BoxContact:
         xyz: center of the box, in the axes of frame2 [m].
         rpy: orientation of the box in frame2, roll, pitch and yaw [rad].
         mu: kinetic coefficient of friction.
-        static_ratio: static over kinetic friction, at least 1.
-        restitution: opening rate of the gap after an impact over its closing rate before, 0 to 1.
+        static_ratio: ratio of static to kinetic friction, at least 1.
+        restitution: ratio of the opening rate of the gap after an impact to its closing rate before, 0 to 1.
         name: used in messages and results.
     """
 

@@ -40,13 +40,13 @@ class EllipsoidContact:
         frame: name of a frame on the body.
         semiaxes: half lengths along the axes [m], (3,), at most one of them zero.
         mu: kinetic coefficient of friction.
-        static_ratio: static over kinetic friction, at least 1.
+        static_ratio: ratio of static to kinetic friction, at least 1.
         plane: name of a frame with origin in the plane (its body may move); None for the world's origin.
         normal: normal of the plane, in the axes of the plane's frame: "x", "y", "z" or three numbers.
         offset: center of the ellipsoid, in the axes of the frame [m].
         rpy: orientation of the axes in the frame, roll, pitch and yaw [rad].
         height: height of the plane above the origin of its frame, along the normal [m].
-        restitution: opening rate of the gap after an impact over its closing rate before, 0 to 1.
+        restitution: ratio of the opening rate of the gap after an impact to its closing rate before, 0 to 1.
         name: used in messages and results.
     """
 
@@ -92,8 +92,8 @@ class HullContact:
         radius2: radius around the hull [m], which rounds its edges and moves its faces outward.
         offset: center of the sphere, in the axes of frame1 [m].
         mu: kinetic coefficient of friction.
-        static_ratio: static over kinetic friction, at least 1.
-        restitution: opening rate of the gap after an impact over its closing rate before, 0 to 1.
+        static_ratio: ratio of static to kinetic friction, at least 1.
+        restitution: ratio of the opening rate of the gap after an impact to its closing rate before, 0 to 1.
         name: used in messages and results.
     """
 
@@ -137,8 +137,8 @@ class CylinderContact:
         xyz: center of the solid's axis, in the axes of frame2 [m].
         rpy: orientation of the solid, with axis z, in frame2, roll, pitch and yaw [rad].
         mu: kinetic coefficient of friction.
-        static_ratio: static over kinetic friction, at least 1.
-        restitution: opening rate of the gap after an impact over its closing rate before, 0 to 1.
+        static_ratio: ratio of static to kinetic friction, at least 1.
+        restitution: ratio of the opening rate of the gap after an impact to its closing rate before, 0 to 1.
         name: used in messages and results.
         end: end of a capsule's segment, which starts at offset, in the axes of frame1 [m]; None for a sphere.
         radius2: radius around the solid [m], which rounds its rims and moves its faces and side outward.
@@ -194,8 +194,8 @@ class RimContact:
         offset: center of the disk, in the axes of frame1 [m].
         rpy: orientation of the disk, with axis z, in frame1, roll, pitch and yaw [rad].
         mu: kinetic coefficient of friction.
-        static_ratio: static over kinetic friction, at least 1.
-        restitution: opening rate of the gap after an impact over its closing rate before, 0 to 1.
+        static_ratio: ratio of static to kinetic friction, at least 1.
+        restitution: ratio of the opening rate of the gap after an impact to its closing rate before, 0 to 1.
         name: used in messages and results.
     """
 
@@ -241,8 +241,8 @@ class RevolvedContact:
         xyz2: center of the second solid's axis, in the axes of frame2 [m].
         rpy2: orientation of the second solid, with axis z, in frame2, roll, pitch and yaw [rad].
         mu: kinetic coefficient of friction.
-        static_ratio: static over kinetic friction, at least 1.
-        restitution: opening rate of the gap after an impact over its closing rate before, 0 to 1.
+        static_ratio: ratio of static to kinetic friction, at least 1.
+        restitution: ratio of the opening rate of the gap after an impact to its closing rate before, 0 to 1.
         name: used in messages and results.
     """
 

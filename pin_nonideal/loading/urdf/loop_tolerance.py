@@ -1,7 +1,7 @@
 """Loops with rounded frames: detection of rows that depend on others within the assembly tolerance.
 
 CAD exports round frames to about 1e-8 m. A loop that closes in theory then has a gap that no motion can
-close, and dependent rows become slightly independent, which would determine rank and reactions.
+close, and dependent rows become slightly independent. Such rounding would determine rank and reactions.
 """
 
 from __future__ import annotations

@@ -155,7 +155,7 @@ def _ground(table: Table, where: str) -> GeometryObject:
     """Return a half-space on the world from a table such as `{ground: {height: 0.1}}`.
 
     Raises:
-        LoadingError: the table is no ground, or an argument is invalid.
+        LoadingError: the table does not describe a ground, or an argument is invalid.
     """
     kind, values = one_entry(table, f"{where}: GeometryContact: geometry2")
     where = f"{where}: GeometryContact: geometry2"

@@ -96,7 +96,7 @@ class Cubics:
         if not self.run.scene.constraint_slices or not len(q):
             return q, np.zeros(len(q))
         program = compiled_scene(self.run.scene).program
-        if program.first_gap == 0:  # contacts that may open are no loops
+        if program.first_gap == 0:  # contacts that may open are not loops
             return q, np.zeros(len(q))
         part = s[:, None]
         v = (1.0 - part) * self.run.v[k] + part * self.run.v[k + 1]

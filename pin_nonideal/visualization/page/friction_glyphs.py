@@ -40,8 +40,8 @@ class Element:
         point: position in that joint's frame [m], (3,), or at each frame, (n, 3), if it moves.
         axis: axis of the joint or normal of the contact, in the frame of `axis_joint`, (3,) or (n, 3).
         axis_joint: index of the joint that carries the axis.
-        mu: friction coefficient, the radius of the friction cone over its height; 0 for a joint.
-        share: friction over its limit at each frame, 0 to 1, (n,), or None if it was not recorded.
+        mu: friction coefficient, the ratio of the radius of the friction cone to its height; 0 for a joint.
+        share: ratio of friction to its limit at each frame, 0 to 1, (n,), or None if it was not recorded.
         normal: normal force of a contact at each frame [N], (n,), or None.
         stays: whether the element is also drawn while its contact is open.
         contact: name of the contact of which the element is a point; empty for other elements.
@@ -115,7 +115,7 @@ def _hinge_axis(run: Trajectory, anchor: str) -> Array:
 
 
 def _joint_share(run: Trajectory, law: str, joint: int, element: int) -> Array | None:
-    """Return the friction in a joint over its limit, (nt,)."""
+    """Return the ratio of the friction in a joint to its limit, (nt,)."""
     if not (run.recorded("law_forces") and run.recorded("limits")):
         return None
     force = run.law(law).force[:, run.scene.model.joints[joint].idx_v]
@@ -139,7 +139,7 @@ def _force(run: Trajectory, touch: ContactPoint) -> Array | None:
 def _contact(
     run: Trajectory, motion: Motion, name: str, band: int, touch: ContactPoint, whole: bool
 ) -> Element:
-    """Return a contact with its cone, and with the friction over its limit if forces were recorded."""
+    """Return a contact with its cone, and with the ratio of friction to its limit if forces were recorded."""
     share = pressing = None
     mu = float(getattr(touch.item, "mu", 0.0)) if whole or name == touch.name else 0.0
     force = _force(run, touch)

@@ -1,4 +1,4 @@
-"""Plots of one quantity over another as a page carries them, with the times of their points."""
+"""Plots of one quantity against another as a page carries them, with the times of their points."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Words on a run for the heading and the help dialog of a replay page."""
+"""Texts about a run for the heading and the help dialog of a replay page."""
 
 from __future__ import annotations
 

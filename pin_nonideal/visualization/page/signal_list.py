@@ -70,7 +70,7 @@ def signals_of(run: Trajectory, finer: Trajectory) -> list[Signal]:
     """Return all scalars of a run that can be plotted, thinned with their extremes.
 
     Every column of `Trajectory.columns` is one of them, or the angle or rate that it holds is. Forces of laws
-    in joints on which they do not act and columns of contacts that never close are no signals.
+    in joints on which they do not act and columns of contacts that never close are not signals.
 
     Args:
         run: run of the replay.

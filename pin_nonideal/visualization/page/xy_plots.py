@@ -1,4 +1,4 @@
-"""Plots of one quantity over another: phase planes, and friction over slip velocity or load."""
+"""Plots of one quantity against another: phase planes, and friction against slip velocity or load."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MAX_RELATIONS = 16
 
 @dataclass(frozen=True)
 class Relation:
-    """Curves of one quantity over another.
+    """Curves of one quantity against another.
 
     Attributes:
         title: title of the plot.
@@ -72,9 +72,9 @@ def relations_of(run: Trajectory, item: str) -> list[Relation]:
 
     Args:
         run: run of the plot.
-        item: "phase" for all joints, or "phase JOINT"; "friction" (over slip velocity) and "load" (friction
-            over the load of the bearing) for all laws in joints of one degree of freedom, or for one law by
-            name.
+        item: "phase" for all joints, or "phase JOINT"; "friction" (against slip velocity) and "load"
+            (friction against the load of the bearing) for all laws in joints of one degree of freedom, or for
+            one law by name.
 
     Raises:
         UnknownNameError: no joint or law has that name.
@@ -87,7 +87,7 @@ def relations_of(run: Trajectory, item: str) -> list[Relation]:
 
 
 def _phases(run: Trajectory, name: str) -> list[Relation]:
-    """Return plots of velocity over position, one for each unit."""
+    """Return plots of velocity against position, one for each unit."""
     model = run.scene.model
     names = [str(joint) for joint in model.names[1:]]
     if name and name not in names:
@@ -128,7 +128,7 @@ def friction_joints(run: Trajectory) -> dict[str, int]:
 
 
 def _frictions(run: Trajectory, name: str, over_load: bool) -> list[Relation]:
-    """Return the curves of joint friction over slip velocity, or over bearing load."""
+    """Return the curves of joint friction against slip velocity, or against bearing load."""
     kind, known = "load" if over_load else "friction", friction_joints(run)
     if name and name not in known:
         raise UnknownNameError(
