@@ -16,7 +16,7 @@ __all__ = ["ConeResiduals", "ConeSolution", "cone_complementarity"]
 
 Array = NDArray[np.floating[Any]]
 
-# Velocities below this part of the velocity scale count as zero in the names of the modes only.
+# Velocities below this fraction of the velocity scale count as zero in the names of the modes only.
 AT_REST = 1e-9
 MAX_ROWS = 3  # maximum number of rows of a contact: normal and two slip directions
 

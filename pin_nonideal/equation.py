@@ -30,10 +30,11 @@ from .validation import floats
 Array = NDArray[np.floating[Any]]
 
 # A unit row is redundant if its remainder outside the span of the other rows is at most this value. Rows from
-# kinematics have rounding of about 1e-13, which a smaller tolerance would count as independent. A row with a
-# larger remainder still determines its acceleration to about 1e-6.
+# kinematics have rounding errors of about 1e-13, which a smaller tolerance would count as independent. A row
+# with a larger remainder still determines its acceleration to about 1e-6.
 RANK_TOLERANCE = 1e-10
-# A row below this part of the longest row is the rounding of a vanishing row (a planar loop closed in 3D).
+# A row below this fraction of the longest row is the rounding error of a vanishing row (a planar loop closed
+# in 3D).
 ZERO_ROW = 1e-14
 # Redundant rows are inconsistent if their residual exceeds this part of the acceleration scale. The tolerance
 # is a hundred times the largest remainder of a redundant row, so rounding alone never raises.
@@ -41,7 +42,8 @@ RESIDUAL_TOLERANCE = 1e-8
 # Number of refinements: repeated solutions for the remaining residual. Each refinement adds the correct
 # digits of one solution, which are few if M has condition 1e12.
 REFINEMENTS = 2
-# M[i, j] and M[j, i] may differ by this part of sqrt(M[i, i] M[j, j]); sums in another order differ by 1e-15.
+# M[i, j] and M[j, i] may differ by this fraction of sqrt(M[i, i] M[j, j]); sums in another order differ by
+# 1e-15.
 SYMMETRY_TOLERANCE = 1e-10
 
 
@@ -213,7 +215,7 @@ def _solve_lower(L: Array, X: Array) -> Array:
     """Compute L^-1 X by forward substitution.
 
     With rows and columns reversed, L is upper triangular. `numpy.linalg.solve` then neither pivots nor
-    eliminates, so rounding of heavy coordinates does not enter light ones.
+    eliminates, so rounding error of heavy coordinates does not enter light ones.
     """
     return np.linalg.solve(L[::-1, ::-1], X[::-1])[::-1]
 

@@ -30,10 +30,10 @@ Rows = NDArray[np.bool_]
 
 # Functions of time without user code.
 CORE_FUNCTIONS = (Constant, Polynomial, Sinusoid, Spline)
-# A row vanishes structurally if its length stays below this part of its greatest possible length at random
-# states. The value covers rounding of the kinematics.
+# A row vanishes structurally if its length stays below this fraction of its greatest possible length at
+# random states. The value covers rounding error of the kinematics.
 VANISHING_LENGTH = 1e-11
-# Right-hand side of a vanishing row, relative to the largest right-hand side: rounding of long sums.
+# Right-hand side of a vanishing row, relative to the largest right-hand side: rounding error of long sums.
 SUM_ROUNDING = 1e-9
 # Tolerance between derivatives of user functions and central differences: relative error of the differences.
 DERIVATIVE_TOLERANCE = 1e-4

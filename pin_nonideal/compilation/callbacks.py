@@ -24,7 +24,7 @@ PROBES = (0.01371, 0.21317, 0.71753)
 PROBE_STEP = 1e-6
 FLOATS = np.dtype(float)
 DERIVATIVE_RTOL = 0.1  # separately interpolated tables of value and derivatives stay below it
-DERIVATIVE_ATOL = 1e-7  # above the rounding of a difference quotient over two steps
+DERIVATIVE_ATOL = 1e-7  # above the rounding error of a difference quotient over two steps
 
 
 def checked_function(

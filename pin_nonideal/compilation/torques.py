@@ -55,7 +55,7 @@ class TorqueFunction(NamedTuple):
 
 Part = ConstantTorque | TimedTorque | Spring | TorqueFunction
 
-# Samples of a control and times of a held table that differ by less than this part of a period are equal.
+# Samples of a control and times of a held table that differ by less than this fraction of a period are equal.
 SAMPLE_ROUNDING = 1e-9
 
 

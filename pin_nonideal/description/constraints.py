@@ -342,7 +342,8 @@ class UserConstraint:
     velocity constraint itself. d residual/dt = rate and d rate/dt = A a - b are checked once by differences.
     Without residual and rate the rows hold at acceleration level only and cannot be projected. With a
     residual and without a rate, the rate is A v plus a difference in t.
-    A row shorter than about 1e-14 times the longest row of the same function is rounding and has no effect.
+    A row shorter than about 1e-14 times the longest row of the same function is rounding error and has no
+    effect.
     Rows: `size`, in the order of the function.
     lam: multipliers in M a = F + C + A^T lam, in the scale of the rows.
 

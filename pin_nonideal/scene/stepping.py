@@ -24,7 +24,7 @@ FIXED_STEP_METHODS = tuple(
     method.name for method in core.methods() if not method.outside and not method.adaptive
 )
 RTOL, ATOL = 1e-8, 1e-10
-# Steps fit into a period if their number differs from a whole number by at most this part.
+# Steps fit into a period if their number differs from a whole number by at most this fraction.
 PERIOD_ROUNDING = 1e-9
 
 

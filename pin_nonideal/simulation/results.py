@@ -43,7 +43,7 @@ from .events import exact_grid, grid_of
 from .options import RunOptions
 
 # Largest residual of a sample on the constraints [m or rad]. Projection after each step reduces residuals to
-# rounding, or to the square root of rounding in singular positions.
+# rounding, or to the square root of the rounding error in singular positions.
 MAX_RESIDUAL = 1e-6
 # Smallest singular value of the rows over that at the start below which a position is singular, and the part
 # of a constraint in the dependence above which an error names it.

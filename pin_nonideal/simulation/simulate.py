@@ -51,8 +51,8 @@ def simulate(
     """Simulate a scene in time, on its constraints.
 
     Adaptive methods keep the local error of each coordinate below atol + rtol |y|. The tolerance of a
-    velocity is at least the rounding of the largest velocity. After each step, the state is projected onto
-    the constraints, so that violations stay at rounding. Transitions of dry friction are located events.
+    velocity is at least the rounding error of the largest velocity. After each step, the state is projected
+    onto the constraints, so that violations stay at rounding. Transitions of dry friction are located events.
 
     Args:
         scene: scene to simulate.

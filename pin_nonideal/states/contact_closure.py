@@ -19,9 +19,10 @@ from .least_distance import LeastDistance, Numbers, solve_ldp
 from .loop_closure import HALVINGS, ROUNDING, Closure, Iterate, Rows, Search
 
 STEPS, MAX_SETTLINGS, OPENINGS = 60, 8, 15
-# Steps end if the next step is shorter than this part of the displacement, since Newton's method squares it.
+# Steps end if the next step is shorter than this fraction of the displacement, since Newton's method squares
+# it.
 MIN_STEP = 1e-7
-# Largest penetration, scaled like its row, that counts as rounding.
+# Largest penetration, scaled like its row, that counts as rounding error.
 PENETRATION_ROUNDING = 10.0 * ROUNDING
 # Minimum decrease of the merit function, relative to the decrease of its linear model.
 MIN_DECREASE = 1e-4

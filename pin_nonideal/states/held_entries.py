@@ -18,9 +18,9 @@ from .scales import coordinate
 
 # Tolerance of row rates divided by their greatest lengths, relative to the scale of the velocities.
 RATE_TOL = 1e-9
-# Rounding of a projection, relative to the largest velocity or to the unit of a coordinate.
+# Rounding error of a projection, relative to the largest velocity or to the unit of a coordinate.
 ROUNDING = 1e-12
-# Changes of free entries are reported above this part of the largest velocity or of a unit.
+# Changes of free entries are reported above this fraction of the largest velocity or of a unit.
 REPORTED_CHANGE = 1e-3
 # Maximum number of Newton steps after a search, which squares the residual in each step.
 MAX_NEWTON_STEPS = 8
@@ -153,7 +153,7 @@ def _coordinate_count(place: JointPlace) -> int:
 def require_rounding(
     model: Model, q: Array, on: Array, held: NDArray[np.bool_], little: Array, t: float
 ) -> None:
-    """Check that a projection has moved held coordinates at most by the rounding of written numbers.
+    """Check that a projection has moved held coordinates at most by the rounding error of written numbers.
 
     Args:
         model: pinocchio.Model.

@@ -14,7 +14,8 @@ from pin_nonideal.errors import InputError
 from pin_nonideal.types import JointModel, Model
 from pin_nonideal.validation import array
 
-# Deviations of a unit length below this value are rounding of a file and are normalized; others are errors.
+# Deviations of a unit length below this value are rounding error of a file and are normalized; others are
+# errors.
 UNIT_TOLERANCE = 1e-6
 
 # Largest spacing of floating-point numbers at a coordinate of an initial state [m or rad]. A joint cannot

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pin_nonideal.types import Array
 
-# Singular values of rows below this part of the largest count as zero.
+# Singular values of rows below this fraction of the largest count as zero.
 MIN_SINGULAR_VALUE = 1e-9
 # Displacements longer than the deepest penetration by this factor are rejected.
 LONGEST_WAY_OUT = 1e6

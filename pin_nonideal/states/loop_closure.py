@@ -33,9 +33,9 @@ CLOSING_STEPS, RETRACTIONS, SLIDES, HALVINGS = 300, 15, 60, 25
 DAMPING, MIN_DAMPING, MAX_DAMPING = 1e-3, 1e-14, 1e10
 # Relative slope of the distance along the constraints at which a closure is stationary: rounding over gaps.
 STATIONARY_SLOPE = 1e-10
-# Part of the last slope above which a descent does not converge.
+# Fraction of the last slope above which a descent does not converge.
 STALLED_SLOPE = 0.5
-# Rounding of a displacement, relative to a displacement of all coordinates by their units.
+# Rounding error of a displacement, relative to a displacement of all coordinates by their units.
 ROUNDING = 1e-13
 # Step of gradient differences [units].
 DIFFERENCE_STEP = 1e-6
@@ -359,7 +359,7 @@ class Search:
                 x = -directions @ (parts / np.maximum(np.abs(curvature), MIN_CURVATURE))
                 trial = self._downhill(iterate, x, slope)
             if trial is None:
-                # Neither distance nor slope decreases, so the remaining slope may be rounding.
+                # Neither distance nor slope decreases, so the remaining slope may be rounding error.
                 is_minimum = slope <= 1e3 * STATIONARY_SLOPE * distance
                 break
             iterate = trial

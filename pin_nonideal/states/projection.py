@@ -36,19 +36,19 @@ from .scales import chain, coordinate, largest_body, slides
 
 # Largest remaining rate of consistent rows, relative to 1 + |v|.
 RATE_TOLERANCE = 1e-6
-# Newton's method returns the nearest state, to rounding, if no coordinate moves by more than this part of its
-# unit.
+# Newton's method returns the nearest state, to rounding, if no coordinate moves by more than this fraction of
+# its unit.
 MAX_NEWTON_MOVE = 1e-6
 # Factor of MAX_NEWTON_MOVE in ambient coordinates; a tangent displacement is never ten times as long.
 AMBIENT_FACTOR = 0.1
 # Largest residual from which Newton's method is tried, relative to the length of the mechanism.
 NEWTON_REACH = 1e-3
-# Displacements above this part of a unit are reported.
+# Displacements above this fraction of a unit are reported.
 REPORTED_MOVE = 1e-3
-# Penetration up to this part of the size of the scene is rounding.
+# Penetration up to this fraction of the size of the scene is rounding error.
 PENETRATION_ROUNDING = 1e-12
 # Largest initial penetration, relative to the length of the mechanism or to 1 m if the mechanism is longer.
-# Deeper penetration cannot be rounding of a pose.
+# Deeper penetration cannot be rounding error of a pose.
 MAX_PENETRATION = 1e-2
 # Maximum number of degrees of freedom for a search, which takes minutes above it. Newton's method is then
 # tried from any residual.

@@ -160,9 +160,9 @@ def minimum_norm(scaled: Array, y: Array, lengths: Array) -> Array:
     return x
 
 
-# Relative difference of directions below which rows are duplicates: rounding of the kinematics.
+# Relative difference of directions below which rows are duplicates: rounding error of the kinematics.
 SAME_ROW = 1e-11
-# Relative difference of the projections of duplicates onto a random vector: rounding of long sums.
+# Relative difference of the projections of duplicates onto a random vector: rounding error of long sums.
 SUM_ROUNDING = 1e-9
 
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from pin_nonideal.types import Model
 
-# Rows and axes below this part of the largest are rounding.
+# Rows and axes below this fraction of the largest are rounding error.
 MIN_ROW_LENGTH = 1e-11
 
 

@@ -22,7 +22,8 @@ from .residual import AtRest
 
 Mask = NDArray[np.bool_]
 
-# Velocities of a coordinate below this part of the admitted velocities depend on coordinates chosen earlier.
+# Velocities of a coordinate below this fraction of the admitted velocities depend on coordinates chosen
+# earlier.
 MIN_INDEPENDENT_VELOCITY = 1e-6
 MAX_MOVE = 0.1  # move of a given coordinate between two closures, in rad or relative to the scene's length
 LOG_ROUNDING = 1e-3  # largest move of a given coordinate, in rad or relative to the scene's length
@@ -46,7 +47,7 @@ class ClosedReference:
         stated: mask of the stated coordinates, (nv,).
         driven: mask of the driven degrees of freedom, (nv,).
         who: prefix of error messages.
-        rounding: rounding of times at the ends, see `ReferenceMotion`.
+        rounding: rounding error of times at the ends, see `ReferenceMotion`.
 
     Raises:
         InputError: the given coordinates do not determine the motion, no configuration on the constraints has
@@ -126,7 +127,7 @@ class ClosedReference:
         return before
 
     def _require_reference(self, on: Array, q: Array, times: Array, stated: Mask, unit: Array) -> None:
-        """Check that given coordinates keep their values, up to the rounding of a log.
+        """Check that given coordinates keep their values, up to the rounding error of a log.
 
         Raises:
             InputError: a given coordinate has moved farther.

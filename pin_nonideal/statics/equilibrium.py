@@ -32,7 +32,8 @@ CONVERGED_STEP = 1e-9
 # displacement, or below CANCELLATION_TOL times the stiffnesses that cancel in it.
 NEUTRAL_STIFFNESS, CANCELLATION_TOL = 1e-7, 1e-10
 MIN_RATE = 1e-12  # smallest divisor of neutral directions [1/s^2]
-# Tolerance of balanced forces relative to the force scale, and rounding of a stiffness relative to its size.
+# Tolerance of balanced forces relative to the force scale, and rounding error of a stiffness relative to its
+# size.
 BALANCE_TOL, ROUNDING = 1e-9, 1e-14
 
 

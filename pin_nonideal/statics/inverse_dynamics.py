@@ -31,9 +31,11 @@ Limits = tuple[Array, Array]  # least and largest torque of each driven degree o
 # Tolerance of A a = b, relative to its terms.
 ACCELERATION_TOL = 1e-6
 ROUNDING = 1e-6  # acceleration scale without weight [m/s^2 or rad/s^2], multiplied by ACCELERATION_TOL
-# Rounding of a row, relative to its length and to the accelerations of all bodies in the metric of M^-1.
+# Rounding error of a row, relative to its length and to the accelerations of all bodies in the metric of
+# M^-1.
 MOTION_ROUNDING = 1e-13
-# Slip rates and slip accelerations below this part of 1 + the largest velocity or acceleration count as zero.
+# Slip rates and slip accelerations below this fraction of 1 + the largest velocity or acceleration count as
+# zero.
 AT_REST = 1e-9
 # Maximum number of iterations for load-dependent friction, and their relative tolerance.
 MAX_PASSES, FRICTION_TOL = 200, 1e-13

@@ -40,11 +40,11 @@ class Balance(NamedTuple):
     left: Array
 
 
-# A contact touches if its gap is below this part of the scene's length, or of 1 m if the scene is shorter, as
-# at starts of runs.
+# A contact touches if its gap is below this fraction of the scene's length, or of 1 m if the scene is
+# shorter, as at starts of runs.
 TOUCHING_GAP = 1e-10
-# A coordinate cannot move if its mobility is below this part of its mobility without constraints. Mobilities
-# are squares of rates: rounding leaves 1e-32, and linkages of usual proportions 1e-10.
+# A coordinate cannot move if its mobility is below this fraction of its mobility without constraints.
+# Mobilities are squares of rates: rounding leaves 1e-32, and linkages of usual proportions 1e-10.
 MIN_MOBILITY = 1e-20
 
 
@@ -134,7 +134,7 @@ class AtRest:
         return np.asarray(now.F + now.C)
 
     def rows(self, q: Array) -> Array:
-        """Return the rows of all constraints and closed contacts, (m, nv); rows of rounding are zero.
+        """Return the rows of all constraints and closed contacts, (m, nv); rows of rounding errors are zero.
 
         Args:
             q: configuration, (nq,).
@@ -142,7 +142,7 @@ class AtRest:
         return self.scaled_rows(q, self.root(q))[0]
 
     def directions(self, q: Array) -> tuple[Array, Array, Array]:
-        """Return the slip directions of friction elements; directions of rounding are zero.
+        """Return the slip directions of friction elements; directions of rounding errors are zero.
 
         Args:
             q: configuration, (nq,).

@@ -71,7 +71,7 @@ Table slip_axes(const Program& p, const Array2& q, const Array& t, const std::ve
     std::vector<int> blocks;
     for (const int element : elements) {
         if (element < 0 || element >= static_cast<int>(p.frictions.size()) || p.frictions[element].dim != 2)
-            throw std::invalid_argument("no such friction element of two directions");
+            throw std::invalid_argument("elements must be indices of friction elements with two directions");
         blocks.push_back(p.frictions[element].block);
     }
     std::vector<double> axes;

@@ -20,7 +20,7 @@ from pin_nonideal.types import Array, GeometryModel, JointModel, Model, Placemen
 
 # Maximum mass of the links between the axes of a ball joint, relative to the mass that the joint carries.
 MAX_LINK_MASS = 1e-6
-ROUNDING = 1e-9  # remaining mass of a body without its links that is rounding, relative to the body
+ROUNDING = 1e-9  # remaining mass of a body without its links that is rounding error, relative to the body
 # Tolerance for intersecting [m] and perpendicular [cosine] axes; exporters print about ten digits.
 AXIS_TOLERANCE = 1e-7
 

@@ -12,9 +12,9 @@ from pin_nonideal.core_loader import core
 from pin_nonideal.errors import SingularMassError
 from pin_nonideal.types import Model
 
-# Threshold of singularity. The rounding of M is a few units in the last place of the largest term of each
-# entry. After rows and columns are scaled to a unit diagonal, smaller eigenvalues cannot be distinguished
-# from zero.
+# Threshold of singularity. The rounding error of M is a few units in the last place of the largest term of
+# each entry. After rows and columns are scaled to a unit diagonal, smaller eigenvalues cannot be
+# distinguished from zero.
 MIN_EIGENVALUE = 16.0 * float(np.finfo(float).eps)
 
 
