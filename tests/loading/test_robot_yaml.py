@@ -246,9 +246,12 @@ YAML_REFUSED = {
     ),
     "a Python kind": (
         "laws:\n  - UserLaw: {function: os.system}",
-        "laws[0]: UserLaw holds Python functions, which a file cannot; add it to a Scene in Python",
+        "laws[0]: UserLaw holds Python functions, which a file cannot hold; add it to a Scene in Python",
     ),
-    "a Python torque": ("actuation:\n  function: f", "function holds a Python function, which a file cannot"),
+    "a Python torque": (
+        "actuation:\n  function: f",
+        "function holds a Python function, which a file cannot hold",
+    ),
     "a list for a table": ("constraints: {PointAnchor: {}}", "constraints must be a list; got a dict"),
     "two kinds in one entry": (
         "constraints:\n  - {PointAnchor: {}, FrameAnchor: {}}",

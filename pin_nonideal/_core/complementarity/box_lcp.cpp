@@ -75,7 +75,7 @@ void BoxProgram::solve_free(const MatrixView& W) {
     for (int i = 0; i < n; ++i) x_[list_[i]] = x[i];
 }
 
-// Compute the acceleration scale of each element. The scale of a light finger does not apply to a leg.
+// Compute the acceleration scale of each element. Light and heavy bodies of a robot have separate scales.
 void BoxProgram::measure(const MatrixView& W, const VecX& alpha0, const VecX& forces) {
     size_ = alpha0.cwiseAbs();
     for (int j = 0; j < forces.size(); ++j) size_ += std::abs(forces[j]) * W.col(j).cwiseAbs();

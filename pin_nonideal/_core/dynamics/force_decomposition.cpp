@@ -54,7 +54,7 @@ void split_forces(const Program& p, Workspace& w, Split& out) {
         // C includes the forces of sticking elements
         add_transpose(p.blocks[i], w.now.A, shared, constraint ? total : out.C);
     }
-    VecX left_over = VecX::Zero(nv);  // forces of lam minus shared multipliers, which locked dofs carry
+    VecX left_over = VecX::Zero(nv);  // locked dofs carry the forces of lam minus the shared multipliers
     for (int i : w.now.rows.blocks) add_transpose(p.blocks[i], w.now.A, lam - shared, left_over);
     for (int dof = 0; dof < nv; ++dof)
         if (w.now.terms.locked[dof]) out.C[dof] += holding_forces(p, w)[dof] + left_over[dof];

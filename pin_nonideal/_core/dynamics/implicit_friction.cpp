@@ -235,7 +235,7 @@ struct Implicit : Unknowns {
         const bool is_warm = w.state.warm;
         if (is_warm)
             exchange([&](int k, int place, int count) { y.segment(k, count) = kept.segment(place, count); });
-        w.state.warm = false;  // the state after a failure is no initial guess
+        w.state.warm = false;  // the state after a failure is not an initial guess
         const bool by_trees = w.state.has_wrenches = solve_trees(is_warm && w.state.has_wrenches);
         const bool by_factor = !by_trees && is_warm && iterate_with_last_factor();
         if (!(by_trees || by_factor || iterate()) || (bearings && is_due() && !contracts(y, by_trees))) {

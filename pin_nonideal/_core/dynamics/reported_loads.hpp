@@ -9,7 +9,7 @@ struct ReportedLoadsParameters {
     // Smallest entry of a row that counts in a unit vector of multipliers that exert no force.
     double min_part = 1e-9;
     // Rows of separate trees beyond which equally compliant contacts take the place of the shortest multipliers, whose
-    // cost grows by the cube of the number, to 20 ms here.
+    // cost grows with the cube of the number, to 20 ms here.
     int max_rows = 150;
     // Part of its limit by which friction may leave its cone by rounding.
     double cone_rounding = 1e-9;

@@ -9,8 +9,8 @@ namespace pn {
 
 // Ratio of the pivots of one tree beyond which the forces on its bodies lose too many digits.
 constexpr double max_pivot_ratio = 1e6;
-// Largest number of dofs of a deep tree whose inertia becomes a matrix. The cost of its factor grows by the cube of the
-// number, and rounding by the fourth power of the depth.
+// Largest number of dofs of a deep tree whose inertia becomes a matrix. The cost of its factor grows with the cube of the
+// number, and the rounding error with the fourth power of the depth.
 constexpr int max_deep_dofs = 200;
 
 TreeBlocks::TreeBlocks(const Program& p)

@@ -45,7 +45,7 @@ struct Runner {
 
     // Write the acceleration into `out`, an array of nv numbers. Uses plain buffers, for calls in tight loops.
     void acceleration(nb::handle q_in, nb::handle v_in, double t, nb::handle tau, nb::handle out);
-    // Solve Eq. (40) at one state. `frozen`: functions of time stand still, for states of rest. `directions`: unit slip
+    // Solve Eq. (40) at one state. `frozen`: functions of time are constant, for states of rest. `directions`: unit slip
     // directions in the order of `slip_rows`, for given modes of elements that begin to slip.
     Instant solve(const Array& q_in, const Array& v_in, double t, const std::optional<Array>& tau,
                   const std::optional<std::vector<Mode>>& modes, bool frozen, const std::optional<Array>& directions);

@@ -327,7 +327,7 @@ bool Simulation::recover(const Failure& failure) {
     return has_switched || modes.bridge_with_time_stepping(failure, of_hand_over) || (of_drive && modes.follow_drive());
 }
 
-// The loads of a stage that diverged are no guess for a shorter step.
+// Do not use the loads of a diverged stage as a guess for a shorter step.
 void Simulation::restore_guess() {
     w.state.unknown = guess;
     w.state.bearing_wrench = guessed_wrench;

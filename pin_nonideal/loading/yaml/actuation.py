@@ -46,7 +46,7 @@ def _drive(model: Model, entry: object, motors: Sequence[str], where: str, liste
         return named if listed else _by_joint(model, named)
     if kind in ("SampledControl", "function"):
         raise LoadingError(
-            f"{where}: {kind} holds a Python function, which a file cannot; pass it to Scene in Python"
+            f"{where}: {kind} holds a Python function, which a file cannot hold; pass it to Scene in Python"
         )
     if kind not in ACTUATION:
         raise LoadingError(f'{where}: unknown kind "{kind}"{nearest(kind, ("torques", *ACTUATION))}')

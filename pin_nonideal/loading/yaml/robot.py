@@ -216,7 +216,8 @@ def descriptions(entries: object, kinds: Mapping[str, type], where: str) -> list
         kind, values = one_entry(entry, place)
         if kind.startswith("User"):
             raise LoadingError(
-                f"{place}: {kind} holds Python functions, which a file cannot; add it to a Scene in Python"
+                f"{place}: {kind} holds Python functions, which a file cannot hold; add it to a "
+                "Scene in Python"
             )
         if kind not in kinds:
             raise LoadingError(f'{place}: unknown kind "{kind}"{nearest(kind, kinds)}')

@@ -20,7 +20,7 @@ struct ConeUniquenessParameters {
     double min_response = 1e-11;
     // Largest squared component of a normal force along such directions that counts as rounding error.
     double max_share = 1e-12;
-    // Maximum number of rows. The cost grows by the cube of the number.
+    // Maximum number of rows. The cost grows with the cube of the number.
     int max_rows = 120;
 };
 

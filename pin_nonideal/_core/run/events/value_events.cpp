@@ -59,7 +59,7 @@ void ValueEvents::start(double t, const VecX& y) {
     for (int k = 0; k < size(); ++k) side_[k] = sign(value(k, t, y));
 }
 
-// A value that is zero at the start of a run has no sign. The first sign of such a value is no event.
+// A value that is zero at the start of a run has no sign. The first sign of such a value is not an event.
 double ValueEvents::first_crossing(int k) {
     double before = 0.0;
     for (int i = 1; i <= parameters.samples; ++i) {

@@ -20,7 +20,7 @@ struct ErrorNormParameters {
     // Rounding error of a velocity, relative to the largest one. A joint that constraints drive slowly beside fast joints
     // has no digits below it at any step size.
     double velocity_rounding = 64 * std::numeric_limits<double>::epsilon();
-    // Residuals below this multiple of the rounding error of a projection are no error of a step.
+    // Residuals below this multiple of the rounding error of a projection do not count as an error of a step.
     double residual_spacings = 8.0;
     // Rounding error of the time in a step's stages, in floating-point spacings. This rounding shifts prescribed motions.
     double time_spacings = 4.0;

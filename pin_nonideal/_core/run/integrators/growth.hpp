@@ -16,7 +16,7 @@ struct GrowthGuardParameters {
     size_t half = 3;
     // Least and largest ratio of the rates of growth of the two halves that counts as exponential growth.
     double as_fast = 0.8, much_faster = 100.0;
-    // A chaotic motion with a source of energy grows by a power of time. The last decade of such a growth takes at least
+    // A chaotic motion with a source of energy grows with a power of time. The last decade of such a growth takes at least
     // this number of steps.
     long min_decade_steps = 1000;
     // Each of its decades takes longer than the one before, on average less than this many times as long. Under a

@@ -17,7 +17,7 @@ struct StepForcesParameters {
     // Largest relative error of the forces of separate trees with which the search with all responses is brief.
     double max_brief_error = 1e-2;
     // Largest number of rows of separate trees that are solved with all responses if the search tree by tree fails. The
-    // cost grows by the cube of the number, to a tenth of a second here.
+    // cost grows with the cube of the number, to a tenth of a second here.
     int max_rows_with_responses = 200;
     // Largest number of joints with dry friction, in a scene without contacts and constraints, that take less time with
     // all responses than tree by tree.
