@@ -36,16 +36,16 @@ class FailureKind(enum.Enum):
     """elements: blocks of the contacts; value: energy gained"""
 
     paradox = 3
-    """elements: friction elements; value: determinant"""
+    """elements: frictional elements; value: determinant"""
 
     not_converged = 4
-    """elements: friction elements whose modes were not found"""
+    """elements: frictional elements whose modes were not found"""
 
     closure = 5
     """elements: the block of rows; value: gap"""
 
     step_size = 6
-    """value: number of steps so far of a run without progress"""
+    """value: number of steps so far, when it would never end"""
 
     stiff = 7
     """elements: the degree of freedom; value: rate"""
@@ -57,14 +57,14 @@ class FailureKind(enum.Enum):
 
     unmet_law = 13
     """
-    elements: the law (0 motion, 1 Signorini, 2 limits, 3 dissipation), and its dof, block or friction element; value: residual
+    elements: the law (0 motion, 1 Signorini, 2 limits, 3 dissipation), and its dof, block or frictional element; value: residual
     """
 
     steps = 8
-    """value: maximum number of steps, which the run has taken"""
+    """value: number of steps, which is all that the run may take"""
 
     wall = 9
-    """value: maximum wall time, which the run has taken"""
+    """value: wall time, which is all that the run may take"""
 
     interrupted = 10
 
@@ -432,10 +432,10 @@ class EventKind(enum.Enum):
     """a cluster of events is bridged by time stepping"""
 
     several = 5
-    """the laws also allow other motions from this time on"""
+    """from here on the laws allow other motions too"""
 
     paradox = 6
-    """time stepping continues from this time on through modes that allow no motion"""
+    """from here on time stepping goes through modes that allow no motion"""
 
     user = 7
     """a function of the user crosses zero"""
@@ -459,7 +459,7 @@ class EventKind(enum.Enum):
     """a contact opens"""
 
     relaxed = 14
-    """steps violate the laws of contact from this time on, by the velocity in `miss`"""
+    """from here on steps miss the laws of contact, by the velocity in `miss`"""
 
 class Event:
     @property
