@@ -84,7 +84,8 @@ inline bool is_between_lines(const Kind& kind) {
     return is_line;
 }
 
-// Maximum penetration as `rounded_by`, at the state of the workspace: larger for a rim over a face than beside an edge.
+// Maximum penetration at which the direction out of contact is defined, at the state of the workspace. Only a rim depends on
+// the state: the maximum is larger over a face than beside an edge.
 inline double max_depth(const Program& p, const Workspace& w, int gap) {
     const Kind& kind = p.blocks[p.gaps[gap].block].kind;
     const auto* rim = std::get_if<DiskHullRow>(&kind);
@@ -93,7 +94,7 @@ inline double max_depth(const Program& p, const Workspace& w, int gap) {
     return rim->max_depth(Sides<Pose>{{p.mechanism, terms, rim->frame1}, {p.mechanism, terms, rim->frame2}, 0.0});
 }
 
-// Further penetration over which the direction out of contact stays defined, for a gap of a width with `rounded_by`.
+// Further penetration up to which the direction out of contact stays defined, for a gap of this width.
 inline double depth_left(const Program& p, const Workspace& w, int gap, double width) {
     double depth = HUGE_VAL;
     visit_as<ShapeGap>(p.blocks[p.gaps[gap].block].kind, [&](const auto& k) {

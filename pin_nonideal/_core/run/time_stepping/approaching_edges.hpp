@@ -35,8 +35,8 @@ private:
     const Program& p;
     Workspace& w;
     const GapWatch& watch_;
-    std::vector<double> rounded_by_;  // rounding radius of the edges of each gap
-    bool rounded_ = false;            // a gap has a rounding radius
+    std::vector<double> rounded_by_;  // maximum penetration of each gap with a defined normal, infinite for planes
+    bool rounded_ = false;            // a gap has a finite maximum
     std::vector<int> near_;           // gaps of edges and rims with a normal that a step may reach
 };
 
