@@ -291,11 +291,11 @@ def unit_axis(what: str, value: object) -> Vector3:
     x, y, z = array(what, value, (3,)).tolist()
     if not (x or y or z):
         raise InputError(f"{what} must have a direction; got three zeros")
-    return _unit_vector((x, y, z))
+    return unit_vector((x, y, z))
 
 
 @lru_cache(maxsize=MAX_CACHED_AXES)
-def _unit_vector(vector: Vector3) -> Vector3:
+def unit_vector(vector: Vector3) -> Vector3:
     """Return a vector of three numbers, not all zero, divided by its length."""
     scaled = np.array(vector)
     scaled /= np.abs(scaled).max()

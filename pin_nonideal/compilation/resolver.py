@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -31,7 +32,7 @@ from pin_nonideal.description.contacts.solids import (
 from pin_nonideal.errors import InputError, UnknownNameError, nearest
 from pin_nonideal.states.kinematics import frame_index, frame_on_joint, joint_placements
 from pin_nonideal.types import Array, Model, Placement
-from pin_nonideal.validation import Vector3, axis_triad, unit_axis
+from pin_nonideal.validation import Vector3, axis_triad, unit_axis, unit_vector
 
 # A frame in the form of the core: joint index, rotation matrix by rows, translation [m].
 Frame = tuple[int, list[float], list[float]]
@@ -64,7 +65,8 @@ class Resolver:
         self._placements = joint_placements(model, q0)
         self._frames: dict[str, Frame] = {}
         self._placed_frames: dict[tuple[str, Vector3, Vector3], Frame] = {}  # shared by contacts
-        self._segments: dict[tuple[str, Segment], tuple[Frame, float]] = {}
+        self._segments: dict[tuple[str, tuple[Segment, ...]], list[tuple[Frame, float]]] = {}
+        self._balls: dict[tuple[str, tuple[Vector3, ...]], list[Frame]] = {}
         self._planes: dict[tuple[str | None, float, Vector3], tuple[Frame, Axes]] = {}
 
     def frame_id(self, name: str, who: str) -> int:
@@ -147,8 +149,8 @@ class Resolver:
         """Return frames at the segment centers, z along the segments, and the half lengths [m]."""
         self._two_bodies(c, who)
         ends1, ends2 = segments(c)
-        first, half1 = self.segment(c.frame1, ends1, who)
-        second, half2 = self.segment(c.frame2, ends2, who)
+        ((first, half1),) = self.segments(c.frame1, (ends1,), who)
+        ((second, half2),) = self.segments(c.frame2, (ends2,), who)
         return first, second, half1, half2
 
     def capsule_pairs(
@@ -157,21 +159,21 @@ class Resolver:
         """Return frames at the centers of all segments, z along them, and the half lengths [m]."""
         c = pairs.like
         self._two_bodies(c, who)
-        return (
-            [self.segment(c.frame1, ends, who) for ends in pairs.lines1],
-            [self.segment(c.frame2, ends, who) for ends in pairs.lines2],
-        )
+        return self.segments(c.frame1, pairs.lines1, who), self.segments(c.frame2, pairs.lines2, who)
 
-    def segment(self, frame: str, ends: Segment, who: str) -> tuple[Frame, float]:
-        """Return the frame at the center of a segment, z along it, and its half length [m]."""
-        key = frame, ends
+    def segments(self, frame: str, lines: tuple[Segment, ...], who: str) -> list[tuple[Frame, float]]:
+        """Return frames at the centers of segments, z along them, and the half lengths [m]."""
+        key = frame, lines
         if key not in self._segments:
-            self._segments[key] = along(self.frame(frame, who), np.array(ends), who)
+            self._segments[key] = [along(self.frame(frame, who), ends) for ends in lines]
         return self._segments[key]
 
     def other_balls(self, balls: BallContacts, who: str) -> list[Frame]:
         """Return the frames at the centers of all spheres but the first."""
-        return [self.placed(balls.like.frame1, offset, who) for offset in balls.offsets[1:]]
+        key = balls.frame, balls.offsets
+        if key not in self._balls:
+            self._balls[key] = [self.placed(balls.frame, offset, who) for offset in balls.offsets[1:]]
+        return self._balls[key]
 
     def box(self, c: BoxContact, who: str) -> tuple[Frame, Frame, list[float]]:
         """Return frames at the centers of sphere and box, and half edges minus the rounding radius [m]."""
@@ -196,7 +198,7 @@ class Resolver:
         """
         first, second = self._two_bodies(c, who)
         above = c.below if c.above is None else c.above
-        first, half1 = along(first, np.array([c.offset, c.offset if c.end is None else c.end]), who)
+        first, half1 = along(first, (c.offset, c.offset if c.end is None else c.end))
         return (
             first,
             rotated_frame(translated_frame(second, c.xyz), c.rpy),
@@ -267,24 +269,30 @@ def translated_frame(frame: Frame, by: Sequence[float] | Array) -> Frame:
         by: translation in the axes of the frame [m], (3,).
     """
     joint, R, p = frame
-    return (joint, R, (np.array(p) + np.reshape(R, (3, 3)) @ np.array(by)).tolist()) if any(by) else frame
+    return (joint, R, [x + move for x, move in zip(p, _rotated(R, by), strict=True)]) if any(by) else frame
 
 
-def along(frame: Frame, ends: Array, who: str) -> tuple[Frame, float]:
+def along(frame: Frame, ends: Segment) -> tuple[Frame, float]:
     """Return a frame at the center of a segment, with z along it, and its half length [m].
 
     Args:
         frame: a frame on the same body.
-        ends: ends of the segment in the axes of the frame [m], (2, 3).
-        who: prefix of error messages.
+        ends: ends of the segment in the axes of the frame [m].
     """
     first, last = ends
-    half = 0.5 * float(np.linalg.norm(last - first))
-    joint, R, p = translated_frame(frame, 0.5 * (first + last))
+    half = 0.5 * math.dist(first, last)
+    joint, R, p = translated_frame(frame, [0.5 * (a + b) for a, b in zip(first, last, strict=True)])
     if half > 0.0:
-        triad = axis_triad(unit_axis(who, last - first))
-        R = (np.reshape(R, (3, 3)) @ np.column_stack(triad)).ravel().tolist()
+        x, y, z = (b - a for a, b in zip(first, last, strict=True))
+        columns = [_rotated(R, axis) for axis in axis_triad(unit_vector((x, y, z)))]
+        R = [column[row] for row in range(3) for column in columns]
     return (joint, R, p), half
+
+
+def _rotated(R: Sequence[float], vector: Sequence[float] | Array) -> list[float]:
+    """Return the product of a rotation matrix, by rows, and a vector."""
+    x, y, z = map(float, vector)
+    return [R[k] * x + R[k + 1] * y + R[k + 2] * z for k in (0, 3, 6)]
 
 
 def rotated_frame(frame: Frame, rpy: Sequence[float] | Array) -> Frame:

@@ -119,8 +119,10 @@ def _half_space_contacts(
         "height": float(ground.normal @ ground.points[0]),
         **options,
     }
-    for point in np.unique(shape.points, axis=0):
-        yield PointContact(shape.frame, offset=tuple(point.tolist()), radius=shape.radius, **level)
+    if len(shape.points):
+        offsets = rows_of(np.unique(shape.points, axis=0))
+        like = PointContact(shape.frame, offset=offsets[0], radius=shape.radius, **level)
+        yield BallContacts(like, offsets)
     rpy = tuple(pin.rpy.matrixToRpy(shape.place.rotation).tolist())
     if shape.semiaxes is not None:
         xyz, semiaxes = tuple(shape.place.translation.tolist()), tuple(shape.semiaxes.tolist())
@@ -129,8 +131,8 @@ def _half_space_contacts(
         return
     inset = rim_inset(who, shape, rounding)
     for end, radius in faces(shape):
-        for point in face_points(shape, end, radius):
-            yield PointContact(shape.frame, offset=point, **level)
+        offsets = tuple(face_points(shape, end, radius))
+        yield BallContacts(PointContact(shape.frame, offset=offsets[0], **level), offsets)
         middle = to_joint_frame(shape, 0.0, 0.0, end - np.copysign(inset, end))
         # The rim belongs to a disk, an ellipsoid without thickness.
         yield EllipsoidContact(shape.frame, (radius, radius, 0.0), offset=middle, rpy=rpy, **level)

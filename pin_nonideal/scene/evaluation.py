@@ -127,13 +127,29 @@ class Evaluator:
         **named: Rest.kwargs,
     ) -> Result:
         """Result of a function of the core at a state that is checked here."""
+        try:
+            return function(*self.arguments(q, v, t, tau), *rest, **named)
+        except core.CoreFailure as failure:
+            raise self._compiled.named(failure) from None
+
+    def arguments(
+        self, q: State, v: State, t: float, tau: ArrayLike | None
+    ) -> tuple[Array, Array, float, Array | None]:
+        """Check a state and torques, and return them as numbers.
+
+        Args:
+            q: configuration, (nq,) or by joint name.
+            v: velocity, (nv,) or by joint name.
+            t: time [s].
+            tau: joint torques, (nv,) or by joint name, or None.
+
+        Raises:
+            InputError: wrong shapes or numbers.
+        """
         q_in, v_in = self._states.configuration(q, "q"), self._states.velocity(v, "v")
         self._states.check_functions_at(q_in, v_in, t)
         torque = None if tau is None else named_joint_values(self._compiled.model, tau, "tau")
-        try:
-            return function(q_in, v_in, number("t", t), torque, *rest, **named)
-        except core.CoreFailure as failure:
-            raise self._compiled.named(failure) from None
+        return q_in, v_in, number("t", t), torque
 
     def rank(self, q: Array, v: Array) -> int:
         """Number of independent rows at a state, where every friction element slips.

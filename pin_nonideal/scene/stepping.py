@@ -169,7 +169,11 @@ class SceneStepper:
         try:  # arrays of the right shape go straight to the core, which checks sizes, lengths and finiteness
             return run.step(q, v, t, tau)
         except (TypeError, ValueError, core.CoreFailure):
-            return self._evaluator.call(run.step, q, v, t, tau)
+            state = self._evaluator.arguments(q, v, t, tau)
+        try:
+            return run.step(*state)
+        except core.CoreFailure as failure:
+            raise self._compiled.named(failure, method) from None
 
     def stepper(
         self,

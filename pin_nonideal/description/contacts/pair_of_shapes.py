@@ -11,6 +11,7 @@ from typing import TypeVar
 
 from pin_nonideal.validation import Vector3
 
+from . import PointContact
 from .base import similar
 from .point_names import NumberedNames
 from .round import BoxContact, CapsuleContact, Segment
@@ -18,8 +19,9 @@ from .solids import CylinderContact, HullContact
 
 C = TypeVar("C")
 
-# Contacts of a sphere, or a point, with a solid; for this `CylinderContact` has no second end of a capsule.
-BallContact = BoxContact | HullContact | CylinderContact
+# Contacts of a sphere, or a point, with a plane or a solid.
+# A `CylinderContact` then has no second end of a capsule.
+BallContact = PointContact | BoxContact | HullContact | CylinderContact
 
 
 @dataclass(frozen=True)
@@ -56,11 +58,11 @@ class ContactGroup(ABC):
 
 @dataclass(frozen=True)
 class BallContacts(ContactGroup):
-    """Contacts of spheres, or points, of a body with a solid of another body.
+    """Contacts of spheres, or points, of a body with a plane or a solid of another body.
 
     Attributes:
         like: the contact of the first sphere.
-        offsets: centers of the spheres in the axes of frame1 [m].
+        offsets: centers of the spheres in the axes of `frame` [m].
     """
 
     like: BallContact
@@ -68,6 +70,11 @@ class BallContacts(ContactGroup):
 
     def __len__(self) -> int:
         return len(self.offsets)
+
+    @property
+    def frame(self) -> str:
+        """Frame of the spheres."""
+        return self.like.frame if isinstance(self.like, PointContact) else self.like.frame1
 
     def contacts(self) -> Iterator[object]:
         """Yield the description of each contact."""

@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from pin_nonideal.compilation.compiled_scene import CompiledScene
 from pin_nonideal.description.contacts import JointLimit
-from pin_nonideal.description.contacts.pair_of_shapes import CapsulePairs, contact_parts
+from pin_nonideal.description.contacts.pair_of_shapes import BallContacts, CapsulePairs, contact_parts
 from pin_nonideal.description.contacts.round import CapsuleContact, SphereContact
 from pin_nonideal.scene.scene import compiled_scene
 from pin_nonideal.states.kinematics import frame_on_joint
@@ -58,14 +58,15 @@ class Plane:
 def planes_of(compiled: CompiledScene) -> list[Plane]:
     """Return the planes of all contacts and rolling bodies, without duplicates."""
     model, planes = compiled.model, list[Plane]()
-    for item in [*contact_parts(compiled.spec.contacts), *compiled.spec.constraints]:
+    for part in [*contact_parts(compiled.spec.contacts), *compiled.spec.constraints]:
+        item = part.like if isinstance(part, BallContacts) else part
         name = getattr(item, "plane", "")
         if not hasattr(item, "normal") or (name is not None and not (name and model.existFrame(name))):
             continue
         joint, place = (0, pin.SE3.Identity()) if name is None else frame_on_joint(model, name)
         normal = np.asarray(place.rotation) @ np.asarray(unit_axis("normal", item.normal))
         point = np.asarray(place.translation) + getattr(item, "height", 0.0) * normal
-        plane = Plane(joint, point, normal, [_touching(model, item)])
+        plane = Plane(joint, point, normal, _touching(model, part))
         known = next((other for other in planes if other.same(plane)), None)
         if known is None:
             planes.append(plane)
@@ -74,9 +75,11 @@ def planes_of(compiled: CompiledScene) -> list[Plane]:
     return planes
 
 
-def _touching(model: pin.Model, item: Any) -> tuple[int, Array]:
-    joint, place = frame_on_joint(model, item.frame)
-    return joint, np.asarray(place.act(np.asarray(getattr(item, "offset", np.zeros(3)), dtype=float)))
+def _touching(model: pin.Model, part: Any) -> list[tuple[int, Array]]:
+    """Return joint and position of the points that touch a plane."""
+    joint, place = frame_on_joint(model, part.frame)
+    offsets = part.offsets if isinstance(part, BallContacts) else [getattr(part, "offset", (0.0, 0.0, 0.0))]
+    return [(joint, np.asarray(place.act(np.array(offset, dtype=float)))) for offset in offsets]
 
 
 def ground_of(planes: list[Plane], up: Array) -> Plane | None:

@@ -208,6 +208,10 @@ def test_a_motion_prescribed_into_a_contact_is_refused_by_name(method: str, cont
         stepper = scene.stepper(1.0, method=method, **step)
         with pytest.raises(pn.InconsistentConstraintsError, match=r'cannot separate at.*\("drive"\)'):
             stepper.step()
+        touch = 0.5 + 0.25 * DT
+        with pytest.raises(pn.InconsistentConstraintsError, match=r"cannot separate at.*drive") as of_step:
+            scene.step([0.3 - 0.5 * touch], [-0.5], None, DT, t=touch, method=method)
+        assert 'method="moreau"' not in str(of_step.value)
     assert 'method="moreau"' not in str(told.value)
     assert abs(told.value.time - 0.5) <= 2.0 * DT
 
