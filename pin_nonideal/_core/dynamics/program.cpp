@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <numeric>
 #include <map>
+#include <unordered_map>
 
 namespace pn {
 
@@ -46,21 +47,23 @@ static void number_descriptions(Program& p) {
     p.described.finish(p.layout.rows);
 }
 
-// Geometry of a gap as a list of numbers. `is_known` is false for kinds with other data, such as solids or functions.
+// Geometry of a gap as a list of numbers.
 class GapNumbers {
 public:
-    GapNumbers(const Program& p, const Gap& gap) {
+    // Return the bytes of the numbers, none for kinds with other data, such as solids or functions.
+    std::string bytes(const Program& p, const Gap& gap) {
+        numbers_.clear();
+        is_known_ = true;
         const Kind& kind = p.blocks[gap.block].kind;
         add(static_cast<double>(kind.index()));
         std::visit([this](const auto& k) {
             std::apply([&](const auto&... data) { (add(k.*data.member), ...); }, k.data());
         }, kind);
+        return {reinterpret_cast<const char*>(numbers_.data()), is_known_ ? numbers_.size() * sizeof(double) : 0};
     }
-    bool is_known() const { return is_known_; }
-    const std::vector<double>& numbers() const { return numbers_; }
 
 private:
-    void add(double x) { numbers_.push_back(x); }
+    void add(double x) { numbers_.push_back(x + 0.0); }  // -0 and 0 have different bytes
     void add(int x) { numbers_.push_back(x); }
     void add(const Vec3& x) {
         for (int k = 0; k < 3; ++k) add(x[k]);
@@ -87,10 +90,11 @@ static void number_bodies(Program& p) {
 }
 
 static void find_duplicates(Program& p) {
-    std::map<std::vector<double>, int> first;
+    std::unordered_map<std::string, int> first;
+    GapNumbers numbers;
     for (int i = 0; i < static_cast<int>(p.gaps.size()); ++i) {
-        const GapNumbers of(p, p.gaps[i]);
-        p.gaps[i].same_geometry_as = of.is_known() ? first.emplace(of.numbers(), i).first->second : i;
+        std::string bytes = numbers.bytes(p, p.gaps[i]);
+        p.gaps[i].same_geometry_as = bytes.empty() ? i : first.emplace(std::move(bytes), i).first->second;
     }
 }
 
@@ -112,6 +116,9 @@ static std::vector<int> acting_dofs(const Program& p, const Block& block) {
 // Find the dofs that constraints tie to a constraint that depends on time, and the friction elements along such dofs.
 // Blocks without rows tie no dofs.
 static void find_tied_to_drives(Program& p) {
+    p.tied_to_drives.assign(p.mechanism.nv, 0);
+    p.elements_of_drives.assign(p.frictions.size(), 0);
+    if (!p.moves_in_time) return;
     std::vector<int> parent(p.mechanism.nv);
     std::iota(parent.begin(), parent.end(), 0);
     const auto root = [&](int dof) {
@@ -126,13 +133,11 @@ static void find_tied_to_drives(Program& p) {
     }
     std::vector<char> drives(p.mechanism.nv, 0);
     for (int dof : timed) drives[root(dof)] = 1;
-    p.tied_to_drives.clear();
-    for (int dof = 0; dof < p.mechanism.nv; ++dof) p.tied_to_drives.push_back(drives[root(dof)]);
-    p.elements_of_drives.clear();
-    for (const Friction& friction : p.frictions) {
-        const std::vector<int> acting = acting_dofs(p, p.blocks[friction.block]);
-        p.elements_of_drives.push_back(
-            std::any_of(acting.begin(), acting.end(), [&](int dof) { return p.tied_to_drives[dof]; }));
+    for (int dof = 0; dof < p.mechanism.nv; ++dof) p.tied_to_drives[dof] = drives[root(dof)];
+    for (size_t e = 0; e < p.frictions.size(); ++e) {
+        const std::vector<int> acting = acting_dofs(p, p.blocks[p.frictions[e].block]);
+        p.elements_of_drives[e] =
+            std::any_of(acting.begin(), acting.end(), [&](int dof) { return p.tied_to_drives[dof]; });
     }
 }
 

@@ -25,9 +25,10 @@ struct Vec3 {
     PN_INLINE Vec3(double a, double b, double c) : x{a, b, c, 0.0} {}
     template <class Derived>
     Vec3(const Eigen::MatrixBase<Derived>& v) : x{v[0], v[1], v[2], 0.0} {}
-    // Copies are written by hand, so that both versions of a wide function pass the vector in memory.
-    PN_INLINE Vec3(const Vec3& o) : x(o.x) {}
-    PN_INLINE Vec3& operator=(const Vec3& o) { x = o.x; return *this; }
+    // Copies are written by hand, so that both versions of a wide function pass the vector in memory. They throw nothing:
+    // a growing std::vector then moves the elements that contain vectors.
+    PN_INLINE Vec3(const Vec3& o) noexcept : x(o.x) {}
+    PN_INLINE Vec3& operator=(const Vec3& o) noexcept { x = o.x; return *this; }
 
     static PN_INLINE Vec3 Zero() { return {}; }
     static PN_INLINE Vec3 UnitX() { return {1.0, 0.0, 0.0}; }
@@ -83,8 +84,8 @@ struct Mat3 {
     template <class Derived>
     Mat3(const Eigen::MatrixBase<Derived>& m) : c{m.col(0), m.col(1), m.col(2)} {}
     // Copies written by hand as for Vec3: inlined everywhere.
-    PN_INLINE Mat3(const Mat3& o) : c{o.c[0], o.c[1], o.c[2]} {}
-    PN_INLINE Mat3& operator=(const Mat3& o) {
+    PN_INLINE Mat3(const Mat3& o) noexcept : c{o.c[0], o.c[1], o.c[2]} {}
+    PN_INLINE Mat3& operator=(const Mat3& o) noexcept {
         for (int k = 0; k < 3; ++k) c[k] = o.c[k];
         return *this;
     }
