@@ -36,16 +36,16 @@ class FailureKind(enum.Enum):
     """elements: blocks of the contacts; value: energy gained"""
 
     paradox = 3
-    """elements: frictional elements; value: determinant"""
+    """elements: friction elements; value: determinant"""
 
     not_converged = 4
-    """elements: frictional elements whose modes were not found"""
+    """elements: friction elements whose modes were not found"""
 
     closure = 5
     """elements: the block of rows; value: gap"""
 
     step_size = 6
-    """value: number of steps so far, when it would never end"""
+    """value: number of steps so far of a run without progress"""
 
     stiff = 7
     """elements: the degree of freedom; value: rate"""
@@ -57,14 +57,14 @@ class FailureKind(enum.Enum):
 
     unmet_law = 13
     """
-    elements: the law (0 motion, 1 Signorini, 2 limits, 3 dissipation), and its dof, block or frictional element; value: residual
+    elements: the law (0 motion, 1 Signorini, 2 limits, 3 dissipation), and its dof, block or friction element; value: residual
     """
 
     steps = 8
-    """value: number of steps, which is all that the run may take"""
+    """value: maximum number of steps, which the run has taken"""
 
     wall = 9
-    """value: wall time, which is all that the run may take"""
+    """value: maximum wall time, which the run has taken"""
 
     interrupted = 10
 
@@ -432,10 +432,10 @@ class EventKind(enum.Enum):
     """a cluster of events is bridged by time stepping"""
 
     several = 5
-    """from here on the laws allow other motions too"""
+    """the laws also allow other motions from this time on"""
 
     paradox = 6
-    """from here on time stepping goes through modes that allow no motion"""
+    """time stepping continues from this time on through modes that allow no motion"""
 
     user = 7
     """a function of the user crosses zero"""
@@ -459,7 +459,7 @@ class EventKind(enum.Enum):
     """a contact opens"""
 
     relaxed = 14
-    """from here on steps miss the laws of contact, by the velocity in `miss`"""
+    """steps violate the laws of contact from this time on, by the velocity in `miss`"""
 
 class Event:
     @property

@@ -38,18 +38,18 @@ void bind_failures(nb::module_& m) {
         .value("inconsistent", Kind::inconsistent, "elements: blocks of rows; value: residual")
         .value("not_finite", Kind::not_finite)
         .value("impact_energy", Kind::impact_energy, "elements: blocks of the contacts; value: energy gained")
-        .value("paradox", Kind::paradox, "elements: frictional elements; value: determinant")
-        .value("not_converged", Kind::not_converged, "elements: frictional elements whose modes were not found")
+        .value("paradox", Kind::paradox, "elements: friction elements; value: determinant")
+        .value("not_converged", Kind::not_converged, "elements: friction elements whose modes were not found")
         .value("closure", Kind::closure, "elements: the block of rows; value: gap")
-        .value("step_size", Kind::step_size, "value: number of steps so far, when it would never end")
+        .value("step_size", Kind::step_size, "value: number of steps so far of a run without progress")
         .value("stiff", Kind::stiff, "elements: the degree of freedom; value: rate")
         .value("growing", Kind::growing,
                "elements: the degree of freedom, and its cause: 0 the actuation, 1 given forces, 2 laws; value: rate")
         .value("unmet_law", Kind::unmet_law,
-               "elements: the law (0 motion, 1 Signorini, 2 limits, 3 dissipation), and its dof, block or frictional "
+               "elements: the law (0 motion, 1 Signorini, 2 limits, 3 dissipation), and its dof, block or friction "
                "element; value: residual")
-        .value("steps", Kind::steps, "value: number of steps, which is all that the run may take")
-        .value("wall", Kind::wall, "value: wall time, which is all that the run may take")
+        .value("steps", Kind::steps, "value: maximum number of steps, which the run has taken")
+        .value("wall", Kind::wall, "value: maximum wall time, which the run has taken")
         .value("interrupted", Kind::interrupted);
     core_failure = PyErr_NewException("pin_nonideal._core.CoreFailure", nullptr, nullptr);
     m.attr("CoreFailure") = nb::steal(core_failure).inc_ref();

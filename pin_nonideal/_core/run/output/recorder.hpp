@@ -42,8 +42,8 @@ constexpr EventKind event_kinds[] = {
     {Event::Kind::reverse, "reverse", "the slip velocity reverses"},
     {Event::Kind::pull, "pull", "the normal force of a contact turns negative"},
     {Event::Kind::chatter, "chatter", "a cluster of events is bridged by time stepping"},
-    {Event::Kind::several, "several", "from here on the laws allow other motions too"},
-    {Event::Kind::paradox, "paradox", "from here on time stepping goes through modes that allow no motion"},
+    {Event::Kind::several, "several", "the laws also allow other motions from this time on"},
+    {Event::Kind::paradox, "paradox", "time stepping continues from this time on through modes that allow no motion"},
     {Event::Kind::user, "user", "a function of the user crosses zero"},
     {Event::Kind::saturate, "saturate", "the torque of a drive reaches its effort limit"},
     {Event::Kind::desaturate, "desaturate", "the torque of a drive falls below its effort limit"},
@@ -51,7 +51,7 @@ constexpr EventKind event_kinds[] = {
     {Event::Kind::impact, "impact", "a contact strikes, with an impulse"},
     {Event::Kind::touch_down, "touch_down", "a contact closes without an impulse, or its bouncing ends"},
     {Event::Kind::lift_off, "lift_off", "a contact opens"},
-    {Event::Kind::relaxed, "relaxed", "from here on steps miss the laws of contact, by the velocity in `miss`"},
+    {Event::Kind::relaxed, "relaxed", "steps violate the laws of contact from this time on, by the velocity in `miss`"},
 };
 
 struct Recording {
