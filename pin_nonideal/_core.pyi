@@ -435,7 +435,9 @@ class EventKind(enum.Enum):
     """the laws also allow other motions from this time on"""
 
     paradox = 6
-    """time stepping continues from this time on through modes that allow no motion"""
+    """
+    time stepping continues from this time on through modes that allow no motion
+    """
 
     user = 7
     """a function of the user crosses zero"""
@@ -459,7 +461,9 @@ class EventKind(enum.Enum):
     """a contact opens"""
 
     relaxed = 14
-    """steps violate the laws of contact from this time on, by the velocity in `miss`"""
+    """
+    steps violate the laws of contact from this time on, by the velocity in `miss`
+    """
 
 class Event:
     @property

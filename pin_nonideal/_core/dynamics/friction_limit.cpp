@@ -167,23 +167,25 @@ Vec3 force_direction(const Program& p, Workspace& w, int e) {
     return -w.state.last_direction[e];
 }
 
-static PN_INLINE void add_force_of_slip(const Program& p, Workspace& w, int e, VecX& C) {
-    if (!slips(w.state.mode[e])) return;
+void add_current_slip_force(const Program& p, const Workspace& w, int e, VecX& C) {
     const Block& block = p.blocks[p.frictions[e].block];
-    Vec3& force = w.now.slip_force.change(e);
-    force = w.now.limit[e] * force_direction(p, w, e);
-    w.now.reactions.current = false;
+    const Vec3& force = w.now.slip_force[e];
     if (block.dof >= 0)
         for (int k = 0; k < block.total; ++k) C[block.dof + k] += force[k];
     else
         add_along(block, w.now.A, force, C);
 }
 
-void add_slip_force(const Program& p, Workspace& w, int e, VecX& C) { add_force_of_slip(p, w, e, C); }
+void add_slip_force(const Program& p, Workspace& w, int e, VecX& C) {
+    if (!slips(w.state.mode[e])) return;
+    w.now.slip_force.change(e) = w.now.limit[e] * force_direction(p, w, e);
+    w.now.reactions.current = false;
+    add_current_slip_force(p, w, e, C);
+}
 
 void add_slip_forces(const Program& p, Workspace& w, bool load_dependent, VecX& C) {
     for (int e : w.now.slipping)
-        if ((p.frictions[e].reaction != Reaction::none) == load_dependent) add_force_of_slip(p, w, e, C);
+        if ((p.frictions[e].reaction != Reaction::none) == load_dependent) add_slip_force(p, w, e, C);
 }
 
 }  // namespace pn

@@ -48,8 +48,10 @@ bool shares_hold(const Program& p, Workspace& w, const std::vector<int>& list, d
 double current_limit(const Program& p, Workspace& w, int element, double t, const VecX& q, const VecX& v);
 // Unit direction of the friction force of a slipping element.
 Vec3 force_direction(const Program& p, Workspace& w, int element);
-// Add the force of a slipping element, for the limit in the workspace, to a generalized force. add_slip_forces adds the
-// forces of all slipping elements, with (`load_dependent`) or without a load from reactions.
+// Add the current force of a slipping element to a generalized force. The motion does not change.
+void add_current_slip_force(const Program& p, const Workspace& w, int element, VecX& C);
+// Compute the force of a slipping element for the limit in the workspace, and add the force to a generalized force.
+// add_slip_forces adds the forces of all slipping elements, with (`load_dependent`) or without a load from reactions.
 void add_slip_force(const Program& p, Workspace& w, int element, VecX& C);
 void add_slip_forces(const Program& p, Workspace& w, bool load_dependent, VecX& C);
 

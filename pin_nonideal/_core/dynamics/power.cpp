@@ -18,10 +18,10 @@ std::vector<std::string> power_names(const Program& p) {
 }
 
 // Compute C of each law without sticking forces, which have no power.
-static void moving_law_forces(const Program& p, Workspace& w, const VecX& v, LawForceList& force) {
+static void moving_law_forces(const Program& p, const Workspace& w, const VecX& v, LawForceList& force) {
     force.clear();
     add_forces_by_law(p, w, v, force);
-    for (int e : w.now.slipping) add_slip_force(p, w, e, force[p.frictions[e].law]);
+    for (int e : w.now.slipping) add_current_slip_force(p, w, e, force[p.frictions[e].law]);
 }
 
 void law_forces(const Program& p, Workspace& w, const VecX& v, LawForceList& force) {

@@ -288,14 +288,16 @@ void BlockNewton::take(const BlockProblem& p, const Island& island, double lengt
 
 void BlockNewton::begin(const BlockProblem& p, const Island& island, const VecX& free_w) {
     unit_ = 1.0;
-    unit_ = speed(p, island, free_w);
+    unit_ = speed(p, island, free_w, false);
 }
 
-double BlockNewton::speed(const BlockProblem& p, const Island& island, const VecX& w) const {
+double BlockNewton::speed(const BlockProblem& p, const Island& island, const VecX& w, bool of_rest) const {
     double largest = 0.0;
-    for (int i : island.elements)
+    for (int i : island.elements) {
+        if (of_rest && !p.elements[i].rests) continue;
         for (int r = p.elements[i].row; r < p.elements[i].row + p.elements[i].dim(); ++r)
             largest = std::max(largest, root_rho_[r] * std::abs(w[r]));
+    }
     return unit_ > 0.0 ? largest / unit_ : 0.0;
 }
 

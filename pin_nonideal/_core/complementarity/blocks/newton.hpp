@@ -65,9 +65,9 @@ public:
     void sweep(const BlockProblem& p, const Island& island, int sweeps, VecX& f, VecX& x, VecX& w);
     // Compute x and w of the island under the forces f.
     void move(const BlockProblem& p, const Island& island, const VecX& f, VecX& x, VecX& w) const;
-    // Return the largest of the rows w of an island, relative to the largest without forces, in units of the root of an
-    // energy.
-    double speed(const BlockProblem& p, const Island& island, const VecX& w) const;
+    // Return the largest of the rows w of an island, or of its elements that rest (`of_rest`), relative to the largest
+    // row without forces, in units of the root of an energy.
+    double speed(const BlockProblem& p, const Island& island, const VecX& w, bool of_rest) const;
     // Find the element of an island with the largest relative error, and that error as a velocity.
     void worst(const BlockProblem& p, const Island& island, const VecX& f, const VecX& w, int& element,
                double& velocity) const;

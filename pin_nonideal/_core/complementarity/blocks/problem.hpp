@@ -32,6 +32,7 @@ struct BlockElement {
     int node[2] = {-1, -1};   // the second one is -1 for an element of one node
     int J[2] = {0, 0};        // first entries of the blocks of J
     int column = -1;          // only nonzero column of a single row on one node
+    bool rests = true;        // the element keeps its rest if forces can hold it
 
     int dim() const { return cone.dim; }
     int head() const { return cone.is(ConeElement::Kind::contact) ? 1 : 0; }  // rows of the normal

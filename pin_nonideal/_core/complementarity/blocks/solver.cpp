@@ -10,6 +10,7 @@ bool BlockSolver::pose() {
     newton_.pose(problem);
     islands_.find(problem);
     if (static_cast<int>(factors_.size()) < islands_.size()) factors_.resize(islands_.size());
+    errors_.assign(islands_.size(), 0.0);
     w_.setZero(problem.rows);
     return true;
 }
@@ -181,13 +182,13 @@ double BlockSolver::solve_within_energy(int island, VecX& f) {
 }
 
 double BlockSolver::solve(VecX& f) {
+    guess_ = f;
     error_ = 0.0;
     miss_ = {};
-    guess_ = f;
     for (int i = 0; i < islands_.size(); ++i) {
-        const double error = solve_within_energy(i, f);
-        if (error > error_) {
-            error_ = error;
+        errors_[i] = solve_within_energy(i, f);
+        if (errors_[i] > error_) {
+            error_ = errors_[i];
             newton_.worst(problem, islands_[i], f, w_, miss_.element, miss_.velocity);
         }
         if (newton_.project(problem, islands_[i], f)) newton_.move(problem, islands_[i], f, x_, w_);
@@ -195,29 +196,57 @@ double BlockSolver::solve(VecX& f) {
     return error_;
 }
 
+// Check if the elements that rest stay at rest, each in its own units and in those of an energy, in which a light body may
+// be faster than a heavy one.
+bool BlockSolver::rests(const Island& island) const {
+    const double still = parameters.rest_speed * free_speed_;
+    return newton_.speed(problem, island, w_, true) <= parameters.rest_speed &&
+           std::all_of(island.elements.begin(), island.elements.end(), [&](int i) {
+               const BlockElement& e = problem.elements[i];
+               return !e.rests || w_.segment(e.row, e.dim()).norm() <= still;
+           });
+}
+
 // Search for rest from the end of the convex problem's path. Compliant elements share the loads in one way.
 bool BlockSolver::hold(int island, VecX& f) {
     const Island& on = islands_[island];
-    const auto rests = [&] { return newton_.speed(problem, on, w_) <= parameters.rest_speed; };
     path_.follow(problem, newton_, on, factors_[island], BlockInteriorPoint::Slip::none, f, x_, w_);
-    if (!(newton_.speed(problem, on, w_) <= parameters.path_rest_speed)) return false;
+    if (!(newton_.speed(problem, on, w_, true) <= parameters.path_rest_speed)) return false;
     swept_ = f;
-    if (share(island, f) && rests()) return true;
+    if (share(island, f) && rests(on)) return true;
     copy(on, swept_, f);
     newton_.move(problem, on, f, x_, w_);
-    return newton(island, BlockNewton::Search::bold, 0.0, f) <= parameters.tolerance && rests();
+    return newton(island, BlockNewton::Search::bold, 0.0, f) <= parameters.tolerance && rests(on);
+}
+
+// Check if an island has elements that rest and no contact that moves. The convex problem does not state the law of a
+// contact that slides.
+bool BlockSolver::may_hold(const Island& island) const {
+    bool rests = false;
+    for (int i : island.elements) {
+        const BlockElement& e = problem.elements[i];
+        if (!e.rests && e.head() > 0) return false;
+        rests |= e.rests;
+    }
+    return rests;
 }
 
 bool BlockSolver::hold(VecX& f) {
     bool all = true;
     guess_ = f;
     for (int i = 0; i < islands_.size(); ++i) {
+        if (!may_hold(islands_[i])) continue;
         begin(i);
-        if (newton_.speed(problem, islands_[i], w_) <= parameters.rest_speed || hold(i, f)) continue;
+        if (rests(islands_[i])) continue;
+        if (hold(i, f)) {
+            errors_[i] = newton_.error(problem, islands_[i], f, w_);
+            continue;
+        }
         copy(islands_[i], guess_, f);
         newton_.move(problem, islands_[i], f, x_, w_);
         all = false;
     }
+    error_ = errors_.empty() ? 0.0 : *std::max_element(errors_.begin(), errors_.end());
     return all;
 }
 

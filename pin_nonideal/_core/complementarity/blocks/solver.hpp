@@ -17,7 +17,7 @@ struct BlockSolverParameters {
     int max_sweep_rounds = 2, sweeps_per_round = 50;
     double min_swept_error = 1e-2;  // error from which sweeps from no forces replace the best forces found
     int last_sweeps = 400;          // number of these sweeps
-    double rest_speed = 1e-9;       // speed of an island at rest, relative to that without forces
+    double rest_speed = 1e-9;       // speed of elements at rest, relative to the largest without forces
     double path_rest_speed = 1e-3;  // speed of an island at rest at the end of the central path
     // Steps in an island, times its elements, after which no other search begins: about 100 ms. The bound is a count
     // instead of a time, so that runs stay the same.
@@ -40,8 +40,9 @@ public:
     // load as equally compliant contacts do, so that their forces depend on the problem alone. Between several nodes
     // shares stay close to the guess.
     double solve(VecX& f);
-    // Hold the islands at rest that forces within the cones can hold, from the forces f of `solve`. Newton's method may
-    // find a motion where rest is possible as well. Return false if an island moves.
+    // Hold the elements that rest, in islands whose contacts all rest, if forces within the cones can hold them. Newton's
+    // method may find a motion where rest is possible as well. f are the forces of `solve`. Return false if elements of
+    // such an island cannot be held.
     bool hold(VecX& f);
     // Compute the motion under the forces f. After `solve` the motion under its forces is known already.
     void move(const VecX& f);
@@ -65,6 +66,8 @@ private:
     double solve_within_energy(int island, VecX& f);
     bool share(int island, VecX& f);
     bool hold(int island, VecX& f);
+    bool may_hold(const Island& island) const;
+    bool rests(const Island& island) const;
     void begin(int island);
     void clear(int island, VecX& f) const;
     void copy(const Island& island, const VecX& from, VecX& to) const;
@@ -87,7 +90,8 @@ private:
     Islands islands_;
     std::vector<BlockFactor> factors_;  // one for each island
     VecX x_, w_;  // motion in the unknowns of the problem, and its rows
-    double error_ = 0.0;
+    std::vector<double> errors_;  // per island
+    double error_ = 0.0;          // largest of them
     Miss miss_;
     double free_speed_ = 0.0;  // largest of free_rows_
 };

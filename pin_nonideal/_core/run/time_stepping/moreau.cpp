@@ -348,8 +348,8 @@ void Moreau::keep_percussions() {
     for (size_t i = 0; i < rows_of_percussions_.size(); ++i) entry(rows_of_percussions_[i]) = forces_.f[i];
 }
 
-// Compute the velocity, the closed contacts and the modes at the step's end. A force below its limit holds an element
-// whose slip stops. If a solution satisfies neither condition, the condition with the smaller error decides.
+// Compute the velocity, the closed contacts and the modes at the step's end. A contact with a load does not open due to a
+// rate as small as the residuals of the forces. A force below its limit holds an element whose slip stops. If a solution satisfies neither condition, the condition with the smaller error decides.
 void Moreau::end_velocity() {
     const auto& parts = elements_.parts;
     const auto& cones = elements_.cones;
@@ -370,14 +370,19 @@ void Moreau::end_velocity() {
     for (size_t e = 0, at = 0; e < parts.size(); at += cones[e].dim, ++e) {
         const StepElements::Part& part = parts[e];
         const int head = part.gap >= 0, dim = cones[e].dim - head;
-        if (head) closed_[part.gap] = rule.is_rest(end[at] - part.approach);
+        if (head) {
+            const double rate = end[at] - part.approach;
+            const double error = std::max(still, h_ * forces_.row_error(static_cast<int>(at), 1));
+            closed_[part.gap] = rule.is_rest(rate, error) || (f[at] > clear && rule.is_stopped(rate));
+        }
         if (part.element < 0 || (head && !closed_[part.gap])) continue;
         const double limit = cones[e].bound * (head ? f[at] : 1.0);
         const double size = dim == 1 ? std::abs(f[at + head] - part.middle) : f.segment(at + head, dim).norm();
         const double slip = end.segment(at + head, dim).norm();
         const double error = h_ * forces_.row_error(static_cast<int>(at), cones[e].dim);
-        // In a short step an element may begin to slip at less than the speed of rest.
-        const bool rests = rule.is_rest(slip, error) && (head || slip <= still + error);
+        // In a short step a joint may begin to slip at less than the speed of rest.
+        const bool rests = head ? rule.is_rest(slip, std::max(error, still))
+                                : rule.is_rest(slip, error) && slip <= still + error;
         const bool holds =
             limit - size > clear && (rule.is_stopped(slip) || rule.is_nearer_to_rest(slip, size, limit));
         const bool forward = dim > 1 || (dim > 0 && end[at + head] > 0.0);

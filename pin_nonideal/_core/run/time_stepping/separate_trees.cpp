@@ -44,11 +44,13 @@ double SeparateTrees::solve(const std::vector<ConeElement>& cones, const VecX& m
     return error;
 }
 
-void SeparateTrees::hold(const VecX& middle, VecX& f) {
+bool SeparateTrees::hold(const std::vector<char>& rests, const VecX& middle, VecX& f) {
     exert(middle, f);
-    solver_.hold(f_);
+    for (size_t e = 0; e < rests.size(); ++e) solver_.problem.elements[e].rests = rests[e];
+    const bool held = solver_.hold(f_);
     f.head(solver_.problem.rows) = f_ + middle_;
     f_moved_ = f.head(solver_.problem.rows);
+    return held;
 }
 
 // Compute the motion under the forces f, of which `middle` are constant, unless it is known.
@@ -102,16 +104,6 @@ void SeparateTrees::measure_balance() {
                 double& most = balanced_[e.node[side]];
                 most = std::max(most, std::abs(solver_.own_response(row, f_moved_)));
             }
-}
-
-bool SeparateTrees::rests(const VecX& a) {
-    measure_balance();
-    for (size_t n = 0; n < balanced_.size(); ++n) {
-        const BlockNode& node = solver_.problem.nodes[n];
-        const double left = a.segment(node.first, node.size).cwiseAbs().maxCoeff();
-        if (!(left <= tree_acceleration_rounding * balanced_[n])) return false;
-    }
-    return true;
 }
 
 void SeparateTrees::keep_rest(double h, const VecX& v0, VecX& v1) {

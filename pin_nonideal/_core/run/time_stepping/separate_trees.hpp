@@ -20,8 +20,11 @@ public:
     // Solve the laws for the forces f, from a guess. The limits of an element without a cone bound its force about
     // `middle`. Return the largest error of an element, relative to its forces.
     double solve(const std::vector<ConeElement>& cones, const VecX& middle, VecX& f);
-    // Change the forces f of the last call of `solve` if other forces hold moving trees at rest.
-    void hold(const VecX& middle, VecX& f);
+    // Change the forces f of the last call of `solve` if other forces hold the elements that rest, see BlockSolver::hold.
+    // `rests`: per element. Return false if such elements cannot be held.
+    bool hold(const std::vector<char>& rests, const VecX& middle, VecX& f);
+    // Largest error of an element under the forces of `solve` and `hold`, relative to its forces.
+    double error() const { return solver_.error(); }
     // Compute the acceleration a and the rows w under the forces f. `middle` as in `solve`.
     void move(const VecX& middle, const VecX& f, VecX& a, VecX& w);
     // Add the multipliers of the constraints due to the forces f of the rows, at the acceleration a under these forces.
@@ -29,8 +32,6 @@ public:
                          VecX& lam);
     // Set the velocity v1 of trees to zero that were at rest, v0 = 0, and whose forces cancel over the step h.
     void keep_rest(double h, const VecX& v0, VecX& v1);
-    // Check if the accelerations a of the trees under the forces of the last motion are rounding error.
-    bool rests(const VecX& a);
     // Element with the largest error of the laws, and this error as a velocity.
     const BlockSolver::Miss& miss() const { return solver_.miss(); }
     // Errors of the laws for the forces f.

@@ -168,13 +168,11 @@ bool StepForces::solve(double h, const VecX& q0, const VecX& v0) {
     guess_ = f.head(static_cast<Eigen::Index>(elements_.rows.size()));
     status_ = ConeStatus::solved;
     const VecX& without_rest = w.state.q_without_rest;
-    const bool starts = v0.cwiseAbs().maxCoeff() <= rest_speed && !(without_rest.size() > 0 && without_rest == q0);
-    if (!separate_) return solve_with_responses(starts, q0);
+    const bool may_rest = !(without_rest.size() > 0 && without_rest == q0);
+    if (!separate_) return solve_with_responses(may_rest && v0.cwiseAbs().maxCoeff() <= rest_speed, q0);
     error_ = trees_.solve(elements_.cones, middle_, f);
-    const bool solved = error_ <= parameters.max_residual;
-    if (solved && !(starts && moves())) return true;
-    if (starts && hold_trees(q0)) return true;
-    if (solved) return true;
+    if (may_rest) hold_resting(q0);
+    if (error_ <= parameters.max_residual) return true;
     best_f_ = f.head(guess_.size());
     if (guess_.size() <= parameters.max_rows_with_responses && solve_with_responses(false, q0)) return true;
     return accept_best_forces(h);
@@ -231,15 +229,13 @@ bool StepForces::solve_cones(bool starts, const VecX& q0) {
     return true;
 }
 
-// Hold trees at rest that forces can hold. Return true if all rest.
-bool StepForces::hold_trees(const VecX& q0) {
-    trees_.hold(middle_, f);
-    if (!moves()) {
-        error_ = 0.0;
-        return true;
-    }
-    w.state.q_without_rest = q0;  // the next sweeps and the step after the start skip this check
-    return false;
+// Hold the elements that rest at the step's start if forces can hold them, whatever moves elsewhere.
+void StepForces::hold_resting(const VecX& q0) {
+    rests_.clear();
+    for (const StepElements::Part& part : elements_.parts)
+        rests_.push_back((part.rests || part.element < 0) && !part.strikes);  // without friction, contact is rest
+    if (!trees_.hold(rests_, middle_, f)) w.state.q_without_rest = q0;  // the next sweeps skip this check
+    error_ = trees_.error();
 }
 
 // Accept the best forces found tree by tree, which violate the laws of contact by the error of one element.
@@ -277,13 +273,6 @@ double StepForces::row_error(int at, int dim) const {
 double StepForces::rest_of_rows() const {
     const auto free = free_rows_.head(static_cast<Eigen::Index>(elements_.rows.size()));
     return parameters.rest_rounding * free.cwiseAbs().maxCoeff();
-}
-
-bool StepForces::moves() {
-    const int n = static_cast<int>(elements_.rows.size());
-    measure_end();
-    if (separate_) return !trees_.rests(a_);
-    return end_rows.head(n).cwiseAbs().maxCoeff() > rest_of_rows();
 }
 
 // Check if forces within all cones hold the bodies at rest, and set f to such forces. The rows without forces are in

@@ -102,8 +102,7 @@ private:
     bool has_few_boxes() const;
     bool solve_boxes();
     bool solve_cones(bool starts, const VecX& q0);
-    bool moves();
-    bool hold_trees(const VecX& q0);
+    void hold_resting(const VecX& q0);
     bool keep_rest(bool solved, const VecX& q0);
 
     const Program& p;
@@ -118,6 +117,7 @@ private:
     SharedFriction shared_;
     bool are_dependent_ = false;
     std::vector<SharedFriction::Element> sticking_;
+    std::vector<char> rests_;  // per element
     std::vector<int> dry_rows_;
     ConeComplementarity solver_;
     BoxProgram box_;
