@@ -193,7 +193,7 @@ def test_three_revolutes_of_a_ball_joint_are_merged():
     scene = pn.load(DATA / "digit_like")
     assert sum("Spherical" in j.shortname() for j in scene.model.joints) == 6
     assert scene.model.nv == 27
-    note = next(n for n in scene.notes if "merged into a ball joint" in n)
+    note = next(n for n in scene.notes if "become one ball joint" in n)
     assert '"hip_x_toe_a_2/2"' in note
     assert pn.load(DATA / "digit_like", merge_ball_joints=False).model.nq == 27
 

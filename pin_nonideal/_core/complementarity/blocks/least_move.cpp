@@ -72,8 +72,7 @@ double LeastMove::longest_single(int i, const VecX& r) {
     return longest;
 }
 
-// Replace a move by the move due to its forces f = -G (r + J dx) on the rows. The rows may have changed since the
-// factor.
+// Replace a move by the move due to its forces f = -G (r + J dx) on the rows, which are equal and opposite on two nodes.
 void LeastMove::exert(int i, const VecX& r, VecX& move) {
     for (int k : islands_[i].elements) {
         const BlockElement& e = problem.elements[k];

@@ -25,8 +25,8 @@ public:
     using Parameters = LeastMoveParameters;
     static constexpr Parameters parameters{};
 
-    // Nodes, elements, M and J are set by the caller. J may change after pose. Moves then follow the new rows with the
-    // factor of the old rows, and exert equal and opposite forces on two nodes.
+    // Nodes, elements, M and J are set by the caller before `pose`. Other rows need another `pose`: the weights would
+    // amplify their difference. Moves exert equal and opposite forces on two nodes.
     BlockProblem problem;
     VecX lever;  // per unknown of the whole scene: length of a unit displacement, set by the caller
 

@@ -311,10 +311,7 @@ bool ContactProjection::correct(const Program& p, Workspace& w, double t, double
         place_bodies(p.mechanism, w.now.terms, q);
     }
     if (moves) place_rows(p, w, t, v);
-    // Velocities follow the inertia after the move. In short trees its change within a step is small, and in deep trees it
-    // multiplies the energy.
-    if (!posed || (moves && !p.mechanism.deep_dofs.empty())) pose(p, w, true);
-    else if (moves) blocks_.fill(p, w, rows_, elements_, least_.problem);
+    if (moves || !posed) pose(p, w, true);  // velocities follow the rows and the inertia after the move
     meet_rates(p, w, v);
     rest(p, w, v);
     if (energy) moved_energy_ += total() - before;

@@ -349,7 +349,8 @@ void Moreau::keep_percussions() {
 }
 
 // Compute the velocity, the closed contacts and the modes at the step's end. A contact with a load does not open due to a
-// rate as small as the residuals of the forces. A force below its limit holds an element whose slip stops. If a solution satisfies neither condition, the condition with the smaller error decides.
+// rate as small as the residuals of the forces. A force below its limit holds an element whose slip stops. If a solution
+// satisfies neither condition, the condition with the smaller error decides.
 void Moreau::end_velocity() {
     const auto& parts = elements_.parts;
     const auto& cones = elements_.cones;
