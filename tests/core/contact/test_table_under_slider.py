@@ -53,11 +53,9 @@ class Table:
         for k, (foot, mu) in enumerate(zip(self.feet, self.mu, strict=True)):
             model.addFrame(pin.Frame(f"foot{k}", table, 0, pin.SE3(np.eye(3), foot), pin.FrameType.OP_FRAME))
             contacts.append(pn.PointContact(f"foot{k}", mu=mu, name=f"foot{k}"))
-        drive = np.zeros(7)
 
         def torques(t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-            drive[6] = self.force * np.sin(self.rate * t)
-            return drive
+            return np.append(np.zeros(6), self.force * np.sin(self.rate * t))
 
         start = {"q0": np.array([0.0, 0.0, HEIGHT, 0.0, 0.0, 0.0, 1.0, 0.0])}
         return pn.Scene(

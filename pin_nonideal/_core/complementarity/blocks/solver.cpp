@@ -231,8 +231,20 @@ bool BlockSolver::may_hold(const Island& island) const {
     return rests;
 }
 
+// Find the largest error of the islands, and the element that has it.
+void BlockSolver::find_worst(const VecX& f) {
+    error_ = 0.0;
+    miss_ = {};
+    for (int i = 0; i < islands_.size(); ++i) {
+        if (!(errors_[i] > error_)) continue;
+        error_ = errors_[i];
+        begin(i);
+        newton_.worst(problem, islands_[i], f, w_, miss_.element, miss_.velocity);
+    }
+}
+
 bool BlockSolver::hold(VecX& f) {
-    bool all = true;
+    bool all = true, changes = false;
     guess_ = f;
     for (int i = 0; i < islands_.size(); ++i) {
         if (!may_hold(islands_[i])) continue;
@@ -240,13 +252,14 @@ bool BlockSolver::hold(VecX& f) {
         if (rests(islands_[i])) continue;
         if (hold(i, f)) {
             errors_[i] = newton_.error(problem, islands_[i], f, w_);
+            changes = true;
             continue;
         }
         copy(islands_[i], guess_, f);
         newton_.move(problem, islands_[i], f, x_, w_);
         all = false;
     }
-    error_ = errors_.empty() ? 0.0 : *std::max_element(errors_.begin(), errors_.end());
+    if (changes) find_worst(f);
     return all;
 }
 

@@ -68,6 +68,7 @@ private:
     bool hold(int island, VecX& f);
     bool may_hold(const Island& island) const;
     bool rests(const Island& island) const;
+    void find_worst(const VecX& f);
     void begin(int island);
     void clear(int island, VecX& f) const;
     void copy(const Island& island, const VecX& from, VecX& to) const;

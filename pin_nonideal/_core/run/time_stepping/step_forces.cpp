@@ -229,7 +229,8 @@ bool StepForces::solve_cones(bool starts, const VecX& q0) {
     return true;
 }
 
-// Hold the elements that rest at the step's start if forces can hold them, whatever moves elsewhere.
+// Hold the elements that rest at the step's start if forces can hold them, whatever moves elsewhere. With the responses of
+// all rows, bodies are held only if the whole scene rests.
 void StepForces::hold_resting(const VecX& q0) {
     rests_.clear();
     for (const StepElements::Part& part : elements_.parts)
@@ -284,7 +285,7 @@ bool StepForces::keep_rest(bool solved, const VecX& q0) {
                        parameters.rest_rounding * end_rows.head(n).cwiseAbs().maxCoeff();
     if (solved && !moves) return false;
     const bool holds = solver_.hold(W, end_rows.head(n), elements_.cones, f.head(n));
-    if (!holds) w.state.q_without_rest = q0;  // the next sweeps and the step after the start skip this check
+    if (!holds) w.state.q_without_rest = q0;  // the next sweeps skip this check
     return holds;
 }
 
